@@ -82,7 +82,7 @@ coverage: install/.built
 # What is run before every commit; with COVERAGE=yes it measures that, too, and takes three
 # minutes longer. The kernels of all networks are compiled while linters run.
 test: install/.built messages
-	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile $(KERNELS) & \
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.executables $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
 	@$(ENTER); for part in '$(OFFLINE) -m "not (live or $(LEFT_OUT))" $(if $(COVERAGE),$(COVER))' \
 		'$(ONLINE) $(AGAIN) -m "live and not ($(LEFT_OUT))"'; do \
@@ -99,7 +99,7 @@ test-deep: install/.built messages
 # Exported gaits as compiled C, and on simulated microcontrollers with their cycles, flash and RAM:
 # gcc-avr, avr-libc, simavr, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm of Debian.
 test-export: install/.built
-	@$(ENTER); $(VENV)/bin/pytest test/export test/tools/test_export_tool.py --timeout 600 -s $(ARGS)
+	@$(ENTER); $(VENV)/bin/pytest test/motion/export --timeout 600 -s $(ARGS)
 
 # Small faults, one at a time in a copy of the tree, each of which some test has to notice.
 mutants: install/.built messages
@@ -152,7 +152,7 @@ install/.built: $(INSTALLED) $(SOURCES)
 # Once for each installation, at most 90 s: later changes are compiled where they are first used.
 # -P: of the installed copy, which is what nodes run.
 install/.compiled: | install/.built
-	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile || \
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.executables || \
 		echo 'the kernels were not compiled: that is done at the first start'
 	@touch $@
 

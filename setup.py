@@ -27,7 +27,7 @@ import signal
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
-from cpg_ros.tools.executables import start
+from cpg_ros.ros.cli.executables import start
 
 if __name__ == '__main__':
     raise SystemExit(start('{name}'))
@@ -66,7 +66,8 @@ setup(
     version='0.1.0',
     cmdclass={'install_scripts': Scripts, 'dist_info': WheelMetadata},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
-    package_data={'cpg_ros': ['py.typed', 'nodes/*.xml', 'panel/page/*', 'export/c/*']},
+    package_data={'cpg_ros': ['py.typed', 'ros/node/*.xml', 'ros/panel/page/*',
+                              'dynamics/integration/c/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),
@@ -96,22 +97,22 @@ setup(
     description='Central pattern generators for legged robots on ROS 2',
     license='Apache-2.0',
     entry_points={'console_scripts': [
-        'generator = cpg_ros.tools.executables:generator',
-        'robot_sim = cpg_ros.tools.executables:robot_sim',
-        'unitree_bridge = cpg_ros.tools.executables:unitree_bridge',
-        'servo_bridge = cpg_ros.tools.executables:servo_bridge',
-        'servo_bus = cpg_ros.tools.executables:servo_bus',
-        'panel = cpg_ros.tools.executables:panel',
-        'inversion = cpg_ros.tools.executables:inversion',
-        'cpg = cpg_ros.tools.executables:cpg',
-        'demo = cpg_ros.tools.executables:demo',
-        'analyze = cpg_ros.tools.executables:analyze',
-        'check_robot = cpg_ros.tools.executables:check_robot',
-        'optimize = cpg_ros.tools.executables:optimize',
-        'reproduce = cpg_ros.tools.executables:reproduce',
-        'tune = cpg_ros.tools.executables:tune',
-        'calibrate = cpg_ros.tools.executables:calibrate',
-        'atlas = cpg_ros.tools.executables:atlas',
-        'record_dataset = cpg_ros.tools.executables:record_dataset',
-        'export = cpg_ros.tools.executables:export']},
+        'generator = cpg_ros.ros.cli.executables:generator',
+        'robot_sim = cpg_ros.ros.cli.executables:robot_sim',
+        'unitree_bridge = cpg_ros.ros.cli.executables:unitree_bridge',
+        'servo_bridge = cpg_ros.ros.cli.executables:servo_bridge',
+        'servo_bus = cpg_ros.ros.cli.executables:servo_bus',
+        'panel = cpg_ros.ros.cli.executables:panel',
+        'inversion = cpg_ros.ros.cli.executables:inversion',
+        'cpg = cpg_ros.ros.cli.executables:cpg',
+        'demo = cpg_ros.ros.cli.executables:demo',
+        'analyze = cpg_ros.ros.cli.executables:analyze',
+        'check_robot = cpg_ros.ros.cli.executables:check_robot',
+        'optimize = cpg_ros.ros.cli.executables:optimize',
+        'reproduce = cpg_ros.ros.cli.executables:reproduce',
+        'tune = cpg_ros.ros.cli.executables:tune',
+        'calibrate = cpg_ros.ros.cli.executables:calibrate',
+        'atlas = cpg_ros.ros.cli.executables:atlas',
+        'record_dataset = cpg_ros.ros.cli.executables:record_dataset',
+        'export = cpg_ros.ros.cli.executables:export']},
 )

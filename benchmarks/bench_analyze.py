@@ -51,15 +51,15 @@ def main() -> None:
     parser = ArgumentParser(description=__doc__)
     parser.add_argument('--beside', type=Path, metavar='FOLDER', help='another workspace')
     parser.add_argument('--rounds', type=int, default=5)
-    chosen = parser.parse_args()
-    places = {'seconds': ROOT, **({'seconds_beside': chosen.beside} if chosen.beside else {})}
+    args = parser.parse_args()
+    places = {'seconds': ROOT, **({'seconds_beside': args.beside} if args.beside else {})}
     found: dict[str, dict[str, float]] = {name: {} for name in places}
     with tempfile.TemporaryDirectory() as folder:
         for run, given in RUNS.items():
             for what, more in ((run, ()), (f'{run}_plot', ('--plot', f'{folder}/analysis.png'))):
                 log(what)
                 times: dict[str, list[float]] = {name: [] for name in places}
-                for turn in range(chosen.rounds + 1):
+                for turn in range(args.rounds + 1):
                     for name, place in places.items():
                         seconds = spent(place, [*given, *more])
                         # What is not compiled yet is compiled in the first turn.

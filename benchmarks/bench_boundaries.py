@@ -31,13 +31,14 @@ import tempfile
 
 from bench_peers import output_rows
 from common import emit, log, ROOT
-from cpg_ros.atlas.chart import Chart, chart_of
-from cpg_ros.atlas.fold_curves import fold_curves
-from cpg_ros.atlas.hopf_curves import Boundary, hopf_curves
-from cpg_ros.atlas.orbit_curves import Edge, orbit_curves
+from cpg_ros.analysis.atlas.chart import chart_of, ParameterPlane
+from cpg_ros.analysis.atlas.fold_curves import fold_curves
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, hopf_curves
+from cpg_ros.analysis.atlas.orbit_curves import Edge, orbit_curves
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import GAITS
 import numpy as np
@@ -74,7 +75,7 @@ def some(curve: Boundary, count: int) -> np.ndarray:
     return np.linspace(0, len(curve.points) - 1, count + 2).astype(int)[1:-1]
 
 
-def dde_biftool(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
+def dde_biftool(chart: ParameterPlane, curves: list[Boundary]) -> dict[str, object]:
     """Return the largest difference in c or tau, whichever is not held, and how many points."""
     place = os.environ.get('DDE_BIFTOOL', '')
     if not shutil.which('octave-cli'):
@@ -102,7 +103,7 @@ def dde_biftool(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
             'curves': len(curves), 'points': len(theirs), 'corrected': int(theirs[:, 1].sum())}
 
 
-def of_pace() -> tuple[Chart, list[Boundary]]:
+def of_pace() -> tuple[ParameterPlane, list[Boundary]]:
     """Return the plane of the pace, and curves of its Hopf points, folds and torus points."""
     chart = chart_of('quadruped', PACE.network, [('xi', (-0.02, 0.02)),
                                                  ('alpha=beta', (0.1, 0.65))], (9, 9))
@@ -123,7 +124,7 @@ def of_pace() -> tuple[Chart, list[Boundary]]:
                    *orbit_curves((chart, 'pace', small))]
 
 
-def auto(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
+def auto(chart: ParameterPlane, curves: list[Boundary]) -> dict[str, object]:
     """Return the largest difference in alpha=beta for each kind, with how many points of what."""
     if not shutil.which('autox') or not shutil.which('gfortran'):
         return {'skipped': 'AUTO-07p is not installed (Debian: auto-07p, gfortran)'}

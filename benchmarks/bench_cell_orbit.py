@@ -27,7 +27,7 @@ import warnings
 
 from common import emit, log
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh.newton import Reduced
+from cpg_ros.dynamics.mesh.orbit import Reduced
 from cpg_ros.dynamics.mesh.solve import beside, from_preset
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import PRESETS

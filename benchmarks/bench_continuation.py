@@ -27,10 +27,10 @@ import warnings
 
 from common import emit, log
 from cpg_ros.dynamics.continuation import Branch, continue_orbit
-from cpg_ros.dynamics.fourier.newton import equations
-from cpg_ros.dynamics.mesh.newton import Reduced
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.dynamics.fourier.orbit import equations
+from cpg_ros.dynamics.mesh.orbit import Reduced
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 import numpy as np
 from scipy.integrate import solve_bvp

@@ -28,9 +28,9 @@ import sys
 import tempfile
 
 from common import by_turns, emit, log
-from cpg_ros.recordings.bag_reader import read_bag
-from cpg_ros.recordings.cdr import JOINT_STATE
-from cpg_ros.recordings.rosbags_library import STORE
+from cpg_ros.fitting.recordings.bag_reader import read_bag
+from cpg_ros.fitting.recordings.cdr import JOINT_STATE
+from cpg_ros.fitting.recordings.rosbags_library import STORE
 import numpy as np
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
@@ -112,11 +112,12 @@ def main() -> None:
     # Of the best and the median, whichever says less for ours.
     speedup = {name: min(spent[f'{name} library'][which] / spent[f'{name} ours'][which]
                          for which in ('best', 'median')) for name in STORAGES}
-    share = {name: taken[name] / sizes[name] for name in STORAGES}
+    fraction = {name: taken[name] / sizes[name] for name in STORAGES}
     emit(benchmark='decode', messages=MESSAGES, joints=len(JOINTS), ms=spent,
          speedup=speedup, identical=identical, bag_mb=sizes, memory_mb=taken,
-         memory_share=share, targets=TARGETS,
-         passed=all(identical.values()) and min(share.values()) > 0.0 and max(share.values()) < 1.0
+         memory_share=fraction, targets=TARGETS,
+         passed=all(identical.values()) and min(fraction.values()) > 0.0
+         and max(fraction.values()) < 1.0
          and all(speedup[name] >= goal for name, goal in TARGETS.items()))
 
 

@@ -100,7 +100,8 @@ def sensor_fault(fault: str, seeds: int) -> dict[str, object]:
     reasons = Counter(reason for one in outcomes for reason in one.faults)
     return {'runs': seeds, 'fell': sum(one.fell for one in outcomes),
             'crossed': sum(one.crossed for one in outcomes),
-            'without feedback at the end': sum(float(one.shares[-1]) == 0.0 for one in outcomes),
+            'without feedback at the end': sum(float(one.fractions[-1]) == 0.0
+                                               for one in outcomes),
             'reasons': [reason for reason, _ in reasons.most_common(3)]}
 
 

@@ -30,13 +30,12 @@ import time
 from typing import Any, NamedTuple
 
 from common import emit, log, ROOT
-from cpg_ros.errors import CpgError
-from cpg_ros.feedback.froude_scaling import robot_gains
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.common.command_line import progress_bar
+from cpg_ros.common.errors import CpgError
+from cpg_ros.feedback.gains import Gains, robot_gains
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.simulation.scenario import SensorNoise
 from feedback_figures import (
     flat,
@@ -133,7 +132,7 @@ def changed(changes: list[str], gains: Gains) -> Gains:
 def pushed_with(job: Job, run: Run, mass: float) -> tuple[float, ...]:
     """Return the impulses that a gait is pushed with, N s."""
     if run.robot != ROBOT:
-        return tuple(round(share * mass, 1) for share in UNKNOWN)
+        return tuple(round(fraction * mass, 1) for fraction in UNKNOWN)
     if job.gait in ('pace', 'bound'):
         return (4.0, 8.0, 12.0, *OPEN[1:], *CLOSED[1:])[:None if job.closed else 6]
     if job.figure == 'networks' and job.closed:
@@ -233,14 +232,14 @@ def main() -> int:
         own = jobs(run.quick) if path == ROBOT else jobs_of(robot)
     except (CpgError, ValueError) as error:
         parser.error(str(error))
-    chosen = [job for job in own if job.figure in (arguments.only or [job.figure])
+    args = [job for job in own if job.figure in (arguments.only or [job.figure])
               and job.gait in (arguments.gaits or [job.gait])
               and (job.closed or not arguments.changes)]
     began, found = time.perf_counter(), {}
     with (ProcessPoolExecutor(arguments.processes) as pool,
-          progress_bar('figures', len(chosen)) as progress):
-        measured = pool.map(measure, chosen, itertools.repeat(run))
-        for done, (job, one) in enumerate(zip(chosen, measured, strict=True), 1):
+          progress_bar('figures', len(args)) as progress):
+        measured = pool.map(measure, args, itertools.repeat(run))
+        for done, (job, one) in enumerate(zip(args, measured, strict=True), 1):
             way = found.setdefault(job.gait, {'open': {}, 'closed': {}})[
                 'closed' if job.closed else 'open']
             if job.network:

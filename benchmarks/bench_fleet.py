@@ -34,12 +34,11 @@ import psutil
 from fleet_recordings import COUNT, DAMAGE, counted, make  # isort: skip
 from fleet_jobs import dask_cluster, pause  # isort: skip
 
-from cpg_ros.fleet import many_recordings
-from cpg_ros.fleet.executors import cluster, processes
-from cpg_ros.fleet.many_recordings import Folders
-from cpg_ros.fleet.outcomes import outcomes
-from cpg_ros.fleet.recording_job import FitSettings
-from cpg_ros.tools.atlas import main as draw
+from cpg_ros.analysis.atlas.atlas import main as draw
+from cpg_ros.common.jobs import outcomes
+from cpg_ros.common.workers import cluster, processes
+from cpg_ros.fitting.inversion import many_recordings
+from cpg_ros.fitting.inversion.many_recordings import FitSettings, Folders
 
 GOALS = {'efficiency': 1.8, 'overhead': 0.10}
 
@@ -154,20 +153,20 @@ def main() -> None:
     parser.add_argument('--efficiency', action='store_true', help='nothing else')
     parser.add_argument('--atlas', action='store_true')
     parser.add_argument('--searches', action='store_true')
-    chosen = parser.parse_args()
+    args = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if not chosen.efficiency:
-            emit(benchmark='fleet table', **table(folder, chosen.recordings, chosen.damaged))
+        if not args.efficiency:
+            emit(benchmark='fleet table', **table(folder, args.recordings, args.damaged))
         emit(benchmark='fleet efficiency', goal=GOALS['efficiency'],
              two_processes_over_one={'inversion': efficiency(folder, 24),
                                      'atlas': atlas_efficiency(folder)})
-        if not chosen.efficiency:
+        if not args.efficiency:
             emit(benchmark='fleet overhead', goal=GOALS['overhead'],
                  dask_over_processes=overhead(folder))
-        if chosen.atlas:
+        if args.atlas:
             emit(benchmark='fleet atlas', **atlas(folder))
-        if chosen.searches:
+        if args.searches:
             emit(benchmark='fleet searches', **searches(folder))
 
 
@@ -180,7 +179,7 @@ def atlas(folder: Path) -> dict[str, object]:
 
 def searches(folder: Path) -> dict[str, object]:
     """Whether tune finds the same on one process, two and dask."""
-    from cpg_ros.simulation.tuning import tune
+    from cpg_ros.simulation.tuning.gaits import tune
     from go2 import GO2
     found = {}
     with (dask_cluster(folder, 2) as dask, cluster(dask.address) as far, processes(2) as two,

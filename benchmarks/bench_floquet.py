@@ -23,9 +23,9 @@ import time
 
 from common import by_turns, emit, log
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.networks.library.delayed import PRESETS
 import numpy as np
 
 ROUNDS, STEPS = 20, 400

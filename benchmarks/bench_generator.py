@@ -24,8 +24,8 @@ import argparse
 import time
 
 from common import emit, log
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 from processes import enter_workspace, Listener, start_node
 

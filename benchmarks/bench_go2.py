@@ -27,10 +27,10 @@ import time
 from common import emit, log, ROOT
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan, plan
-from cpg_ros.motion.strides import Drive
+from cpg_ros.motion.robot_file import read_robot
+from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import read_robot
-from cpg_ros.simulation.batch import Batch, targets
+from cpg_ros.simulation.bodies import OpenLoopBatch, targets
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
@@ -46,7 +46,7 @@ FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk'
 ROBOT = read_robot(ROOT / 'config' / 'unitree_go2.yaml')
 
 
-def program(gait: str) -> GaitPlan:
+def gait_plan(gait: str) -> GaitPlan:
     preset = PRESETS['delayed'][gait]
     return plan(ROBOT, gait, preset, preset.network, ROBOT.motion(gait, gait).frequency or 0.0)
 
@@ -68,7 +68,7 @@ def sines(made: GaitPlan) -> np.ndarray:
     return np.stack([columns[name] for name in ROBOT.order], axis=1)
 
 
-def pushed(batch: Batch, angles: np.ndarray, force: float) -> int:
+def pushed(batch: OpenLoopBatch, angles: np.ndarray, force: float) -> int:
     """How many of 20 seeds a run survives, each with four random pushes."""
     runs = []
     for seed in range(20):
@@ -98,7 +98,7 @@ def tour(body: Body, made: dict[str, GaitPlan]) -> str:
 
 def steered(body: Body, made: GaitPlan, forward: float, turn: float) -> tuple[float, float]:
     """Return the speeds and yaw rates that are reached for those commanded."""
-    pattern = Pattern(made, drive=Drive(4))
+    pattern = Pattern(made, drive=StrideCommand(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)
     walk.go(2.0)
@@ -113,8 +113,8 @@ def figures(trial: RunMetrics) -> dict[str, float | bool]:
 
 
 def main() -> int:
-    batch, body = Batch('go2', ROBOT), Body('go2', ROBOT)
-    made = {gait: program(gait) for gait in GAITS}
+    batch, body = OpenLoopBatch('go2', ROBOT), Body('go2', ROBOT)
+    made = {gait: gait_plan(gait) for gait in GAITS}
     angles = {gait: targets(made[gait], DURATION, DT) for gait in GAITS}
     log('six gaits and the plain formulas')
     began = time.perf_counter()

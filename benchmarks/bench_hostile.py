@@ -25,7 +25,7 @@ import time
 
 from client import NoAnswer, ParameterClient
 from common import emit, log
-from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.networks.library.delayed import PRESETS
 from hostile import effect, requests
 import numpy as np
 from processes import enter_workspace, Listener, start_node

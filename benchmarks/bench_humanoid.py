@@ -35,7 +35,7 @@ from typing import Any, NamedTuple
 from common import emit, log
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.biped.gains import BipedGains
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.simulation.biped_run import BipedRun
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
@@ -76,7 +76,7 @@ class EvenClock:
     """Phases of two legs that grow evenly."""
 
     def __init__(self, track: Any) -> None:
-        self.program, self.legs, self.phase = track.program, track.legs.copy(), track.phase
+        self.plan, self.legs, self.phase = track.plan, track.legs.copy(), track.phase
         # The cells stand still, and the arms with them.
         self.stepper = track.stepper
 
@@ -181,25 +181,25 @@ def main() -> None:
     parser.add_argument('--first-seed', type=int, default=1000)
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--quick', action='store_true', help='no ablations')
-    chosen = parser.parse_args()
-    robot, seed = (chosen.robot, chosen.model or chosen.robot), chosen.first_seed
+    args = parser.parse_args()
+    robot, seed = (args.robot, args.model or args.robot), args.first_seed
     jobs = [Job(*robot, seed + k, name, gait, tuple(wish), seconds)
-            for name, (gait, *wish, seconds) in GOINGS.items() for k in range(chosen.seeds)]
+            for name, (gait, *wish, seconds) in GOINGS.items() for k in range(args.seeds)]
     jobs += [Job(*robot, seed + k, 'ten times', 'walk', (0.3, 0.0, 0.0), 10.0 * ROUND)
              for k in range(2)]
     jobs += [Job(*robot, seed + k, name, 'walk', (0.3, 0.0, 0.0), CROSSING, number=k)
              for name in GROUNDS for k in range(CROSSINGS)]
     jobs += [Job(*robot, seed + k, name, 'run', (1.0, 0.0, 0.0), RUNNING + 7.0, number=k)
-             for name in ENDS for k in range(4 * chosen.seeds)]
+             for name in ENDS for k in range(4 * args.seeds)]
     for gait, strengths in IMPULSES.items():
         for strength in strengths:
             jobs += pushed(robot, seed, gait, strength)
-    ablations = () if chosen.quick else (*ABLATIONS, EVEN)
+    ablations = () if args.quick else (*ABLATIONS, EVEN)
     for ablation in ablations:
         for strength in IMPULSES['walk'][:2]:
             jobs += pushed(robot, seed, 'walk', strength, ablation)
     log(f'{len(jobs)} runs')
-    with ProcessPoolExecutor(chosen.jobs, multiprocessing.get_context('spawn')) as pool:
+    with ProcessPoolExecutor(args.jobs, multiprocessing.get_context('spawn')) as pool:
         found = list(pool.map(measure, jobs, chunksize=4))
     goings = {name: summary([one for job, one in found if job.name == name], tuple(wish))
               for name, (_, *wish, _) in GOINGS.items()}
@@ -219,7 +219,7 @@ def main() -> None:
               and all(goings[name]['error'] <= TARGETS['speed_error'] * abs(GOINGS[name][1])
                       for name in ('0.3', '0.5', 'backward', 'run 0.5', 'run 1.0'))
               and whole['20'] >= TARGETS['survived_20'] and whole['30'] >= TARGETS['survived_30'])
-    emit(benchmark='humanoid', robot=chosen.robot, goings=goings, grounds=crossed,
+    emit(benchmark='humanoid', robot=args.robot, goings=goings, grounds=crossed,
          walk_run_walk_stand_ten_times={'runs': len(ten), 'falls': sum(map(math.isfinite, ten))},
          run_ends={name: {'runs': len(own), 'falls': sum(own)} for name, own in ended.items()},
          pushes_of=DIRECTIONS * PHASES, survived=survived, targets=TARGETS, passed=passed)

@@ -112,29 +112,29 @@ def main() -> None:
     parser.add_argument('--first-seed', type=int, default=1000)
     parser.add_argument('--seconds', type=float, default=45.0)
     parser.add_argument('--impulses', type=float, nargs='*', default=[20.0, 30.0])
-    chosen = parser.parse_args()
+    args = parser.parse_args()
     enter_workspace()
     rclpy.init()
-    seeds = range(chosen.first_seed, chosen.first_seed + chosen.seeds)
+    seeds = range(args.first_seed, args.first_seed + args.seeds)
     walks, loads = {}, []
     for speed in SPEEDS:
-        own = [walked(chosen.robot, speed, chosen.seconds, seed) for seed in seeds]
+        own = [walked(args.robot, speed, args.seconds, seed) for seed in seeds]
         loads += own
         walks[f'{speed:g}'] = {
             'runs': len(own), 'falls': sum(one['fell'] for one in own),
             **{key: float(np.mean([one[key] for one in own])) for key in ('forward', 'left')},
             'error': max(abs(one['forward'] - speed) for one in own),
             'tilt_rad': max(one['tilt'] for one in own)}
-    survived = {f'{strength:g}': pushed(chosen.robot, strength, chosen.first_seed)
-                for strength in chosen.impulses}
-    tour = toured(chosen.robot, chosen.first_seed)
+    survived = {f'{strength:g}': pushed(args.robot, strength, args.first_seed)
+                for strength in args.impulses}
+    tour = toured(args.robot, args.first_seed)
     load = {key: float(np.median([one[key] for one in loads])) for key in (
         'cpu_generator', 'cpu_robot_sim', 'times_real_time')}
     passed = (not any(one['falls'] for one in walks.values()) and not tour['falls']
               and all(walks[f'{speed:g}']['error'] <= TARGETS['speed_error'] * speed
                       for speed in SPEEDS[1:])
               and survived.get('20', 24) >= TARGETS['survived_20'])
-    emit(benchmark='humanoid_live', robot=chosen.robot, seconds=chosen.seconds, walks=walks,
+    emit(benchmark='humanoid_live', robot=args.robot, seconds=args.seconds, walks=walks,
          pushes_of=DIRECTIONS * ROUNDS, survived=survived, tour=tour, **load, targets=TARGETS,
          passed=passed)
 

@@ -34,15 +34,20 @@ import symengine
 
 sys.path.append(str(ROOT / 'test' / 'support'))
 
-from cpg_ros.dynamics.orbit import solve_orbit  # noqa: E402, I100
-from cpg_ros.inversion.fit_data import joints_of  # noqa: E402
-from cpg_ros.inversion.free_parameters import free_numbers  # noqa: E402
-from cpg_ros.inversion.invert import invert, TOLERANCE  # noqa: E402
-from cpg_ros.inversion.least_squares import CycleProblem  # noqa: E402
-from cpg_ros.inversion.leg_duty import GaitReadout  # noqa: E402
-from cpg_ros.inversion.trust_region import minimise  # noqa: E402
-from cpg_ros.motion.joint_polynomial import monomials, TURN  # noqa: E402
-from cpg_ros.networks.delayed import Delayed, PRESETS  # noqa: E402
+from cpg_ros.dynamics.solve_orbit import solve_orbit  # noqa: E402, I100
+from cpg_ros.fitting.inversion.fit_data import joints_of  # noqa: E402
+from cpg_ros.fitting.inversion.free_parameters import (
+    free_numbers,  # noqa: E402
+    minimise,  # noqa: E402
+)
+from cpg_ros.fitting.inversion.invert import (  # noqa: E402
+    CycleProblem,  # noqa: E402
+    invert,
+    TOLERANCE,
+)
+from cpg_ros.fitting.inversion.leg_duty import GaitReadout  # noqa: E402
+from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
+from cpg_ros.networks.library.delayed import Delayed, PRESETS  # noqa: E402
 from made_up import record, weights_of  # noqa: E402
 
 CELLS = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)

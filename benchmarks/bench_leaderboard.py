@@ -31,10 +31,10 @@ import time
 from typing import Any
 
 from common import emit, log, ROOT
-from cpg_ros.errors import CpgError
-from cpg_ros.feedback.froude_scaling import robot_gains
-from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.common.command_line import progress_bar
+from cpg_ros.common.errors import CpgError
+from cpg_ros.feedback.gains import robot_gains
+from cpg_ros.motion.robot_file import read_robot
 from feedback_figures import subject
 
 sys.path.append(str(Path(__file__).with_name('leaderboard')))
@@ -80,14 +80,14 @@ def make(entrant: str, go1: Path | None, plain: bool, motors: bool
                  'mass_kg': body.mass}
 
 
-def measure(entrant: str, row: str, chosen: argparse.Namespace) -> dict[str, Any]:
+def measure(entrant: str, row: str, args: argparse.Namespace) -> dict[str, Any]:
     """Return the figures of a row, or why there are none, in a process of its own."""
     began = time.perf_counter()
     try:
-        one, what = make(entrant, chosen.go1, chosen.plain, chosen.motors)
+        one, what = make(entrant, args.go1, args.plain, args.motors)
     except Missing as error:
         return {'skipped': str(error)}
-    found = ROWS[row](one, draws(chosen.seed, row), chosen.quick)
+    found = ROWS[row](one, draws(args.seed, row), args.quick)
     log(f'{entrant}, {row}: {found} ({time.perf_counter() - began:.0f} s)')
     return {'what': what, row: found}
 
@@ -106,23 +106,23 @@ def main() -> int:
     parser.add_argument('--quick', action='store_true', help='few runs: a look')
     parser.add_argument('--seed', type=int, default=None, help='a fresh one if not given')
     parser.add_argument('--processes', type=int, default=len(os.sched_getaffinity(0)))
-    chosen = parser.parse_args()
-    chosen.seed = secrets.randbelow(2**31) if chosen.seed is None else chosen.seed
-    log(f'seed {chosen.seed}')
-    jobs = [(entrant, row) for row in chosen.rows for entrant in chosen.entrants]
-    found: dict[str, Any] = {entrant: {} for entrant in chosen.entrants}
+    args = parser.parse_args()
+    args.seed = secrets.randbelow(2**31) if args.seed is None else args.seed
+    log(f'seed {args.seed}')
+    jobs = [(entrant, row) for row in args.rows for entrant in args.entrants]
+    found: dict[str, Any] = {entrant: {} for entrant in args.entrants}
     try:
-        with (ProcessPoolExecutor(chosen.processes) as pool,
+        with (ProcessPoolExecutor(args.processes) as pool,
               progress_bar('rows', len(jobs)) as progress):
-            running = [pool.submit(measure, *job, chosen) for job in jobs]
+            running = [pool.submit(measure, *job, args) for job in jobs]
             for done, ((entrant, _), one) in enumerate(zip(jobs, running, strict=True), 1):
                 found[entrant] |= one.result()
                 progress(done)
     except CpgError as error:
         parser.error(str(error))
-    emit(benchmark='leaderboard', seed=chosen.seed, quick=chosen.quick,
-         joints='without friction' if chosen.plain else 'as measured',
-         torque='falls with speed' if chosen.motors else 'limited', entrants=found)
+    emit(benchmark='leaderboard', seed=args.seed, quick=args.quick,
+         joints='without friction' if args.plain else 'as measured',
+         torque='falls with speed' if args.motors else 'limited', entrants=found)
     return 0
 
 

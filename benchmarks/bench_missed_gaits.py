@@ -29,18 +29,18 @@ from collections.abc import Iterator
 import time
 
 from common import emit, log
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
-from cpg_ros.dynamics.orbit import NoOrbit
-from cpg_ros.dynamics.periodic import added_symmetry, check_values
-from cpg_ros.integration.simulate import simulate, Trajectory
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import Delayed
+from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
+from cpg_ros.dynamics.orbit import check_values, signal_symmetry
+from cpg_ros.dynamics.settling import last_cycle
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Symmetry
-from cpg_ros.search.settled_cycle import last_cycle
 import numpy as np
 from own_networks import FhnRing, half_centre, WilsonCowan
 
@@ -151,7 +151,7 @@ def period_of(network: Network, symmetry: Symmetry, run: Trajectory) -> float | 
     if symmetry.odd:
         pairs.append((signals, -turned(signals, 0.5)))
     gap = max(np.abs(one - other).max() for one, other in pairs)
-    if gap > SAME * np.ptp(signals) or added_symmetry(symmetry, signals, RICHER):
+    if gap > SAME * np.ptp(signals) or signal_symmetry(symmetry, signals, RICHER):
         return None
     return cycle.period
 
@@ -207,10 +207,10 @@ def main() -> None:
     parser.add_argument('--sets', type=int, default=SETS, help='of each network')
     parser.add_argument('--networks', nargs='+', choices=list(NETWORKS),
                         default=list(NETWORKS))
-    chosen = parser.parse_args()
-    seed, rng = chosen.seed, np.random.default_rng(chosen.seed)
-    sets = [(name, NETWORKS[name][0](rng)) for name in chosen.networks
-            for _ in range(chosen.sets)]
+    args = parser.parse_args()
+    seed, rng = args.seed, np.random.default_rng(args.seed)
+    sets = [(name, NETWORKS[name][0](rng)) for name in args.networks
+            for _ in range(args.sets)]
     missed, seen, neutral, slow, second, spent = [], 0, 0, 0, 0, 0.0
     for count, (name, network) in enumerate(sets):
         span = NETWORKS[name][2]
@@ -238,7 +238,7 @@ def main() -> None:
                 log(f'missed: {missed[-1]}')
         if count % 10 == 9:
             log(f'{count + 1} sets, {seen} gaits')
-    emit(benchmark='missed_gaits', seed=seed, networks=chosen.networks, sets=len(sets), gaits=seen,
+    emit(benchmark='missed_gaits', seed=seed, networks=args.networks, sets=len(sets), gaits=seen,
          neutral=neutral, slow=slow, second_orbits=second,
          missed=sum(not one['reason'].startswith('period') for one in missed),
          other_orbits=sum(one['reason'].startswith('period') for one in missed),

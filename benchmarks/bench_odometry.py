@@ -29,14 +29,13 @@ import secrets
 import time
 
 from common import emit, log, ROOT
-from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.feedback.froude_scaling import LENGTH, scaled_gains
-from cpg_ros.feedback.odometry import Odometry
+from cpg_ros.feedback.estimate import Odometry, SensorData
+from cpg_ros.feedback.gains import LENGTH, scaled_gains
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.robot_file import read_robot
-from cpg_ros.simulation.closed_loop import ClosedLoop
-from cpg_ros.simulation.efference_measurement import measure_efference
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
 from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
@@ -70,7 +69,7 @@ def scenarios(rng: np.random.Generator, runs: int, size: float) -> list[Scenario
         for k in range(runs)]
 
 
-def tape(loop: ClosedLoop, expected: object, seed: int, size: float) -> float:
+def tape(loop: ClosedLoopBatch, expected: object, seed: int, size: float) -> float:
     """Return true way over estimated way, as a user measures it: straight on beside a tape."""
     speeds = math.sqrt(size) * np.linspace(*SPEEDS, 3)
     ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE,
@@ -80,10 +79,10 @@ def tape(loop: ClosedLoop, expected: object, seed: int, size: float) -> float:
     return float(np.mean(ways / walked))
 
 
-def measure(loop: ClosedLoop, expected: object, chosen: argparse.Namespace, scale: float
+def measure(loop: ClosedLoopBatch, expected: object, args: argparse.Namespace, scale: float
             ) -> dict[str, object]:
     """Return drift in percent and NEES at the end of the way, of runs that did not fall."""
-    runs, seed, size = chosen.runs, chosen.seed, chosen.size
+    runs, seed, size = args.runs, args.seed, args.size
     ran = loop.run(scenarios(np.random.default_rng(seed), runs, size), LONGEST / math.sqrt(size),
                    scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))
     found: dict[str, object] = {'runs': runs, 'fell': int(runs - ran.upright.sum())}
@@ -100,10 +99,10 @@ def measure(loop: ClosedLoop, expected: object, chosen: argparse.Namespace, scal
     return found
 
 
-def _follow(loop: ClosedLoop, ran: Outcome, k: int, how: tuple[float, ...],
+def _follow(loop: ClosedLoopBatch, ran: Outcome, k: int, how: tuple[float, ...],
             rng: np.random.Generator) -> tuple[Odometry, np.ndarray]:
     """Return the odometry at the end of one run's way, and where the base is then, m, (2,)."""
-    legs, joints = len(loop.program.robot.legs), len(loop.program.robot.joints)
+    legs, joints = len(loop.plan.robot.legs), len(loop.plan.robot.joints)
     sensors, nothing = SensorData.zeros(1, legs, joints), np.zeros(legs, dtype=bool)
     made = Odometry(loop.geometry, *how)
     off = HEADING * math.sqrt(loop.timestep) * np.cumsum(rng.standard_normal(len(ran.rpy[k])))
@@ -124,21 +123,21 @@ def main() -> None:
     parser.add_argument('--gaits', nargs='+', default=['trot', 'walk'])
     parser.add_argument('--runs', type=int, default=8)
     parser.add_argument('--seed', type=int, default=secrets.randbelow(2**31))
-    chosen = parser.parse_args()
-    robot, loops = read_robot(chosen.robot), {}
-    for gait in chosen.gaits:
+    args = parser.parse_args()
+    robot, loops = read_robot(args.robot), {}
+    for gait in args.gaits:
         preset = NETWORKS[robot.networks[0]].presets()[gait]
         made = plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency)
-        loop = ClosedLoop(chosen.model, made)
-        loops[gait] = loop, measure_efference(loop, math.sqrt(chosen.size) * np.array(SPEEDS))
-    scales = {gait: tape(*loops[gait], chosen.seed + 1, chosen.size) for gait in loops}
+        loop = ClosedLoopBatch(args.model, made)
+        loops[gait] = loop, measure_efference(loop, math.sqrt(args.size) * np.array(SPEEDS))
+    scales = {gait: tape(*loops[gait], args.seed + 1, args.size) for gait in loops}
     log(f'by the tape: {scales}')
     found = {}
     for gait in loops:
         began = time.perf_counter()
-        found[gait] = measure(*loops[gait], chosen, float(np.mean(list(scales.values()))))
+        found[gait] = measure(*loops[gait], args, float(np.mean(list(scales.values()))))
         log(f'{gait}: {found[gait]} ({time.perf_counter() - began:.0f} s)')
-    emit(benchmark='odometry', model=chosen.model, size=chosen.size, seed=chosen.seed, way_m=WAY,
+    emit(benchmark='odometry', model=args.model, size=args.size, seed=args.seed, way_m=WAY,
          scales=scales, scale_error=MEASURED, **found)
 
 

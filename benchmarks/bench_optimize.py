@@ -27,11 +27,11 @@ import os
 import time
 
 from common import by_turns, emit, log
-from cpg_ros.integration.simulate import Trajectory
-from cpg_ros.networks.biped import Biped, CELL, CELLS, PARTNERS, PRIMARY
-from cpg_ros.search.nsga2 import optimise
-from cpg_ros.search.search_space import search_space
-from cpg_ros.search.settled_cycle import COARSER, last_cycle, population_run, SPAN, start_states
+from cpg_ros.analysis.nsga2 import optimise
+from cpg_ros.analysis.objectives import search_space
+from cpg_ros.dynamics.integration.simulate import Trajectory
+from cpg_ros.dynamics.settling import COARSE_STEPS, last_cycle, population_run, SPAN, start_states
+from cpg_ros.networks.library.biped import Biped, CELL, CELLS, PARTNERS, PRIMARY
 from numba import njit
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -107,14 +107,14 @@ def main() -> None:
         began = time.perf_counter()
         front = optimise('biped', gait, progress=False)
         searches[gait] = {'seconds': time.perf_counter() - began,
-                          'largest_phase_error_deg': float(front.chosen.errors.max()),
-                          'leading_multiplier': front.chosen.leading}
+                          'largest_phase_error_deg': float(front.args.errors.max()),
+                          'leading_multiplier': front.args.leading}
     speedup = ivp_ms[0] / ours_ms[0]
     emit(benchmark='optimize', ours_ms_per_network=ours_ms, ivp_ms_per_network=ivp_ms,
          ivp_numpy_ms_per_network=ivp_numpy_ms, speedup_per_network=speedup,
          error_ours=[float(np.median(ours)), float(ours.max())],
          error_ivp=[float(np.median(peers)), float(peers.max())],
-         step_ours=COARSER * Biped.step, span=SPAN, networks=SETS, searches=searches,
+         step_ours=COARSE_STEPS * Biped.step, span=SPAN, networks=SETS, searches=searches,
          cores=os.cpu_count(), targets=TARGETS,
          passed=(speedup >= TARGETS['speedup_per_network']
                  and bool(np.median(ours) <= np.median(peers)) and ours.max() <= peers.max()

@@ -24,10 +24,11 @@ of the delayed network).
 from functools import partial
 
 from common import by_turns, emit, log
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.orbit import Orbit, solve_orbit
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.networks.library.delayed import PRESETS
 from cpg_ros.networks.network import Preset
 import numpy as np
 from scipy.optimize import brentq, root

@@ -230,21 +230,21 @@ def main() -> None:
     parser.add_argument('--rounds', type=int, default=3)
     parser.add_argument('--seconds', type=float, default=8.0, help='of each turn')
     parser.add_argument('--memory', type=float, default=120.0, help='seconds with a page open')
-    chosen = parser.parse_args()
+    args = parser.parse_args()
     enter_workspace()
     os.environ.pop('DISPLAY', None)
     rclpy.init()
-    result: dict[str, object] = {'period': periods(chosen.rounds, chosen.seconds)}
+    result: dict[str, object] = {'period': periods(args.rounds, args.seconds)}
     log('robot_sim without and with a page')
-    result['simulation'] = {'alone': simulated(2 * chosen.seconds, False),
-                            'page': simulated(2 * chosen.seconds, True)}
+    result['simulation'] = {'alone': simulated(2 * args.seconds, False),
+                            'page': simulated(2 * args.seconds, True)}
     with start_node('generator', rate=200.0, transition=0.2), Panel() as panel:
         log('clicks')
         result['clicks'] = clicks(panel, 50)
         log('500 hostile requests')
         result['hostile'] = hostile(panel, 500)
-        log(f'memory, {chosen.memory:g} s')
-        result['memory'] = memory(panel, chosen.memory)
+        log(f'memory, {args.memory:g} s')
+        result['memory'] = memory(panel, args.memory)
     rclpy.shutdown()
     emit(benchmark='panel', **result, targets=TARGETS)
 

@@ -32,10 +32,10 @@ from common import emit, log, ROOT
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import Branch, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
-from cpg_ros.networks.delayed import Delayed
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
+from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import PRESETS
 import numpy as np
 

@@ -25,10 +25,11 @@ import time
 
 from common import emit, log
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import Orbit, solve_beside, solve_preset
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.phase_response import phase_response
+from cpg_ros.dynamics.solve_orbit import solve_beside, solve_preset
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.registry import PRESETS
 import numpy as np
 
@@ -57,7 +58,7 @@ class Kicked:
 
 def directly(orbit: Orbit, step: float) -> np.ndarray:
     """Return the phase response at TIMES by simulation, shape (times, cells, variables)."""
-    network, gain = orbit.network, stability(orbit).chosen
+    network, gain = orbit.network, stability(orbit).args
     leading = multipliers(orbit, gain).leading
     cycles = math.ceil(math.log(1e-8) / math.log(max(leading, 1e-4)))
     steps, unit = math.ceil(cycles * orbit.period / step), np.eye(network.components)

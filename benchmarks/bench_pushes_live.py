@@ -26,8 +26,8 @@ import math
 
 from bench_feedback import MODEL, ROBOT
 from common import emit, log
-from cpg_ros.feedback.froude_scaling import robot_gains
-from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.feedback.gains import robot_gains
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.simulation.scenario import PUSH
 from feedback_figures import interval, pushes, subject
 import numpy as np

@@ -26,14 +26,14 @@ import traceback
 
 from common import emit, log
 from cpg_ros import read_recording
-from cpg_ros.errors import CpgError
-from cpg_ros.gaits.leg_names import legs_of
-from cpg_ros.gaits.stride import find_stride, Stride
-from cpg_ros.inversion.recording_fit import fit_recording
-from cpg_ros.networks.delayed import Delayed
-from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.recordings.servo import Servo
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.common.errors import CpgError
+from cpg_ros.fitting.gaits.leg_names import legs_of
+from cpg_ros.fitting.gaits.stride import find_stride, Stride
+from cpg_ros.fitting.inversion.recording_fit import fit_recording
+from cpg_ros.fitting.recordings.csv_reader import read_csv
+from cpg_ros.fitting.recordings.joint_streams import Servo
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.library.delayed import Delayed
 from hostile_recordings import SEED, spoiled, WAYS
 import numpy as np
 import yaml
@@ -92,8 +92,8 @@ def of_dataset(folder: Path) -> dict[str, object]:
                                  if name in truth['parameters']]
             off.append(abs(fit.stride.frequency / truth['frequency'] - 1.0))
             if fit.stride.contacts is not None:
-                duties += [abs(fit.stride.contacts.duty[leg] - share)
-                           for leg, share in truth['duty'].items()]
+                duties += [abs(fit.stride.contacts.duty[leg] - fraction)
+                           for leg, fraction in truth['duty'].items()]
         elif sure:
             wrong.append(path.parent.name)
     return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
@@ -124,10 +124,10 @@ def main() -> None:
                 log(line)
             if found is not None and found.confidence >= 0.95:
                 sure.append(kind == 'right')
-    share = sum(sure) / max(len(sure), 1)
+    fraction = sum(sure) / max(len(sure), 1)
     emit(benchmark='recordings', seed=given.seed, files=sum(tally.values()), **tally, bad=bad[:5],
-         said_with_95_percent=len(sure), of_these_right=share, target=GOAL,
-         passed=not tally['traceback'] and not tally['wrong'] and share >= GOAL)
+         said_with_95_percent=len(sure), of_these_right=fraction, target=GOAL,
+         passed=not tally['traceback'] and not tally['wrong'] and fraction >= GOAL)
 
 
 if __name__ == '__main__':

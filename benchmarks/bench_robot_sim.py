@@ -37,8 +37,8 @@ TARGETS = {'real_time_factor_error': 0.01}
 #: The node with its periods' delays kept: a line on standard output at its end.
 MEASURED = """
 import sys
-from cpg_ros.nodes import deadline_thread as ticker
-from cpg_ros.nodes.robot_sim import main
+from cpg_ros.ros import deadline_thread as ticker
+from cpg_ros.ros.robot_sim import main
 delays, stalled = [], ticker.Ticker._stalled
 def noted(self, behind, period):
     delays.append(behind)
@@ -53,7 +53,7 @@ sys.exit(code)
 
 def bare(robot: str, seconds: float) -> float:
     """Return the steps a second of MuJoCo alone, marching on the spot."""
-    from cpg_ros.robots.robot_file import load_robot
+    from cpg_ros.motion.robot_file import load_robot
     from cpg_ros.simulation.body import Body
     import mujoco
     body = Body('go2', load_robot(robot))

@@ -28,8 +28,8 @@ import sys
 import tempfile
 
 from common import by_turns, emit, log, ROOT
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import Delayed
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.networks.library.delayed import Delayed
 import numpy as np
 from peers import A, B, C, D, END, InC, Jitcdde, OUTPUT, START, TAU
 

@@ -95,8 +95,8 @@ class Checker:
     """Listens to joint states and compares each message with the robot's limits."""
 
     def __init__(self, robot: str) -> None:
-        from cpg_ros.nodes.polled_group import PolledSubscription
-        from cpg_ros.robots.robot_file import load_robot
+        from cpg_ros.motion.robot_file import load_robot
+        from cpg_ros.ros.node.polled import PolledSubscription
         joints = load_robot(robot).joints
         self._limits = {joint.name: (joint.lower, joint.upper, joint.velocity)
                         for joint in joints}

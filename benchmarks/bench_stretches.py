@@ -31,10 +31,10 @@ from pathlib import Path
 
 from common import emit, log, ROOT
 from cpg_ros import read_recording
-from cpg_ros.errors import CpgError
-from cpg_ros.inversion.recording_fit import ORDERS
-from cpg_ros.inversion.stretch_fits import fit_stretches, StretchFit
-from cpg_ros.recordings.recording import Recording
+from cpg_ros.common.errors import CpgError
+from cpg_ros.fitting.inversion.gait_schedule import fit_stretches, StretchFit
+from cpg_ros.fitting.inversion.recording_fit import ORDERS
+from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.simulation.robot_model import find_model
 import mujoco
 import numpy as np
@@ -163,7 +163,7 @@ def others(folder: Path) -> Iterator[Clip]:
 
 def row(clip: Clip, one: StretchFit) -> dict[str, object]:
     """Return a stretch as a row of the result."""
-    errors = [] if one.fit is None else [round(100.0 * one.fit.shares[order], 1)
+    errors = [] if one.fit is None else [round(100.0 * one.fit.fractions[order], 1)
                                          for order in ORDERS]
     return {'body': clip.body, 'recording': clip.recording.source.rpartition('/')[2],
             'begin': round(one.begin, 1), 'end': round(one.end, 1),

@@ -36,17 +36,17 @@ import numpy as np
 
 sys.path.append(str(ROOT / 'test' / 'support'))
 
-from cpg_ros.dynamics.orbit import solve_preset  # noqa: E402, I100
-from cpg_ros.errors import CpgError  # noqa: E402
-from cpg_ros.gaits.stride import find_stride  # noqa: E402
-from cpg_ros.inversion.free_parameters import free_numbers, with_values  # noqa: E402
-from cpg_ros.inversion.invert import invert  # noqa: E402
-from cpg_ros.inversion.leg_duty import GAIT_DUTY  # noqa: E402
-from cpg_ros.inversion.recording_fit import fit_recording  # noqa: E402
+from cpg_ros.common.errors import CpgError  # noqa: E402
+from cpg_ros.dynamics.solve_orbit import solve_preset  # noqa: E402, I100
+from cpg_ros.fitting.gaits.stride import find_stride  # noqa: E402
+from cpg_ros.fitting.inversion.free_parameters import free_numbers, with_values  # noqa: E402
+from cpg_ros.fitting.inversion.invert import invert  # noqa: E402
+from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY  # noqa: E402
+from cpg_ros.fitting.inversion.recording_fit import fit_recording  # noqa: E402
 from cpg_ros.motion.plan import gait_of, refusal  # noqa: E402
+from cpg_ros.motion.robot import HARMONICS  # noqa: E402
+from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.networks.registry import NETWORKS, PRESETS  # noqa: E402
-from cpg_ros.robots.robot import HARMONICS  # noqa: E402
-from cpg_ros.robots.robot_file import load_robot  # noqa: E402
 from generated import generated, walks  # noqa: E402
 from made_up import joint_angles, record, weights_of  # noqa: E402
 from motion import Driven, noisy, Recorded, stamps  # noqa: E402
@@ -76,7 +76,7 @@ def covered(name: str, gait: str, order: int, cells: tuple[int, ...], off: dict[
     preset = PRESETS[name][gait]
     orbit, network = solve_preset(preset), preset.network
     truth = {free: getattr(network, network.groups.get(free, (free,))[0]) for free in off}
-    start = {free: share * truth[free] for free, share in off.items()}
+    start = {free: fraction * truth[free] for free, fraction in off.items()}
     inside, errors, spent = dict.fromkeys(off, 0), {free: [] for free in off}, []
     for seed in range(SEEDS):
         recording, assigned = record(orbit, cells, weights_of(len(cells), order),
@@ -139,9 +139,9 @@ def held_up(name: str, rng: np.random.Generator, orbit: object, repeated: bool) 
     cells = {f'{leg}_{joint}': cell for leg, own in legs.items()
              for joint, cell in zip(('hip', 'thigh', 'calf'), (own[0], own[0], own[-1]),
                                     strict=True)}
-    times, share = np.arange(0.0, LASTING, 1.0 / RATE), rng.uniform(*STALLED)
+    times, fraction = np.arange(0.0, LASTING, 1.0 / RATE), rng.uniform(*STALLED)
     stalled = np.zeros(times.size, bool)
-    while stalled.mean() < share:
+    while stalled.mean() < fraction:
         begin = rng.integers(times.size)
         stalled[begin:begin + int(RATE * rng.uniform(*STALL))] = True
     steps = np.where(stalled & repeated, 0.0, STRIDES / RATE)
@@ -225,7 +225,7 @@ def main() -> None:
               for stalls in ('', 'missing', 'repeated') for name in DRAWN}
     found = {f'{case[0]} {case[1]} order {case[2]}': covered(*case) for case in CASES}
     found |= {f'{name} {gait} phases': phases_covered(name, gait) for name, gait in STATED}
-    worst = min(share for case in found.values() for share in case['inside'].values())
+    worst = min(fraction for case in found.values() for fraction in case['inside'].values())
     emit(benchmark='truth', seeds=SEEDS, cases=found, worst=worst, target=GOAL, seed=given.seed,
          drawn=random, generator=generated_covered(GENERATED), passed=worst >= GOAL)
 

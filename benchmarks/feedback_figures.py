@@ -23,11 +23,11 @@ from pathlib import Path
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import read_robot
-from cpg_ros.simulation.closed_loop import ClosedLoop
-from cpg_ros.simulation.efference_measurement import measure_efference
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
 from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
@@ -54,7 +54,7 @@ class Subject:
 
     """
 
-    loop: ClosedLoop
+    loop: ClosedLoopBatch
     expected: Mapping[str, EfferenceCopy]
     gains: Gains | None
     rng: np.random.Generator
@@ -76,13 +76,13 @@ def subject(robot_file: Path, gait: str, gains: Gains | None, seed: int, quick: 
     Seeds are those of the run, so that open and closed meet the same.
     """
     robot = read_robot(robot_file)
-    programs = [_program(robot, network or robot.networks[0], one) for one in (gait, *others)]
-    loop = ClosedLoop(model, *programs)
+    plans = [_program(robot, network or robot.networks[0], one) for one in (gait, *others)]
+    loop = ClosedLoopBatch(model, *plans)
     expected = {}
     if gains is not None:
-        for program in programs:
-            if program.motion.efference is None:
-                expected[program.name] = measure_efference(ClosedLoop(model, program))
+        for plan in plans:
+            if plan.motion.efference is None:
+                expected[plan.name] = measure_efference(ClosedLoopBatch(model, plan))
     return Subject(loop, expected, gains, np.random.default_rng(seed),
                    quick)
 
@@ -98,32 +98,32 @@ def pushes(one: Subject, impulses: Sequence[float], friction: float = 1.0) -> di
     The impulse that half survive is read off the line through the shares.
     """
     directions, phases = (4, 2) if one.quick else (12, 8)
-    shares: dict[float, float] = {}
+    fractions: dict[float, float] = {}
     for size in impulses:
         first = one.rng.uniform(0.0, 2.0 * math.pi)
         ways = first + np.arange(directions) * 2.0 * math.pi / directions
-        shares[size] = float(one.run(
+        fractions[size] = float(one.run(
             [Scenario(friction, phase=k / phases, pushes=(
                 impulse(PUSHED, size * math.cos(way), size * math.sin(way)),))
              for way in ways for k in range(phases)],
             PUSHED + AFTER).upright.mean())
-        if shares[size] < 0.4:
+        if fractions[size] < 0.4:
             break
-    half = max(shares) if min(shares.values()) >= 0.5 else min(shares)
-    for low, high in itertools.pairwise(shares):
-        if shares[low] >= 0.5 > shares[high]:
-            half = float(np.interp(0.5, [shares[high], shares[low]], [high, low]))
+    half = max(fractions) if min(fractions.values()) >= 0.5 else min(fractions)
+    for low, high in itertools.pairwise(fractions):
+        if fractions[low] >= 0.5 > fractions[high]:
+            half = float(np.interp(0.5, [fractions[high], fractions[low]], [high, low]))
     count = directions * phases
-    return {'survived': {f'{size:g}': share for size, share in shares.items()},
-            'interval_95': {f'{size:g}': interval(share, count)
-                            for size, share in shares.items()},
+    return {'survived': {f'{size:g}': fraction for size, fraction in fractions.items()},
+            'interval_95': {f'{size:g}': interval(fraction, count)
+                            for size, fraction in fractions.items()},
             'half_survive_N_s': half}
 
 
-def interval(share: float, count: int) -> tuple[float, float]:
+def interval(fraction: float, count: int) -> tuple[float, float]:
     """Return the 95 % confidence interval of a share of so many runs (Wilson 1927)."""
     z = 1.96 / math.sqrt(count)
-    middle, half = share + z**2 / 2.0, z * math.sqrt(share * (1.0 - share) + z**2 / 4.0)
+    middle, half = fraction + z**2 / 2.0, z * math.sqrt(fraction * (1.0 - fraction) + z**2 / 4.0)
     return (round((middle - half) / (1.0 + z**2), 3), round((middle + half) / (1.0 + z**2), 3))
 
 
@@ -173,7 +173,7 @@ def settling(one: Subject) -> float:
     dt, begin, hold = one.loop.timestep, 6.0, 6.0
     ran = one.run([Scenario(speed=low, phase=k / 4, commands=((begin, high, 0.0, 0.0),))
                    for low, high in ((0.2, 0.4), (0.4, 0.2)) for k in range(4)], begin + hold)
-    stride = round(1.0 / (one.loop.program.frequency * dt))
+    stride = round(1.0 / (one.loop.plan.frequency * dt))
     times = []
     for speed in ran.velocity[:, :, 0]:
         mean = np.convolve(speed, np.full(stride, 1.0 / stride), mode='valid')
@@ -186,7 +186,7 @@ def settling(one: Subject) -> float:
 
 def switches(one: Subject) -> dict[str, object]:
     """Change from the gait to each other one on rough ground of 4 cm, 20 seeds."""
-    others = [name for name in one.loop.programs if name != one.loop.program.name]
+    others = [name for name in one.loop.plans if name != one.loop.plan.name]
     runs = [Scenario(terrain=Terrain('height_field', 0.04, seed), switches=((3.0, other),))
             for other in others for seed in one.seeds(20)]
     ran = one.run(runs, 7.0)

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path += [str(Path(__file__).parent), str(ROOT / 'test' / 'support')]
 
 from bags import joint_state, write_bag  # noqa: E402
-from cpg_ros.fleet.recording_job import invert_recording, Task  # noqa: E402
+from cpg_ros.fitting.inversion.many_recordings import invert_recording, Task  # noqa: E402
 from hostile_recordings import walked  # noqa: E402
 
 #: File that every job adds a line to, wherever it runs.

@@ -25,12 +25,12 @@ import sys
 import threading
 from types import SimpleNamespace
 
-from cpg_ros.nodes.deadline_thread import Ticker
-from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.other_publishers import OtherPublishers
-from cpg_ros.nodes.shutdown import ended
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.generator import Diagnostics
+from cpg_ros.ros.node.health import OtherPublishers
+from cpg_ros.ros.node.node_base import exit_code
+from cpg_ros.ros.node.ticker import Ticker
 import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -103,10 +103,10 @@ def main() -> int:
         outputs.publish(stamp, position, velocity, phases)
 
     ticker = Ticker(node, rate, tick, lambda: None, lambda error: stop.set())
-    program = SimpleNamespace(name='null', frequency=1.0, gain=1.0,
+    plan = SimpleNamespace(name='null', frequency=1.0, gain=1.0,
                               character='none', orbit=SimpleNamespace(
                                   period=1.0, network=SimpleNamespace(name='none')))
-    still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
+    still = SimpleNamespace(plan=plan, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
     deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
     diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf,
@@ -138,7 +138,7 @@ def main() -> int:
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
     del diagnostics
-    return ended(0, ticker, serving)
+    return exit_code(0, ticker, serving)
 
 
 if __name__ == '__main__':

@@ -26,10 +26,10 @@ import tempfile
 from typing import ClassVar
 
 from common import ROOT
-from cpg_ros.networks.network import Network, Preset, Range
+from cpg_ros.networks.definition import Range, tanh
+from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import find_network
 from cpg_ros.networks.symmetry import Group, Symmetry
-from cpg_ros.networks.terms import tanh
 
 RING = Group(4, (('turn', (1, 2, 3, 0)),))
 OTHER = (1, 0)

@@ -52,8 +52,9 @@ def survival(found: dict[str, dict[str, dict[str, Any]]], path: Path) -> None:
     for axis, gait in zip(axes[0], gaits, strict=True):
         for way, looks in LOOKS.items():
             if 'pushes' in found[gait][way]:
-                shares = found[gait][way]['pushes']['survived']
-                axis.plot([float(x) for x in shares], [100.0 * y for y in shares.values()], 'o-',
+                fractions = found[gait][way]['pushes']['survived']
+                axis.plot([float(x) for x in fractions], [100.0 * y for y in fractions.values()],
+                          'o-',
                           label='with feedback' if way == 'closed' else 'without', **looks)
         axis.axhline(50.0, color='0.7', lw=0.8, zorder=0)
         axis.set(title=gait, xlabel='impulse [N s]', ylim=(0.0, 103.0))
@@ -69,10 +70,10 @@ def terrain(found: dict[str, dict[str, dict[str, Any]]], path: Path) -> None:
                                 squeeze=False, layout='constrained')
     for axis, gait in zip(axes[0], gaits, strict=True):
         for k, (way, looks) in enumerate(LOOKS.items()):
-            shares = found[gait][way].get('ground')
-            if shares:
+            fractions = found[gait][way].get('ground')
+            if fractions:
                 bars = axis.bar([x + 0.4 * (0.5 - k) for x in range(len(GROUNDS))],
-                                [100.0 * shares[name] for name in GROUNDS], 0.38,
+                                [100.0 * fractions[name] for name in GROUNDS], 0.38,
                                 label='with feedback' if way == 'closed' else 'without', **looks)
                 axis.bar_label(bars, fmt='%.0f', fontsize=8)
         axis.set(title=gait, ylim=(0.0, 108.0))
@@ -89,13 +90,13 @@ def main() -> None:
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('files', nargs='+', type=Path)
     parser.add_argument('--out', type=Path, default=Path('.'))
-    chosen = parser.parse_args()
-    found = read(chosen.files)
-    survival(found, chosen.out / 'feedback_pushes.png')
-    terrain(found, chosen.out / 'feedback_terrain.png')
+    args = parser.parse_args()
+    found = read(args.files)
+    survival(found, args.out / 'feedback_pushes.png')
+    terrain(found, args.out / 'feedback_terrain.png')
     with plt.rc_context(fname=DARK):
-        survival(found, chosen.out / 'feedback_pushes_dark.png')
-        terrain(found, chosen.out / 'feedback_terrain_dark.png')
+        survival(found, args.out / 'feedback_pushes_dark.png')
+        terrain(found, args.out / 'feedback_terrain_dark.png')
 
 
 if __name__ == '__main__':

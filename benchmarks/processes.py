@@ -25,7 +25,7 @@ import tempfile
 import time
 
 from common import log, ROOT
-from cpg_ros.nodes.transport import leave_shared_memory
+from cpg_ros.ros.node.node_base import leave_shared_memory
 
 HERE = Path(__file__).resolve().parent
 GENERATOR = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/generator')]

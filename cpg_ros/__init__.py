@@ -26,28 +26,28 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # As in typing, which would take longer to load than all of this.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from cpg_ros.common.errors import CpgError
+    from cpg_ros.dynamics.arclength import NoOrbit
     from cpg_ros.dynamics.continuation import continue_orbit  # noqa: I300
     from cpg_ros.dynamics.floquet import multipliers
-    from cpg_ros.dynamics.hopf_search import hopf_points
-    from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
+    from cpg_ros.dynamics.hopf import hopf_points
+    from cpg_ros.dynamics.integration.simulate import simulate
+    from cpg_ros.dynamics.integration.stepper import Stepper
+    from cpg_ros.dynamics.solve_orbit import solve_orbit
     from cpg_ros.dynamics.stability import stability
-    from cpg_ros.errors import CpgError
-    from cpg_ros.integration.simulate import simulate
-    from cpg_ros.integration.stepper import Stepper
-    from cpg_ros.inversion.parameter_files import write_fitted
-    from cpg_ros.inversion.recording_fit import fit_recording
+    from cpg_ros.fitting.inversion.parameter_files import write_fitted
+    from cpg_ros.fitting.inversion.recording_fit import fit_recording
+    from cpg_ros.fitting.recordings.bag_reader import read_bag
+    from cpg_ros.fitting.recordings.csv_reader import read_csv
+    from cpg_ros.fitting.recordings.formats import read_recording
     from cpg_ros.motion.pattern import Pattern
     from cpg_ros.motion.plan import plan
-    from cpg_ros.networks.network import Network
-    from cpg_ros.networks.network_definition import Range
-    from cpg_ros.networks.parameter_line import ParameterLine
-    from cpg_ros.networks.preset_files import Preset
+    from cpg_ros.motion.robot_file import load_robot
+    from cpg_ros.networks.definition import Range
+    from cpg_ros.networks.network import Network, ParameterLine
+    from cpg_ros.networks.presets import Preset
     from cpg_ros.networks.registry import NETWORKS, PRESETS
     from cpg_ros.networks.symmetry import Symmetry
-    from cpg_ros.recordings.bag_reader import read_bag
-    from cpg_ros.recordings.csv_reader import read_csv
-    from cpg_ros.recordings.formats import read_recording
-    from cpg_ros.robots.robot_file import load_robot
 
 __version__ = '0.1.0'
 __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLine', 'Pattern',
@@ -56,17 +56,18 @@ __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLi
            'read_recording', 'simulate', 'solve_orbit', 'stability', 'write_fitted']
 
 _PLACES = {
-    'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'errors',
-    'Network': 'networks.network', 'NoOrbit': 'dynamics.orbit',
-    'ParameterLine': 'networks.parameter_line', 'Pattern': 'motion.pattern',
-    'Preset': 'networks.preset_files', 'Range': 'networks.network_definition',
-    'Stepper': 'integration.stepper', 'Symmetry': 'networks.symmetry',
-    'continue_orbit': 'dynamics.continuation', 'fit_recording': 'inversion.recording_fit',
-    'hopf_points': 'dynamics.hopf_search', 'load_robot': 'robots.robot_file',
-    'multipliers': 'dynamics.floquet', 'plan': 'motion.plan', 'read_bag': 'recordings.bag_reader',
-    'read_csv': 'recordings.csv_reader', 'read_recording': 'recordings.formats',
-    'simulate': 'integration.simulate', 'solve_orbit': 'dynamics.orbit',
-    'stability': 'dynamics.stability', 'write_fitted': 'inversion.parameter_files'}
+    'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'common.errors',
+    'Network': 'networks.network', 'NoOrbit': 'dynamics.solve_orbit',
+    'ParameterLine': 'networks.network', 'Pattern': 'motion.pattern',
+    'Preset': 'networks.presets', 'Range': 'networks.definition',
+    'Stepper': 'dynamics.integration.stepper', 'Symmetry': 'networks.symmetry',
+    'continue_orbit': 'dynamics.continuation', 'fit_recording': 'fitting.inversion.recording_fit',
+    'hopf_points': 'dynamics.hopf', 'load_robot': 'motion.robot_file',
+    'multipliers': 'dynamics.floquet', 'plan': 'motion.plan',
+    'read_bag': 'fitting.recordings.bag_reader',
+    'read_csv': 'fitting.recordings.csv_reader', 'read_recording': 'fitting.recordings.formats',
+    'simulate': 'dynamics.integration.simulate', 'solve_orbit': 'dynamics.solve_orbit',
+    'stability': 'dynamics.stability', 'write_fitted': 'fitting.inversion.parameter_files'}
 
 
 def __getattr__(name: str) -> object:

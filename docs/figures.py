@@ -62,7 +62,7 @@ def draw(name: str, dark: bool) -> Path:
     module, words, left = FIGURES[name]
     out = DOCS / f'{name}{"_dark" if dark else ""}.png'
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, '-m', f'cpg_ros.tools.{module}',
+        command = [sys.executable, '-m', f'cpg_ros.ros.{module}',
                    *(word.replace('FOLDER', folder) for word in words)]
         variables = dict(os.environ, **{'MATPLOTLIBRC': str(DARK)} if dark else {})
         subprocess.run(command, env=variables, stdin=subprocess.DEVNULL,
@@ -81,10 +81,10 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition('\n')[0])
     parser.add_argument('figures', nargs='*', metavar='NAME',
                         help=f'which (default: all of {", ".join(FIGURES)})')
-    chosen = parser.parse_args().figures or list(FIGURES)
-    if wrong := [name for name in chosen if name not in FIGURES]:
+    args = parser.parse_args().figures or list(FIGURES)
+    if wrong := [name for name in args if name not in FIGURES]:
         parser.error(f"'{wrong[0]}' is not one of {', '.join(FIGURES)}")
-    for name in chosen:
+    for name in args:
         for dark in (False, True):
             print(draw(name, dark), flush=True)
     return 0

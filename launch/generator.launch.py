@@ -14,7 +14,7 @@
 
 """Start the generator: ros2 launch cpg_ros generator.launch.py network:=biped gait:=skip."""
 
-from cpg_ros.nodes.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import declared, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction
 

@@ -21,7 +21,7 @@ and with real_time_factor:=0, as fast as they can; time begins when both are the
 
 from pathlib import Path
 
-from cpg_ros.nodes.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import declared, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration

@@ -19,7 +19,7 @@ messages; optionally feedback, a page in the browser and a recording. simulator:
 Unitree's simulator on this computer.
 """
 
-from cpg_ros.nodes.launch_arguments import declared, page, started, value
+from cpg_ros.ros.launch_arguments import declared, page, started, value
 from launch import LaunchDescription
 from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
 from launch.substitutions import LaunchConfiguration

@@ -17,7 +17,7 @@
 Then ``ros2 service call /cpg_inversion/fit std_srvs/srv/Trigger``, or every:=10.
 """
 
-from cpg_ros.nodes.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import declared, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction
 

@@ -21,8 +21,8 @@ its robot file and its URDF: robot:=$PWD/my_robot.yaml urdf:=$PWD/my.urdf.
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
-from cpg_ros.nodes.launch_arguments import value
-from cpg_ros.robots.urdf import load_urdf
+from cpg_ros.motion.description import load_urdf
+from cpg_ros.ros.launch_arguments import value
 from launch import LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,

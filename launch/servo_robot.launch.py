@@ -18,7 +18,7 @@ Read docs/how_to/servos.md first. The generator, the bridge that leads the robot
 its servos are on. The robot lies still until the bridge's service ~/start is called.
 """
 
-from cpg_ros.nodes.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import declared, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 

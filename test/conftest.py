@@ -25,7 +25,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-from cpg_ros.nodes.transport import leave_shared_memory  # noqa: E402
+from cpg_ros.ros.node.node_base import leave_shared_memory  # noqa: E402
 import depth  # noqa: E402
 from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402

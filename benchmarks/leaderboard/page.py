@@ -113,9 +113,10 @@ def picture(found: Found, path: Path) -> None:
                  'marker': 'o', 'ms': 3.0, 'lw': 2.0 if name in COLORS else 1.2,
                  'ls': '--' if robot == 'go1' else '-'}
         for axis, (row, key, across, up) in zip(axes.flat, panels, strict=False):
-            shares = {float(label.replace(key, '').split()[0]): 100.0 * share
-                      for label, share in one[row].items() if key in label and 'half' not in label}
-            axis.plot(list(shares), list(shares.values()), **looks)
+            fractions = {float(label.replace(key, '').split()[0]): 100.0 * fraction
+                      for label,
+                         fraction in one[row].items() if key in label and 'half' not in label}
+            axis.plot(list(fractions), list(fractions.values()), **looks)
             axis.set(xlabel=across, ylabel=up, ylim=(-3.0, 103.0))
         reached = {WISHES[label][0]: value for label, value in one['tracking'].items()
                    if label.startswith('forward') and value != 'fell'}
@@ -135,14 +136,14 @@ def main() -> None:
     parser.add_argument('file', type=Path)
     parser.add_argument('--out', type=Path, default=Path('.'))
     parser.add_argument('--name', default='leaderboard', help='of the picture')
-    chosen = parser.parse_args()
-    entrants = json.loads(chosen.file.read_text())['entrants']
+    args = parser.parse_args()
+    entrants = json.loads(args.file.read_text())['entrants']
     found = dict(sorted(((name, one) for name, one in entrants.items() if 'skipped' not in one),
                         key=lambda item: item[1]['what']['robot'], reverse=True))
     if all(set(ROWS) <= set(one) for one in found.values()):
-        picture(found, chosen.out / f'{chosen.name}.png')
+        picture(found, args.out / f'{args.name}.png')
         with plt.rc_context(fname=DARK):
-            picture(found, chosen.out / f'{chosen.name}_dark.png')
+            picture(found, args.out / f'{args.name}_dark.png')
     print(table(found))
 
 

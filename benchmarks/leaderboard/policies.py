@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.simulation.bodies import Bodies
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.simulation.bodies import BatchPhysics
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.run_metrics import BEGINNING, torques
 from cpg_ros.simulation.scenario import Scenario, SensorNoise
@@ -123,7 +123,7 @@ class LearnedPolicy:
         self._act, self._entry = network(entry), entry
         robot = load_robot('unitree_go2')  # the Go1's joints have the same names
         self.body = Body(entry['robot'], robot, entry['kp'], entry['kd'], TIMESTEP, add_ground)
-        self.bodies = Bodies(self.body, 1)
+        self.bodies = BatchPhysics(self.body, 1)
         own = [f'{leg}_{joint}_joint' for leg in entry['legs'] for joint in JOINTS]
         #: Where the policy's joints are among the body's, and the other way round.
         self._ours = [robot.order.index(name) for name in own]

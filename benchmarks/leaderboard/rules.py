@@ -71,17 +71,17 @@ def tracking(one: Entrant, rng: np.random.Generator, few: bool) -> dict[str, Any
 
 def pushes(one: Entrant, rng: np.random.Generator, few: bool) -> dict[str, Any]:
     """Push for 0.1 s, harder and harder until hardly any stays up: shares, and where half do."""
-    shares: dict[float, float] = {}
+    fractions: dict[float, float] = {}
     for size in np.arange(20.0, 101.0, 10.0):
-        shares[size] = pushed(one, size, rng.uniform(0.0, 2.0 * math.pi), few)
-        if shares[size] < 0.15:
+        fractions[size] = pushed(one, size, rng.uniform(0.0, 2.0 * math.pi), few)
+        if fractions[size] < 0.15:
             break
     half = None
-    for low, high in itertools.pairwise(shares):
-        if shares[low] >= 0.5 > shares[high]:
-            half = float(np.interp(0.5, [shares[high], shares[low]], [high, low]))
+    for low, high in itertools.pairwise(fractions):
+        if fractions[low] >= 0.5 > fractions[high]:
+            half = float(np.interp(0.5, [fractions[high], fractions[low]], [high, low]))
     return {'half, N s': half, 'of': DIRECTIONS * TIMES,
-            **{f'{size:g} N s': share for size, share in shares.items()}}
+            **{f'{size:g} N s': fraction for size, fraction in fractions.items()}}
 
 
 def pushed(one: Entrant, size: float, first: float, few: bool) -> float:

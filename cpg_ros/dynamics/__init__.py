@@ -12,15 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Orbits, their stability, Hopf points and branches.
+"""Integration, periodic orbits, their stability, Hopf points, continuation, phase response.
 
-Imports ``integration`` and what is below; knows nothing of ROS.
+Imports ``networks`` and ``common``; knows nothing of ROS.
 """
 
-__all__ = ['arclength', 'bifurcation', 'branch_end', 'branch_orbits', 'characteristic',
-           'coexisting_orbits', 'continuation', 'critical_disturbances', 'deflation',
-           'delay_crossings', 'equilibrium',
-           'expansion', 'floquet', 'fourier', 'gait_assessment', 'hopf_point',
-           'hopf_search', 'isotypic', 'isotypic_split', 'mesh', 'normal_form', 'orbit',
-           'orbit_method', 'orbit_normal_form', 'periodic', 'phase_reduction', 'phase_response',
-           'seek', 'sign_changes', 'stability', 'switching']
+__all__ = ['arclength', 'bifurcation', 'characteristic', 'coexisting_orbits', 'continuation',
+           'equilibrium', 'floquet', 'fourier', 'hopf', 'integration', 'isotypic', 'mesh',
+           'orbit', 'orbit_method', 'orbit_normal_form', 'phase_response', 'settling',
+           'solve_orbit', 'stability']

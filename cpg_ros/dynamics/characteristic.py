@@ -22,8 +22,70 @@ points (Breda, Maset & Vermiglio 2005), and what it gives is refined by Newton's
 det Delta.
 """
 
+import cmath
+import math
+
 import numpy as np
 import scipy
+
+# Where the roots of ``h' = L0 h(t) + L1 h(t - tau)`` cross the imaginary axis, in closed form.
+
+#: How far from the unit circle, and from the axis, a solution may lie by rounding.
+ON_CIRCLE = 1e-7
+
+
+def frequencies(a: complex, b: complex) -> list[float]:
+    """Return omega > 0 of the crossings, ``Im A +- sqrt(|B|^2 - (Re A)^2)``, fast one first."""
+    square = abs(b)**2 - a.real**2
+    if square <= 0.0:
+        return []
+    return [omega for omega in (a.imag + math.sqrt(square), a.imag - math.sqrt(square))
+            if omega > 0.0]
+
+
+def critical_delay(a: complex, b: complex, omega: float, n: int = 0) -> float:
+    """Return ``tau_n = (-arg((i omega - A)/B) mod 2 pi + 2 pi n) / omega``."""
+    return _delay((1j * omega - a) / b, omega, n)
+
+
+def _delay(z: complex, omega: float, n: int) -> float:
+    return (-cmath.phase(z) % (2.0 * math.pi) + 2.0 * math.pi * n) / omega
+
+
+def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, float]]:
+    """Return omega > 0 and the smallest delay of every crossing, the fast ones first.
+
+    The others with the same omega have delays that are longer by multiples of 2 pi / omega.
+
+    Args:
+        now: L0, shape (n, n).
+        past: L1, shape (n, n).
+
+    """
+    if len(now) == 1:
+        a, b = complex(now[0, 0]), complex(past[0, 0])
+        return [(omega, critical_delay(a, b, omega)) for omega in frequencies(a, b)]
+    unit = np.eye(len(now))
+    found: list[tuple[float, float]] = []
+    first, middle, last = (np.kron(past, unit),
+                           np.kron(now, unit) + np.kron(unit, now.conj()),
+                           np.kron(unit, past.conj()))
+    size = len(first)
+    # z^2 first + z middle + last = 0, written for (v, z v).
+    left = np.block([[np.zeros((size, size)), np.eye(size)], [-last, -middle]])
+    right = np.block([[np.eye(size), np.zeros((size, size))], [np.zeros((size, size)), first]])
+    with np.errstate(all='ignore'):
+        values = scipy.linalg.eigvals(left, right)
+    for z in values[np.isfinite(values) & (np.abs(np.abs(values) - 1.0) < ON_CIRCLE)]:
+        z = complex(z / abs(z))
+        for root in np.linalg.eigvals(now + past * z):
+            close = ON_CIRCLE * (1.0 + abs(root))
+            one = (float(root.imag), _delay(z, float(root.imag), 0)) if root.imag > close else None
+            if one and abs(root.real) < close and not any(
+                    np.allclose(one, other, 1e-6, 0.0) for other in found):
+                found.append(one)
+    return sorted(found, reverse=True)
+
 
 #: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
 LARGEST = 690.0

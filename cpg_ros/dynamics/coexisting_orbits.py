@@ -23,15 +23,15 @@ of the class's Hopf points, or are reached by Newton's method when those known a
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.branch_orbits import branch_orbits
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_from_path, solve_orbit
-from cpg_ros.dynamics.periodic import check_values, richer
-from cpg_ros.dynamics.seek import find_orbit, Path, RANDOM, SIZES
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit
+from cpg_ros.dynamics.settling import find_orbit, Path, RANDOM, SIZES
+from cpg_ros.dynamics.solve_orbit import branch_orbits, solve_from_path, solve_orbit
 from cpg_ros.networks.network import Network
-from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: States at random from which a thorough search simulates.
@@ -157,7 +157,7 @@ class _Search:
 
     def add(self, orbit: Orbit | None) -> bool:
         """Add an orbit unless it is known or has more symmetry; tell whether it is new."""
-        if orbit is None or richer(orbit) or any(_same(orbit, one) for one in self.orbits):
+        if orbit is None or extra_symmetry(orbit) or any(_same(orbit, one) for one in self.orbits):
             return False
         self.orbits.append(orbit)
         self._growth.append(leading_within(orbit))

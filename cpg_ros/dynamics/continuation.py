@@ -22,17 +22,121 @@ more symmetry, near a homoclinic orbit, where its period has no bound, or at the
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics import arclength
-from cpg_ros.dynamics.arclength import CurvePoint
-from cpg_ros.dynamics.branch_end import BranchEnd, grows_alone, without_period
+from cpg_ros.dynamics.arclength import CurvePoint, NoOrbit
+from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
-from cpg_ros.errors import InputError
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
-from cpg_ros.short_repr import ShortRepr
 import numpy as np
+
+# How branches of orbits end, and where: what lies beyond the last orbit is extrapolated.
+
+#: A branch that cannot be resolved any more has run into such an orbit if its period has grown
+#: this many times over, and the value moves less than this share of its scale in a period.
+GROWN, STILL = 3.0, 1e-2
+#: A step in which the period grows by this share and the value moves by less than this one of its
+#: scale is all that is left to see of such an end.
+LONGER, ROUNDING = 0.01, 1e-9
+#: The value's slope falls as the period to the power of -3 near a saddle-node; from this power on
+#: its fall is taken for an exponential one.
+STEEPER = 4.0
+
+
+@dataclass(frozen=True)
+class BranchEnd:
+    """How a branch ends.
+
+    Attributes:
+        why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (it runs into an
+            orbit that has more of it, where it turns back as its own mirror image), 'period'
+            (it grows without bound: near a homoclinic orbit), 'bound' (an end of the range),
+            'steps', 'steep' (the waveform cannot be resolved), 'lost' (Newton's method fails
+            however short the step), 'start' (it was not followed that way).
+        value: where; of a Hopf point extrapolated to amplitude 0, of 'period' to no period.
+        period: at the Hopf point; else that of the last orbit.
+
+    """
+
+    why: str
+    value: float
+    period: float
+
+    def __str__(self) -> str:
+        texts = {'rest': 'Hopf point', 'symmetry': 'orbit of more symmetry',
+                 'bound': 'followed to',
+                 'period': 'homoclinic end near', 'steps': 'not followed beyond', 'start':
+                 'not followed from', 'steep': 'too steep beyond', 'lost': 'lost at'}[self.why]
+        grows = ', period grows' if self.why == 'period' else ''
+        return f'{texts} {self.value:.7g}{grows}'
+
+
+def grows_alone(values: np.ndarray, periods: np.ndarray, scale: float) -> bool:
+    """Whether from one point to the next the period grows and the value no longer moves."""
+    return bool(len(values) > 1 and abs(np.diff(periods)) > LONGER * periods[0]
+                and abs(np.diff(values)) < ROUNDING * scale)
+
+
+def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> float | None:
+    """Return the value towards which a branch's period grows without bound; None if not so.
+
+    Args:
+        values: of the parameter at the last points, shape (points,).
+        periods: of the orbits there, shape (points,).
+        scale: of the values.
+
+    """
+    if periods.size < 4 or not periods[-1] > GROWN * periods.min():
+        return None
+    slopes, middle = _slopes(values, periods)
+    if not abs(slopes[-1]) * periods[-1] < STILL * scale:
+        return None
+    if _winds(slopes):
+        # In ever smaller turns: the last one is the best estimate.
+        return float(values[-1])
+    fall = np.log(slopes[0] / slopes[2])
+    power = fall / np.log(middle[2] / middle[0])
+    if power <= 1.5:
+        return None
+    if power < STEEPER:
+        last = slopes[2] * (middle[2] / periods[-1])**power
+        return float(values[-1] + last * periods[-1] / (power - 1.0))
+    rate = fall / (middle[2] - middle[0])
+    last = slopes[2] * np.exp(-rate * (periods[-1] - middle[2]))
+    return float(values[-1] + last / rate)
+
+
+def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
+    """Return by which law a branch's period grows without bound, from its last points.
+
+    Args:
+        values: of the parameter, shape (points,).
+        periods: of the orbits there, shape (points,).
+
+    Returns:
+        'homoclinic', 'SNIC' (a saddle node on the invariant circle), or None.
+
+    """
+    if periods.size < 4:
+        return None
+    slopes, middle = _slopes(values, periods)
+    if _winds(slopes):
+        return 'homoclinic'
+    power = np.log(slopes[0] / slopes[2]) / np.log(middle[2] / middle[0])
+    return None if power <= 1.5 else 'SNIC' if power < STEEPER else 'homoclinic'
+
+
+def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the value by the period between the last four points, and periods there."""
+    return (np.diff(values[-4:]) / np.diff(periods[-4:]),
+            0.5 * (periods[-4:-1] + periods[-3:]))
+
+
+def _winds(slopes: np.ndarray) -> bool:
+    """Whether the value winds in, or no longer moves."""
+    return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
+
 
 #: Below this amplitude an orbit is as good as its Hopf point.
 REST = 2e-3
@@ -155,7 +259,7 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     along = ParameterLine.of(along, type(orbit.network))
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
-    curve, z = orbit_method(orbit.network).curve.through(orbit, along, scales)
+    curve, z = orbit_method(orbit.network).solve.through(orbit, along, scales)
     # At a fold the value cannot be held, but the period can.
     start = (arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -1))
              or arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -2)))
@@ -261,7 +365,7 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     """
     _check(network, symmetry, along, low, high)
     value = along.value(network)
-    curve, still, border = orbit_method(network).curve.beside(
+    curve, still, border = orbit_method(network).solve.curve_beside(
         network, symmetry, along, (period, high - low), path, disturbance, period)
     start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
@@ -306,7 +410,7 @@ def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
             return 'rest'
         if orbit.period > longest or grows_alone(*_course(points[-2:]), high - low):
             return 'period'
-        return 'symmetry' if richer(orbit) else ''
+        return 'symmetry' if extra_symmetry(orbit) else ''
 
     turns, why = arclength.continue_curve(start, low, high, visit, **steps)
     last = points[-1] if points else _point(start)
@@ -318,9 +422,9 @@ def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
         # Near a Hopf point value and period are linear in the square of the amplitude.
         before = points[-2] if len(points) > 1 else _point(start)
         size = last.place.amplitude**2
-        share = size / (before.place.amplitude**2 - size)
-        value += share * (value - before.value)
-        period += share * (period - before.orbit.period)
+        fraction = size / (before.place.amplitude**2 - size)
+        value += fraction * (value - before.value)
+        period += fraction * (period - before.orbit.period)
     return points, turns, BranchEnd(why, value, period)
 
 

@@ -24,10 +24,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, lru_cache
 
-from cpg_ros.dynamics.sign_changes import crossings
-from cpg_ros.errors import CpgError, InputError
-from cpg_ros.networks.equations import equations_of
-from cpg_ros.networks.field import Field
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.dynamics.arclength import crossings
+from cpg_ros.networks.equations import equations_of, Field
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -62,9 +61,9 @@ class Quotient(Field[Network]):
         self._coupled = [equations.by_cell.get(row, (row,))[0] in network.couplings
                          for row in equations.rows]
 
-    def set_share(self, share: float) -> None:
+    def set_share(self, fraction: float) -> None:
         """Set the share of the couplings that is there."""
-        self._p = [share * value if coupled else value
+        self._p = [fraction * value if coupled else value
                    for value, coupled in zip(self._whole, self._coupled, strict=True)]
 
     def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -239,13 +238,13 @@ def equilibrium(network: Network) -> np.ndarray:
     cell.set_share(0.0)
     state = _uncoupled(replace(  # type: ignore[type-var]
         network, **dict.fromkeys(network.couplings, 0.0)))
-    share, step, grow = 0.0, 0.25, 2.0
+    fraction, step, grow = 0.0, 0.25, 2.0
     slope = cell.together(state)[1]
-    while share < 1.0:
-        step = min(step, 1.0 - share)
+    while fraction < 1.0:
+        step = min(step, 1.0 - fraction)
         way = -step * np.linalg.solve(slope, cell.push(state))
         size, new = 1.0 + np.abs(state).max(), None
-        cell.set_share(share + step)
+        cell.set_share(fraction + step)
         if np.abs(way).max() <= LONGEST * size:
             new = cell.newton(state + way)
         ahead = slope if new is None else cell.together(new)[1]
@@ -253,15 +252,15 @@ def equilibrium(network: Network) -> np.ndarray:
         if (new is not None and np.abs(new - state - way).max() <= MISS * size
                 and np.linalg.det(ahead) * np.linalg.det(slope) > 0.0):
             state, slope = new, ahead
-            share, step, grow = share + step, grow * step, 2.0
+            fraction, step, grow = fraction + step, grow * step, 2.0
         else:
-            cell.set_share(share)
+            cell.set_share(fraction)
             step, grow = 0.5 * step, 1.0
-        if step < SHORTEST < 1.0 - share or size > FURTHEST:
+        if step < SHORTEST < 1.0 - fraction or size > FURTHEST:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'
             place = ', '.join(f'{name} {value:.4f}' for name, value
                               in named(network, state).items())
-            raise NoEquilibrium(f'the stand is lost {how} at {share:.4f} of the couplings, '
+            raise NoEquilibrium(f'the stand is lost {how} at {fraction:.4f} of the couplings, '
                                 f'{place}')
     return state
 

@@ -20,9 +20,9 @@ which the symmetry lock -g (I - P) x shrinks and nothing else does.
 
 from dataclasses import dataclass
 
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.short_repr import ShortRepr
 import numpy as np
 import scipy
 

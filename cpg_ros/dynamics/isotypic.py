@@ -21,18 +21,153 @@ once for that a delay ago. Oscillations of a class are primary gaits:
 ``x_i ~ chi(i) exp(i omega t)``, so the character is the gait (Table 5).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
+from typing import Any
 
+from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
-from cpg_ros.dynamics.expansion import Expansion
-from cpg_ros.errors import InputError
-from cpg_ros.networks.hk_theorem import homomorphisms
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.symmetry import Group, Symmetry
-from cpg_ros.short_repr import ShortRepr
+from cpg_ros.networks.equations import equations_of, multilinear, values_of
+from cpg_ros.networks.network import Network, ParameterLine
+from cpg_ros.networks.symmetry import Group, homomorphisms, Symmetry
 import numpy as np
+
+# Subspaces of a network's states that its linearised flow along a gait keeps apart.
+
+@cache
+def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return orthonormal columns of the gait's class, and of the subspaces transverse to it."""
+    cells = symmetry.group.cells
+    inside, parts = symmetry.basis.T, [np.eye(cells)]
+    for name, shift in symmetry.shifts:
+        sign = 1.0 if shift == 0 else -1.0
+        if shift not in (0, Fraction(1, 2)) or (sign < 0.0 and not symmetry.odd):
+            continue
+        image = np.zeros((cells, cells))
+        image[np.array(symmetry.group.elements[name]), np.arange(cells)] = sign
+        if np.array_equal(image @ image, np.eye(cells)):
+            parts = [half for part in parts for half in _halves(part, image)]
+    outside = []
+    for part in parts:
+        columns = np.kron(np.eye(symmetry.variables), part)
+        rest = columns - inside @ (inside.T @ columns)
+        vectors, sizes, _ = np.linalg.svd(rest, full_matrices=False)
+        if (sizes > 0.5).any():
+            outside.append(vectors[:, sizes > 0.5])
+    return inside, outside
+
+
+def _halves(part: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
+    """Part a subspace, orthonormal columns, into those that an involution keeps and turns."""
+    found = []
+    for sign in (1.0, -1.0):
+        vectors, sizes, _ = np.linalg.svd(0.5 * (part + sign * image @ part), full_matrices=False)
+        if (sizes > 0.5).any():
+            found.append(vectors[:, sizes > 0.5])
+    return found
+
+
+# A cell's rates about a state in which all cells are alike, expanded in what the cell hears.
+
+class Expansion:
+    """Derivatives of the first cell's rates, exact; they are those of every cell.
+
+    Attributes:
+        network: parameters.
+        state: of every cell, shape (variables,).
+
+    """
+
+    def __init__(self, network: Network, state: np.ndarray) -> None:
+        """Take the parameters and the state of every cell."""
+        self.network, self.state = network, state
+        self._equations = equations_of(type(network))
+        self._x = [state[one.variable] for one in self._equations.arguments]
+        self._p = [value.flat[0] for value in values_of(network)]
+
+    @cached_property
+    def _slopes(self) -> Mapping[tuple[int, int], float]:
+        return self._equations.slopes(self._x, self._p)[1]
+
+    @cached_property
+    def _second(self) -> Mapping[Any, float]:
+        return self._equations.second(self._x, self._p)
+
+    @cached_property
+    def _third(self) -> Mapping[Any, float]:
+        return self._equations.third(self._x, self._p)
+
+    def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """L0 and L1 of a class, complex: ``h' = L0 h(t) + L1 h(t - tau)``, (variables, variables).
+
+        Args:
+            chi: the class's character for every cell, 1 for the first, shape (cells,).
+
+        """
+        return self._split(chi, self._slopes)
+
+    def _split(self, chi: np.ndarray, slopes: Mapping[tuple[int, int], float]
+               ) -> tuple[np.ndarray, np.ndarray]:
+        variables = self.network.variables
+        both = np.zeros((2, variables, variables), dtype=complex)
+        for (v, k), slope in slopes.items():
+            one = self._equations.arguments[k]
+            both[int(one.delayed), v, one.variable] += slope * (
+                1.0 if one.source is None else chi[one.source[0]])
+        return both[0], both[1]
+
+    def heard(self, h: np.ndarray, chi: np.ndarray, exponent: complex = 0.0) -> np.ndarray:
+        """Return what is heard of ``h chi exp(exponent t)`` at t = 0, shape (arguments,).
+
+        Args:
+            h: of a cell, shape (variables,).
+            chi: character, shape (cells,).
+            exponent: 1/model time.
+
+        """
+        past = np.exp(-exponent * self.network.delay)
+        return np.array([h[one.variable] * (1.0 if one.source is None else chi[one.source[0]])
+                         * (past if one.delayed else 1.0) for one in self._equations.arguments])
+
+    def second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Second derivative of the rates, B(a, b), at two sets of arguments, (variables,)."""
+        return self._multilinear(self._second, a, b)
+
+    def third(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+        """Third derivative of the rates, C(a, b, c), shape (variables,)."""
+        return self._multilinear(self._third, a, b, c)
+
+    def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray
+                     ) -> np.ndarray:
+        out = np.zeros(self.network.variables, dtype=complex)
+        for v, rate in multilinear(derivatives, list(sets)).items():
+            out[v] = rate
+        return out
+
+    def _moving(self, line: ParameterLine) -> dict[int, float]:
+        """How fast the rows of parameters move along a line, those that do."""
+        signs = dict(zip(line.names, line.signs, strict=True))
+        by_cell = self._equations.by_cell
+        names = [by_cell[row][0] if row in by_cell else row for row in self._equations.rows]
+        return {r: signs[name] for r, name in enumerate(names) if name in signs}
+
+    def along(self, line: ParameterLine) -> np.ndarray:
+        """Return the derivative of the rates along a line of parameters, shape (variables,)."""
+        out, moving = np.zeros(self.network.variables), self._moving(line)
+        for (v, r), slope in self._equations.by_parameter(self._x, self._p).items():
+            out[v] += slope * moving.get(r, 0.0)
+        return out
+
+    def linear_along(self, line: ParameterLine, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of L0 and L1 along a line of parameters, at a state that stays."""
+        moving = self._moving(line)
+        slopes: dict[tuple[int, int], float] = {}
+        mixed = self._equations.by_parameter_and_argument(self._x, self._p)
+        for (v, r, k), slope in mixed.items():
+            slopes[v, k] = slopes.get((v, k), 0.0) + slope * moving.get(r, 0.0)
+        return self._split(chi, slopes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

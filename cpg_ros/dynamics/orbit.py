@@ -12,106 +12,242 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits as exact periodic orbits, for every network."""
+"""Periodic orbits of a network in a gait, whatever solves them."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+import math
 
-from cpg_ros.dynamics.branch_orbits import branch_orbits
-from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-__all__ = [
-    'NoOrbit',
-    'Orbit',
-    'solve_beside',
-    'solve_from_path',
-    'solve_orbit',
-    'solve_preset',
-]
+# Deflation: Newton's method kept off the orbits that are known.
+
+#: Width w, relative to a known period, of what deflation keeps free about it.
+WIDTH = 0.1
+#: The factor is at most this large: near a pole the step says little.
+LARGEST = 3.0
 
 
-def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit:
-    """Solve for one orbit of the gait, with exact derivatives by every parameter.
-
-    A gait may have several: ``coexisting_orbits`` finds them and which of them attract.
+def deflation_factor(period: float, step: float, known: Sequence[float]) -> float:
+    """Return what Newton's step is multiplied by; 1 where no orbit is known.
 
     Args:
-        network: parameters.
-        gait: one of the network's gaits.
-        near: an orbit of that gait of the same kind of network to start from; by default, where
-            the network has no delay, that of the shipped preset.
-
-    Raises:
-        InputError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoOrbit: this set has no such orbit, or none was found; the message says how far off
-            the parameters are.
+        period: the current one, in any unit of time.
+        step: Newton's own step of it, in the same unit.
+        known: periods of the orbits to be kept off, the same.
 
     """
-    preset = network.presets().get(gait)
-    try:
-        found: Orbit = orbit_method(network).solve.solve(network, gait, near)
+    slope = 0.0
+    for one in known:
+        x = period / one - 1.0 or 1e-12
+        slope -= 2.0 * WIDTH**2 / (x * (x * x + WIDTH**2)) / one
+    factor = 1.0 / (1.0 - slope * step or 1e-12)
+    return max(-LARGEST, min(LARGEST, factor))
+
+
+#: Waveforms over theta in cycles, of a wave and a variable: ``waveform(theta, wave, variable)``.
+Waveforms = Callable[[np.ndarray, int, int], np.ndarray]
+#: Why there is no phase response.
+NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a disturbance other '
+                'than along it does not decay, either')
+#: Points of a cycle among which extremes are looked for before they are refined.
+POINTS = 1024
+#: Points of a cycle at which signals are compared, at least; and parts of a cycle, of which no
+#: orbit may repeat one.
+COMPARED, PARTS = 60, (2, 3, 5)
+#: Two signals this close, over their range, are one.
+SAME = 1e-4
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit(ShortRepr, ABC):
+    """A gait of a network: its waveforms, its period, and where each cell is in them.
+
+    Called with times it gives the states, so it serves as a history for the simulation. Cell i's
+    variable q is ``u_{w,q}(t/T + phi_i)``, w its wave, phi_i its phase; phase zero is where the
+    first variable of cell 1 peaks.
+
+    Attributes:
+        network: the parameters for which it solves the equations.
+        symmetry: of the gait; gives waves and phases of the cells.
+        period: T in model time.
+        residual: largest residual of the equations, between the nodes where they are solved.
+
+    """
+
+    network: Network
+    symmetry: Symmetry
+    period: float
+    residual: float
+
+    @property
+    @abstractmethod
+    def d_period(self) -> np.ndarray:
+        """Derivatives of the period by the network's parameters, shape (parameters,)."""
+
+    @abstractmethod
+    def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
+                 ) -> np.ndarray:
+        """Return a waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
+
+    @abstractmethod
+    def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
+        """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
+
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name}: period {self.period:.7g}, '
+                f'residual {self.residual:.0e}')
+
+    @property
+    @abstractmethod
+    def samples(self) -> int:
+        """How many evenly spaced points of a cycle resolve a waveform."""
+
+    @property
+    def gait(self) -> str:
+        """Name of the gait: the one that the parameters state, or that has this symmetry."""
+        network = self.network
+        return stated_gait(network) or next(
+            (gait for gait in network.gaits() if network.symmetry(gait) == self.symmetry),
+            'unnamed orbit')
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phase of each cell in cycles, shape (cells,)."""
+        return self.symmetry.phases
+
+    @property
+    def leg_phases(self) -> dict[str, float]:
+        """Leg -> cycles by which its first cell is ahead of cell 1, from 0 to 1."""
+        legs = next(iter(self.network.legs.values()))
+        return {leg: float(self.phases[cells[0] - 1]) for leg, cells in legs.items()}
+
+    @property
+    def waves(self) -> np.ndarray:
+        """Number of each cell's waveform, from 0, shape (cells,)."""
+        return self.symmetry.waves
+
+    @cached_property
+    def levels(self) -> np.ndarray:
+        """Middle and half the range of each waveform, shape (waves, variables, 2)."""
+        found = np.empty((int(self.waves.max()) + 1, self.network.variables, 2))
+        theta = np.arange(POINTS) / POINTS
+        for wave, variable in np.ndindex(found.shape[:2]):
+            values = self.waveform(theta, 0, wave, variable)
+            ends = []
+            for place in (theta[values.argmin()], theta[values.argmax()]):
+                for _ in range(3):
+                    slope, bend = (float(self.waveform(np.array([place]), order, wave,
+                                                       variable)[0]) for order in (1, 2))
+                    if bend:
+                        place -= float(np.clip(slope / bend, -1.0 / POINTS, 1.0 / POINTS))
+                ends.append(float(self.waveform(np.array([place]), 0, wave, variable)[0]))
+            low, high = min(ends[0], values.min()), max(ends[1], values.max())
+            found[wave, variable] = 0.5 * (high + low), 0.5 * (high - low)
         return found
-    except NoOrbit as error:
-        if near is not None or (preset is not None and preset.start is not None):
-            raise
-        return _from_hopf_point(network, gait, error)
+
+    @property
+    def peak(self) -> float:
+        """The largest value of cell 1."""
+        return float(self.levels[0, 0].sum())
+
+    def _states(self, times: np.ndarray, order: int) -> np.ndarray:
+        theta = np.asarray(times, dtype=float)[..., None] / self.period + self.phases
+        out = np.empty((*theta.shape[:-1], self.network.components))
+        for wave in range(int(self.waves.max()) + 1):
+            cells = np.flatnonzero(self.waves == wave)
+            for variable in range(self.network.variables):
+                out[..., cells + variable * self.network.cells] = self.waveform(
+                    theta[..., cells], order, wave, variable)
+        return out
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """All states at model times, cell 1 peaking at 0; shape times.shape + (components,)."""
+        return self._states(times, 0)
+
+    def derivative(self, times: np.ndarray) -> np.ndarray:
+        """Slopes of all states, per model time; shape times.shape + (components,)."""
+        return self._states(times, 1) / self.period
 
 
-def solve_beside(network: Network, near: Orbit) -> Orbit:
-    """Solve for the orbit next to a known one of the same symmetry, by Newton's method alone.
-
-    Args:
-        network: parameters.
-        near: the known orbit.
+def check_values(network: Network, gait: str) -> None:
+    """Check what every solver needs.
 
     Raises:
-        NoOrbit: the method leads elsewhere; a shorter way may do.
+        InputError: a parameter is not finite, or the delay not positive.
+        NoOrbit: weights differ that the gait's symmetry needs to be equal, or the parameters
+            state the phases of another gait.
 
     """
-    found: Orbit = orbit_method(network).solve.beside(network, near)
-    return found
+    for name, value in network.as_dict().items():
+        if not np.isfinite(value):
+            raise InputError(f'{name} is {value}, not a finite number')
+    if network.delay_parameter and network.delay <= 0.0:
+        raise InputError(f'{network.delay_parameter} is {network.delay}, it must be positive')
+    broken = network.broken(network.symmetry(gait))
+    if broken:
+        raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
+    if other := other_gait(network, gait):
+        raise NoOrbit(other)
+
+
+def extra_symmetry(orbit: Orbit) -> str:
+    """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
+
+    Newton's method may end on an orbit with more symmetry, which every equation of the gait
+    also holds for: a walk is a skip whose two waveforms agree; or it goes round an orbit several
+    times, whose shifts are then others.
+    """
+    # A whole number of them for every shift that there may be.
+    points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
+    x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
+    for parts in PARTS:
+        if np.abs(x - np.roll(x, points // parts, axis=0)).max() < SAME * np.ptp(x):
+            return f'it repeats {parts} times'
+    return signal_symmetry(orbit.symmetry, x, SAME)
+
+
+def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
+    """Name what a cycle has beyond a symmetry, or '' if it has nothing.
+
+    Args:
+        symmetry: that it has.
+        x: the cells' first variable at even times of a cycle, shape (points, cells), a multiple of
+            the group's exponent.
+        same: signals that differ by less are one, over the range of all.
+
+    """
+    most = same * np.ptp(x)
+    names, lates, cells = _beyond(symmetry, len(x))
+    # A single time rules out nearly all of them.
+    for k in np.flatnonzero(np.abs(x[0, cells] - x[lates]).max(axis=1) < most):
+        if np.abs(x[:, cells[k]] - np.roll(x, -lates[k], axis=0)).max() < most:
+            return names[k]
+    return ''
 
 
 @lru_cache(maxsize=64)
-def solve_preset(preset: Preset) -> Orbit:
-    """Solve for a preset's orbit; errors as in solve_orbit."""
-    try:
-        found: Orbit = orbit_method(preset.network).solve.from_preset(preset)
-        return found
-    except NoOrbit as error:
-        if preset.start is not None:
-            raise
-        return _from_hopf_point(preset.network, preset.gait, error)
+def _beyond(symmetry: Symmetry, points: int) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """List what a cycle could have beyond a symmetry.
 
-
-def _from_hopf_point(network: Network, gait: str, error: NoOrbit) -> Orbit:
-    """Return the first orbit on the branches of the equilibrium's Hopf points, or raise."""
-    if not network.delay_parameter:
-        for orbits in branch_orbits(network, gait):
-            for orbit in orbits:
-                if not richer(orbit):
-                    return orbit
-    raise error
-
-
-def solve_from_path(network: Network, symmetry: Symmetry,
-                    path: Callable[[np.ndarray], np.ndarray], period: float,
-                    known: Sequence[float] = ()) -> Orbit | None:
-    """Solve for an orbit from a guess; None where Newton's method leads to none.
-
-    Args:
-        network: parameters.
-        symmetry: of the gait.
-        path: states, shape (m, components), as a function of times in cycles, shape (m,), that
-            begin where cell 1 peaks.
-        period: in model time.
-        known: periods, model time, of orbits that Newton's method is to be kept off.
+    Returns:
+        What it is; by how many of a cycle's points it shifts; and whose signal each cell has,
+        shape (n, cells).
 
     """
-    found: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period,
-                                                                known)
-    return found
+    own, found = dict(symmetry.shifts), []
+    for name, element in symmetry.group.elements.items():
+        order = symmetry.group.order(name)
+        known = round(order * own[name]) if name in own else None
+        found += [(f'{name} shifts it by {k}/{order} of a cycle', points * k // order, element)
+                  for k in range(order) if k != known]
+    return ([name for name, _, _ in found], np.array([late for _, late, _ in found], dtype=int),
+            np.array([element for *_, element in found],
+                     dtype=int).reshape(len(found), symmetry.group.cells))

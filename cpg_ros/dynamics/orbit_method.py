@@ -21,32 +21,22 @@ with the same functions; what they solve for are orbits and curves that know wha
 from types import ModuleType
 from typing import NamedTuple
 
-from cpg_ros.dynamics.fourier import adjoint as fourier_adjoint
-from cpg_ros.dynamics.fourier import curve as fourier_curve
 from cpg_ros.dynamics.fourier import floquet as fourier_floquet
 from cpg_ros.dynamics.fourier import solve as fourier_solve
-from cpg_ros.dynamics.fourier import variational as fourier_variational
-from cpg_ros.dynamics.mesh import adjoint as mesh_adjoint
-from cpg_ros.dynamics.mesh import curve as mesh_curve
 from cpg_ros.dynamics.mesh import floquet as mesh_floquet
 from cpg_ros.dynamics.mesh import solve as mesh_solve
-from cpg_ros.dynamics.mesh import variational as mesh_variational
 from cpg_ros.networks.network import Network
 
 
 class OrbitMethod(NamedTuple):
-    """Modules with the same functions, which find, follow and judge orbits, and adjoints."""
+    """Two modules with the same functions: one solves for orbits, one judges their stability."""
 
     solve: ModuleType
-    curve: ModuleType
     floquet: ModuleType
-    adjoint: ModuleType
-    variational: ModuleType
 
 
-FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_adjoint,
-                      fourier_variational)
-MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_adjoint, mesh_variational)
+FOURIER = OrbitMethod(fourier_solve, fourier_floquet)
+MESH = OrbitMethod(mesh_solve, mesh_floquet)
 
 
 def orbit_method(network: Network) -> OrbitMethod:

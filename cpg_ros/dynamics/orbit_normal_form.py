@@ -31,14 +31,121 @@ bifurcations of limit cycles in DDEs, 2023).
 """
 
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.bifurcation import REAL
-from cpg_ros.dynamics.critical_disturbances import Linearised
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit
-from cpg_ros.networks.field import States
-from cpg_ros.short_repr import ShortRepr
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.orbit_method import orbit_method
+from cpg_ros.networks.equations import Field, States
 import numpy as np
+import scipy
+
+# The variational equation about an orbit where it is singular: null vectors and answers.
+
+#: How often null vectors are taken for the borders by which they are found anew.
+ROUNDS = 2
+
+
+class _Bordered:
+    """``[[matrix, columns], [conj(rows), 0]]``, factorised; rows and columns of shape (k, n)."""
+
+    def __init__(self, matrix: np.ndarray | scipy.sparse.csc_array, rows: np.ndarray,
+                 columns: np.ndarray) -> None:
+        self._shape = matrix.shape[0], len(rows)
+        if isinstance(matrix, np.ndarray):
+            corner = np.zeros((len(rows), len(rows)))
+            factors = scipy.linalg.lu_factor(np.block([[matrix, columns.T],
+                                                       [rows.conj(), corner]]))
+            self._solve: Any = partial(scipy.linalg.lu_solve, factors)
+        else:
+            whole = scipy.sparse.block_array([[matrix, columns.T], [rows.conj(), None]],
+                                             format='csc') if len(rows) else matrix
+            lu = scipy.sparse.linalg.splu(whole)
+            self._solve = lambda right, trans: lu.solve(right, 'NTH'[trans])
+
+    def answer(self, right: np.ndarray) -> np.ndarray:
+        """Return the answer that is normal to the rows, shape (n,) as the right-hand side."""
+        n, k = self._shape
+        found: np.ndarray = self._solve(np.append(right, np.zeros(k)).astype(complex), trans=0)
+        return found[:n]
+
+    def null(self, adjoint: bool) -> np.ndarray:
+        """Return the matrix's right or left null vectors, of length 1, shape (k, n)."""
+        n, k = self._shape
+        found = self._solve(np.eye(n + k, k, -n, dtype=complex), trans=2 * adjoint)[:n].T
+        return found / np.linalg.norm(found, axis=1)[:, None]
+
+
+class Linearised:
+    """Disturbances of an orbit, with those that return as multiples of themselves.
+
+    Attributes:
+        equation: the variational equation.
+
+    """
+
+    def __init__(self, orbit: Orbit, halvings: int) -> None:
+        """Linearise about an orbit, on its mesh halved so many times.
+
+        Raises:
+            NoOrbit: its rates have no derivatives, or there are too many unknowns.
+
+        """
+        self.equation = orbit_method(orbit.network).floquet.Variational(orbit, halvings)
+        if self.equation.flaw:
+            raise NoOrbit(self.equation.flaw)
+        self._field: Field = Field(orbit.network)
+        self._systems: dict[complex, tuple[_Bordered, np.ndarray]] = {}
+
+    def find(self, turn: complex, guesses: np.ndarray) -> np.ndarray:
+        """Return all disturbances that return as a factor of themselves, shape (k, n).
+
+        Args:
+            turn: the factor.
+            guesses: of them at the unknowns, shape (k, n).
+
+        """
+        matrix = self.equation.matrix(turn)
+        rights = lefts = guesses / np.linalg.norm(guesses, axis=1)[:, None]
+        for _ in range(ROUNDS):
+            system = _Bordered(matrix, rights, lefts)
+            rights, lefts = system.null(False), system.null(True)
+        self._systems[turn] = _Bordered(matrix, rights, lefts), lefts
+        return rights
+
+    def fractions(self, turn: complex, rates: np.ndarray) -> np.ndarray:
+        """Return what of sources none can answer to, for each left null vector, shape (k,)."""
+        return self._systems[turn][1].conj() @ self.equation.right(rates, turn)
+
+    def solve(self, rates: np.ndarray, turn: complex) -> States:
+        """Return the disturbance that sources make which return as a factor of themselves."""
+        if turn not in self._systems:
+            none = np.zeros((0, self.equation.along().size))
+            self._systems[turn] = _Bordered(self.equation.matrix(turn), none, none), none
+        found = self._systems[turn][0].answer(self.equation.right(rates, turn))
+        return self.equation.values(found, rates, turn)
+
+    def second(self, a: States, b: States) -> np.ndarray:
+        """Return the rates' second derivative B(a, b) along the orbit."""
+        return self._field.multilinear(self.equation.at, a, b)
+
+    def third(self, a: States, b: States, c: States) -> np.ndarray:
+        """Return the rates' third derivative C(a, b, c) along the orbit."""
+        return self._field.multilinear(self.equation.at, a, b, c)
+
+    def moved(self, y: States) -> np.ndarray:
+        """Return ``E y = y + tau B y(t - tau)``."""
+        return y[0] + self.equation.delay * self.equation.delayed(y)
+
+    def late(self, y: States) -> States:
+        """Return ``tau y(t - tau)`` as a disturbance that is there a delay ago only."""
+        past = None if y[1] is None else self.equation.delay * y[1]
+        return np.zeros_like(y[0]), past
+
 
 #: Multipliers this near to the circle are on it; powers of one this near to 1 are 1.
 CRITICAL, RESONANT = 1e-3, 0.02
@@ -142,21 +249,21 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
 
     # Sources have a part along the orbit and one along v; where both return unchanged, the left
     # null vectors tell them apart together.
-    weights = np.array([linear.shares(1.0, linear.moved(y)) for y in ((along, v) if alike
+    weights = np.array([linear.fractions(1.0, linear.moved(y)) for y in ((along, v) if alike
                                                                       else (along,))]).T
-    own = None if alike else linear.shares(turn, linear.moved(v))[0]
+    own = None if alike else linear.fractions(turn, linear.moved(v))[0]
 
-    def share(rates: np.ndarray) -> complex:
+    def fraction(rates: np.ndarray) -> complex:
         """Return the part along v."""
         if own is None:
-            return complex(np.linalg.solve(weights, linear.shares(1.0, rates))[1])
-        return complex(linear.shares(turn, rates)[0] / own)
+            return complex(np.linalg.solve(weights, linear.fractions(1.0, rates))[1])
+        return complex(linear.fractions(turn, rates)[0] / own)
 
     other = _conj(v) if pair else v
     first = linear.second(v, other)
-    if alike and abs(share(first)) > NOTHING * np.abs(first).max():
+    if alike and abs(fraction(first)) > NOTHING * np.abs(first).max():
         raise NoOrbit('a branch crosses this one (transcritical)')
-    a = complex(np.linalg.solve(weights, linear.shares(1.0, first))[0])
+    a = complex(np.linalg.solve(weights, linear.fractions(1.0, first))[0])
     mixed = linear.solve(first - a * linear.moved(along), 1.0)
     cubic = linear.third(v, v, other)
     if pair:
@@ -168,7 +275,7 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
         terms = [0.5 * linear.second(v, mixed), cubic / 6.0]
     slope = equation.derivative(v, turn)
     terms += [-a * linear.moved(slope), -a * linear.second(v, linear.late(along))]
-    parts = [share(term) for term in terms]
+    parts = [fraction(term) for term in terms]
     if abs(sum(parts).real) <= NOTHING * max(map(abs, parts)):
         raise NoOrbit('its cubic term is 0')
     return complex(sum(parts))

@@ -12,12 +12,33 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stability of a gait: whether it attracts, and with what symmetry gain."""
+"""What a parameter set does, gait by gait: whether there is one, how large, how fast, how stable.
 
-from dataclasses import dataclass
+And what stands nearest where there is none: the threshold at which rest gives way.
+"""
 
-from cpg_ros.dynamics.floquet import leading_within, sufficient_gain
-from cpg_ros.dynamics.periodic import Orbit
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits, CoexistingOrbits
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
+from cpg_ros.dynamics.floquet import (
+    attracts_with,
+    leading_within,
+    Multipliers,
+    multipliers,
+    smallest_gain,
+    sufficient_gain,
+)
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.networks.network import Network
+
+# Stability of a gait: whether it attracts, and with what symmetry gain.
 
 #: Decay that the chosen gain gives transverse disturbances, per model time.
 RATE = 0.5
@@ -29,13 +50,13 @@ class Stability:
 
     Attributes:
         enough: symmetry gain (1/model time) that makes transverse disturbances decay.
-        chosen: the gain to run with: that, with a margin.
+        args: the gain to run with: that, with a margin.
         flaw: why the gait does not attract whatever the gain, or ''.
 
     """
 
     enough: float
-    chosen: float
+    args: float
     flaw: str
 
 
@@ -46,10 +67,159 @@ def stability(orbit: Orbit) -> Stability:
     """
     bound = orbit.network.sufficient_gain(RATE)
     if bound is None:
-        enough, chosen = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
+        enough, args = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
     else:
-        enough = chosen = bound
+        enough = args = bound
     leading = leading_within(orbit)
     flaw = '' if leading < 1.0 else (
         f'a disturbance within its own symmetry class grows {leading:.4g} times a stride')
-    return Stability(enough, chosen, flaw)
+    return Stability(enough, args, flaw)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitAssessment(ShortRepr):
+    """One gait of one parameter set.
+
+    Attributes:
+        gait: one of the network's gaits.
+        orbit: its orbit, or None; of several one that attracts within the gait's class if any
+            does, nearest in period to that of the preset.
+        why: why there is none, or ''.
+        others: the same of each coexisting orbit of the gait that was found.
+        searched: what others were searched from, or ''.
+
+    """
+
+    gait: str
+    orbit: Orbit | None
+    why: str = ''
+    others: tuple['GaitAssessment', ...] = ()
+    searched: str = ''
+
+    @property
+    def orbits(self) -> tuple['GaitAssessment', ...]:
+        """Itself and the others; none where there is no orbit."""
+        return () if self.orbit is None else (self, *self.others)
+
+    @property
+    def _orbit(self) -> Orbit:
+        if self.orbit is None:
+            raise NoOrbit(f'there is no {self.gait}: {self.why}')
+        return self.orbit
+
+    @property
+    def amplitude(self) -> float:
+        """Half the range of cell 1's first variable."""
+        return float(self._orbit.levels[0, 0, 1])
+
+    @property
+    def phases(self) -> dict[str, float]:
+        """Phase of each leg's first cell, or of each muscle, in cycles."""
+        orbit = self._orbit
+        muscles = orbit.network.muscles
+        return ({name: float(orbit.phases[cell - 1]) for name, cell in muscles.items()}
+                or orbit.leg_phases)
+
+    @cached_property
+    def multipliers(self) -> Multipliers:
+        """Floquet multipliers without a symmetry lock."""
+        return multipliers(self._orbit)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the gait attracts in the full network, without a lock."""
+        return self.multipliers.attracts
+
+    @cached_property
+    def smallest_gain(self) -> float:
+        """Symmetry gain above which every transverse disturbance decays, 1/model time."""
+        return smallest_gain(self._orbit)
+
+    @cached_property
+    def default_gain(self) -> float:
+        """The gain the generator would choose, 1/model time."""
+        return stability(self._orbit).args
+
+    @cached_property
+    def stable_with_default_gain(self) -> bool:
+        """Whether the gait attracts with the gain the generator would choose."""
+        return attracts_with(self._orbit, self.default_gain)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything in plain types, for JSON."""
+        if self.orbit is None:
+            return {'exists': False, 'why': self.why}
+        return {'exists': True, 'period': self.orbit.period, 'amplitude': self.amplitude,
+                'phases': self.phases, 'waveforms': int(self.orbit.waves.max()) + 1,
+                'floquet_leading': self.multipliers.leading_within,
+                'floquet_leading_transverse': self.multipliers.leading_transverse,
+                'floquet_error': self.multipliers.error,
+                'stable': self.stable, 'min_symmetry_gain': self.smallest_gain,
+                'default_symmetry_gain': self.default_gain,
+                'stable_with_default_gain': self.stable_with_default_gain,
+                'searched': self.searched, 'others': [one.as_dict() for one in self.others]}
+
+
+def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
+             near: Orbit | None = None, everything: bool = False) -> dict[str, GaitAssessment]:
+    """Judge every gait of a network, by all of its orbits that are found.
+
+    Where the orbit reached first is not stable, others are looked for from starts in the gait's
+    class; where none attracts in it, also by deflation and, with a delay, on branches.
+
+    Args:
+        network: parameters, all finite.
+        done: called with the number of gaits that are done.
+        near: a known orbit of one of the gaits, from which that one is solved for.
+        everything: look for all orbits of every gait.
+
+    Raises:
+        InputError: a parameter that is not finite, or a delay that is not positive.
+
+    """
+    found = {}
+    for count, gait in enumerate(network.gaits()):
+        done(count)
+        known = near if near is not None and near.gait == gait else None
+        try:
+            one = coexisting_orbits(network, gait, known, starts=everything,
+                                    everything=everything)
+            found[gait] = _assessed(one)
+            if not (found[gait].stable or one.starts):
+                found[gait] = _assessed(coexisting_orbits(network, gait, one.orbits[0],
+                                                          everything=False))
+        except (NoEquilibrium, NoOrbit) as error:
+            found[gait] = GaitAssessment(gait, None, str(error))
+    done(len(found))
+    return found
+
+
+def _assessed(found: CoexistingOrbits) -> GaitAssessment:
+    first, *others = (GaitAssessment(found.gait, orbit) for orbit in found.orbits)
+    return replace(first, others=tuple(others), searched=found.searched)
+
+
+def nearest_threshold(network: Network) -> str:
+    """Name what would have to change for a gait, of a network with a delay that has none.
+
+    The critical delay that is nearest above the delay; where no delay has one, what the network
+    says has to be larger.
+    """
+    name, delay = network.delay_parameter, network.delay
+    points = {gait: first_hopf(network, gait) for gait in network.gaits()}
+    ahead = {gait: point.value for gait, point in points.items()
+             if point is not None and point.value >= delay}
+    if ahead:
+        gait = min(ahead, key=lambda one: ahead[one])
+        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} ({name} "
+                f'is {delay:g})')
+    needed = {gait: coupling for gait, point in points.items()
+              if point is None and (coupling := network.least_coupling(gait)) is not None}
+    if needed:
+        gait = min(needed, key=lambda one: needed[one].least)
+        what, value, least = needed[gait]
+        return (f'the nearest threshold is {what} {least:.4f}, above which the {gait} has a '
+                f'critical delay ({what} is {value:g})')
+    if not any(points.values()):
+        return 'no delay gives one'
+    return f'every critical delay is below {name}, but no orbit was found this far from onset'

@@ -12,14 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Feedback from sensors to the pattern: kinematics, estimate, laws, efference copy.
+"""Feedback from sensors to the pattern: kinematics, estimate, laws and the efference copy.
 
-Imports ``motion``, ``robots`` and what is below; knows nothing of ROS. All of it works on many
-robots at a time: arrays have a leading axis of runs, which is 1 for a robot alone.
+Arrays have a leading axis of robots, of length 1 for a single robot. Imports ``motion`` and the
+rooms below it; knows nothing of ROS and of no physics engine.
 """
 
-__all__ = ['biped', 'clearance', 'efference_copy', 'estimate', 'feedback', 'foot_force',
-           'froude_scaling', 'gains', 'gait_tables', 'heading', 'input_monitor',
-           'interpolation', 'kinematics', 'law', 'memory', 'odometry', 'pace', 'placement',
-           'plausibility', 'posture', 'reflexes', 'sidestep', 'slope', 'speed', 'stiffen',
-           'tegotae', 'tick', 'timetable', 'touchdown', 'virtual_stiffness', 'warm_up']
+__all__ = ['biped', 'efference_copy', 'estimate', 'feedback', 'gains', 'gait_tables',
+           'input_checks', 'kinematics', 'laws', 'leg_rates', 'tick']

@@ -19,15 +19,54 @@ Only what differs from it is fed back. The term is von Holst and Mittelstaedt's 
 
 from dataclasses import dataclass
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.interpolation import between_phases, between_speeds
-from cpg_ros.integration.jit import jit
-from cpg_ros.robots import body_keys
-from cpg_ros.robots.body_keys import EfferenceTable
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.motion import body_file
+from cpg_ros.motion.body_file import EfferenceTable
 import numpy as np
 
+# Linear interpolation in tables: periodic ones over the stride, and ones over rising speeds.
+
+def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Interpolate values given at even phases of a cycle, from 0 on, at phases in cycles."""
+    grid = np.arange(values.size + 1) / values.size
+    return np.interp(phase % 1.0, grid, np.append(values, values[0]))
+
+
+@jit
+def between_phases(place, points):
+    """Return the points of a cycle on either side of a place, and the share of the second.
+
+    Args:
+        place: in points, from 0 on.
+        points: number of points in the cycle.
+
+    """
+    low = int(place) % points
+    return low, (low + 1) % points, place - int(place)
+
+
+@jit
+def between_speeds(speeds, speed):
+    """Return the rows of a table on either side of a speed, and the share of the second.
+
+    Beyond the table, that of its nearest end.
+
+    Args:
+        speeds: of the rows, m/s, rising, shape (rows,).
+        speed: m/s.
+
+    """
+    low = 0
+    while low + 2 < speeds.shape[0] and speed > speeds[low + 1]:
+        low += 1
+    high = min(low + 1, speeds.shape[0] - 1)
+    gap = speeds[high] - speeds[low]
+    return low, high, min(max((speed - speeds[low]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
+
+
 #: Bins of a stride, number of signals, and most speeds of a table; see ``body_keys``.
-BINS, SIGNALS, SPEEDS = body_keys.BINS, len(body_keys.SIGNALS), body_keys.SPEEDS
+BINS, SIGNALS, SPEEDS = body_file.BINS, len(body_file.SIGNALS), body_file.SPEEDS
 
 
 @dataclass(frozen=True)
@@ -54,17 +93,17 @@ class EfferenceCopy:
     def of(cls, table: EfferenceTable) -> 'EfferenceCopy':
         """Take a robot file's table."""
         return cls(np.array(table.speeds),
-                   np.stack([table.rows[key] for key in body_keys.SIGNALS], axis=-1))
+                   np.stack([table.rows[key] for key in body_file.SIGNALS], axis=-1))
 
     def as_table(self) -> EfferenceTable:
         """Return it as a robot file has it."""
         return EfferenceTable(tuple(self.speeds.round(4).tolist()), {
             key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
-            for k, key in enumerate(body_keys.SIGNALS)})
+            for k, key in enumerate(body_file.SIGNALS)})
 
 
 @jit
-def expect(speeds, table, phase, speed, share, out):
+def expect(speeds, table, phase, speed, fraction, out):
     """Add a share of what is expected to out, shape (SIGNALS,); see EfferenceCopy."""
     low, high, up = between_speeds(speeds, speed)
     # A bin's mean stands for its middle.
@@ -72,7 +111,7 @@ def expect(speeds, table, phase, speed, share, out):
     for k in range(SIGNALS):
         below = table[low, one, k] + on * (table[low, two, k] - table[low, one, k])
         above = table[high, one, k] + on * (table[high, two, k] - table[high, one, k])
-        out[k] += share * (below + up * (above - below))
+        out[k] += fraction * (below + up * (above - below))
 
 
 def fold(phases: np.ndarray, signals: np.ndarray) -> np.ndarray:

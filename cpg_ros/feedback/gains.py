@@ -12,13 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The list of the feedback laws, and the switches and gains of all of them."""
+"""Gains of a robot of another size than the Go2 for which the usual ones were found.
+
+Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983):
+as gravity is the same, lengths go with the length l of the legs, and times with sqrt(l/g). Forces
+are shares of the weight in all laws of a quadruped, so mass does not matter there; a biped's gains
+go with it. What a gain is a multiple of follows from its unit.
+"""
 
 from collections.abc import Sequence
+from functools import cache
+import math
 from typing import Any
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback import (
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.efference_copy import SIGNALS
+from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
+from cpg_ros.feedback.laws import (
     clearance,
     heading,
     pace,
@@ -33,7 +43,11 @@ from cpg_ros.feedback import (
     touchdown,
     virtual_stiffness,
 )
-from cpg_ros.feedback.law import Gain, Law, named_tuple
+from cpg_ros.feedback.laws.law import Gain, Law, named_tuple, StateVariable
+from cpg_ros.motion.robot import Robot
+import numpy as np
+
+# The list of the feedback laws, and the switches and gains of all of them.
 
 #: In the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [module.LAW for module in (
@@ -65,3 +79,134 @@ class Gains(_Fields):  # type: ignore[misc]
             if not gain.low <= value <= gain.high:
                 raise InputError(f"gain '{name}' is {value:g}, but must be from {gain.low:g} to "
                                  f'{gain.high:g}' + (f' {gain.unit}' if gain.unit else ''))
+
+
+# What the feedback keeps from tick to tick: the estimate, the laws' state, its output.
+
+#: State that is no single law's.
+COMMON_MEMORY = {
+    'velocity': StateVariable('of the base in its own frame [m/s]', (3,)),
+    'contact': StateVariable('whether each foot is on the ground', ('legs',), False),
+    'doubt': StateVariable('for how long the legs on the ground have disagreed with the velocity '
+                           '[s]'),
+    'displacement': StateVariable('of each foot, smoothed [m]', ('legs', 3)),
+    'stride': StateVariable("to be added to each leg's stride", ('legs',)),
+    'frequency_scale': StateVariable('factor of the stride frequency', (), 1.0),
+    'last_phase': StateVariable('of the first leg at the last tick [cycles]'),
+    'wanted_velocity': StateVariable('forward and to the left as it is approached [m/s], and in a '
+                                     'second row its rate [m/s^2]', (2, 2))}
+VARIABLES = {name: variable for part in (COMMON_MEMORY, *(law.memory for law in LAWS))
+             for name, variable in part.items()}
+#: Arrays without an axis of the runs, which pass values on within a tick.
+SCRATCH = {
+    'previous_contact': StateVariable('contact before this tick', ('legs',), False),
+    'leg_velocities': StateVariable("see estimate.update; then the planned feet's places [m]",
+                                    ('legs', 4)),
+    'scratch': StateVariable('see estimate.update', (4, 3)),
+    'expected': StateVariable('signals of the efference copy', (SIGNALS,))}
+_MemoryFields: Any = named_tuple('Memory', [*VARIABLES, *SCRATCH])
+
+
+class Memory(_MemoryFields):  # type: ignore[misc]
+    """Arrays of VARIABLES, whose first axis is that of the runs, and of SCRATCH."""
+
+    __slots__ = ()
+
+    @classmethod
+    def empty(cls, runs: int, legs: int) -> 'Memory':
+        """Return the memory of robots that have not moved yet."""
+        def array(variable: StateVariable, *first: int) -> np.ndarray:
+            shape = [legs if size == 'legs' else int(size) for size in variable.shape]
+            return np.full((*first, *shape), variable.initial)
+
+        return cls(*(array(one, runs) for one in VARIABLES.values()),
+                   *(array(one) for one in SCRATCH.values()))
+
+
+#: Of the Go2's outstretched legs, from the thigh joints to the feet, m.
+LENGTH = 0.426
+#: Powers of the legs' length, of sqrt(l/g) and of the mass that each unit is.
+POWERS = {'m': (1, 0, 0), 's': (0, 1, 0), 's^2': (0, 2, 0), 'Hz': (0, -1, 0), 'kg': (0, 0, 1),
+          'N': (1, -2, 1), 'rad': (0, 0, 0), '1': (0, 0, 0), '': (0, 0, 0)}
+#: Scaled gains have so many digits.
+DIGITS = 3
+
+
+def leg_length(geometry: Geometry) -> float:
+    """Return the mean length of the outstretched legs, m; that of a Go2 for no legs.
+
+    Unlike the height of the stand, it does not depend on how far a file bends the knees.
+    """
+    known = geometry.turns[:, 1] != 0.0
+    lengths = (np.abs(geometry.uppers) + np.abs(geometry.lowers))[known]
+    return float(lengths.mean()) if known.any() else LENGTH
+
+
+@cache
+def _powers(unit: str) -> tuple[int, ...]:
+    over, *under = unit.split('/')
+    found = np.zeros(3, dtype=int)
+    for part in over.split(' '):
+        found += POWERS[part]
+    for part in under:
+        found -= POWERS[part]
+    return tuple(found.tolist())
+
+
+def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
+    """Return how much 1 of a dimensionless gain is in its unit, as sqrt(g l) for 'm/s'.
+
+    Args:
+        unit: of the gain.
+        length: of the legs, m.
+        mass: of the robot, kg.
+
+    """
+    lengths, times, masses = _powers(unit)
+    return float(length**lengths * math.sqrt(length / GRAVITY)**times * mass**masses)
+
+
+def scaled_gains(length: float) -> Gains:
+    """Return the usual gains for legs of a length, m, held to their limits."""
+    found = {}
+    for name, gain in GAINS.items():
+        ratio = scale_of(gain.unit, length) / scale_of(gain.unit, LENGTH)
+        if ratio != 1.0:
+            scaled = float(f'{gain.default * ratio:.{DIGITS}g}')
+            found[name] = min(max(scaled, gain.low), gain.high)
+    return Gains()._replace(**found)
+
+
+def dimensionless(gains: Gains, length: float) -> dict[str, float]:
+    """Return gains by name as a robot file has them; length of the legs, m."""
+    return {name: float(f'{getattr(gains, name) / scale_of(gain.unit, length):.{DIGITS + 1}g}')
+            for name, gain in GAINS.items()}
+
+
+def robot_gains(robot: Robot) -> Gains:
+    """Return a robot's gains: the usual ones for legs of its length, and its file's own.
+
+    Raises:
+        InputError: the file names a law or a gain that does not exist, or one beyond its limits.
+
+    """
+    if robot.geometry is None:
+        return Gains()
+    length = leg_length(geometry_of(robot))
+    gains, own = scaled_gains(length), robot.feedback
+    if own is None:
+        return gains
+    for part, names, known in (('laws', own.laws, [law.name for law in LAWS]),
+                               ('gains', own.gains, list(GAINS))):
+        for name in names:
+            if name not in known:
+                raise InputError(f"robot file '{robot.name}': feedback.{part} has '{name}', which "
+                                 f'is not one of {", ".join(known)}')
+    gains = gains._replace(**own.laws, **{
+        name: value * scale_of(GAINS[name].unit, length) for name, value in own.gains.items()})
+    try:
+        gains.check()
+    except InputError as error:
+        raise InputError(f"robot file '{robot.name}', feedback.gains, for legs of {length:.3g} m: "
+                         f'{error}') from error
+    return gains

@@ -14,13 +14,73 @@
 
 """Tables of the gaits that the feedback corrects, in arrays that are filled once."""
 
+import itertools
 from typing import NamedTuple
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, SIGNALS, SPEEDS
-from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, periodic, SIGNALS, SPEEDS
+from cpg_ros.feedback.kinematics import forward, Geometry
 from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.robot import Robot
 import numpy as np
+
+# When each leg of a gait swings, and how far it has got, by the stride phase of the first leg.
+
+#: Points of a stride.
+POINTS = 512
+#: Legs of a pair swing together if they differ for less than this share of the stride.
+TOGETHER = 0.2
+
+
+class Timetable:
+    """A gait's angles and the times of its steps, over the stride.
+
+    Attributes:
+        angles: from the stand at full strides, rad, shape (POINTS, joints).
+        in_place: the same at strides of length 0.
+        swinging: whether each leg is meant to, shape (POINTS, legs).
+        progress: share of that swing, or else of its stance, that is over, shape (POINTS, legs).
+        hops: whether the left and right leg of each pair swing together.
+
+    """
+
+    def __init__(self, plan: GaitPlan, geometry: Geometry) -> None:
+        """Look at a gait: a leg swings while its foot goes forward, seen from the body."""
+        robot, theta = plan.robot, np.arange(POINTS) / POINTS
+        phases = theta[:, None] - plan.readout.start + plan.orbit.phases[robot.cells]
+        self.angles, self.in_place = (
+            plan.shift + np.stack([periodic(row, phase) for row, phase
+                                      in zip(readout.angles, phases.T, strict=True)], axis=1)
+            for readout in (plan.readout, plan.in_place))
+        feet = forward(geometry, robot.column('offset') + self.angles)
+        columns = [_swing(x) for x in feet[:, :, 0].T]
+        self.swinging = np.stack([one for one, _ in columns], axis=1)
+        self.progress = np.stack([one for _, one in columns], axis=1)
+        self.hops = _hops(robot, self.swinging)
+
+
+def _hops(robot: Robot, swinging: np.ndarray) -> bool:
+    pairs = [pair for pair in itertools.combinations(range(len(robot.legs)), 2)
+             if _paired(robot, *(list(robot.legs)[leg] for leg in pair))]
+    return bool(pairs) and all((swinging[:, one] != swinging[:, other]).mean() < TOGETHER
+                               for one, other in pairs)
+
+
+def _paired(robot: Robot, one: str, other: str) -> bool:
+    return (robot.girdles.get(one) == robot.girdles.get(other)
+            and {robot.sides.get(one), robot.sides.get(other)} == {'left', 'right'})
+
+
+def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the swing from the foot furthest back to the foot furthest ahead, if it moves."""
+    lift, land = int(x.argmin()), int(x.argmax())
+    swing = (land - lift) % x.size
+    if np.ptp(x) < 1e-9:
+        return np.zeros(x.size, dtype=bool), np.zeros(x.size)
+    since = (np.arange(x.size) - lift) % x.size
+    swinging = since < swing
+    return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))
+
 
 #: Gaits known at the same time, and most rows of a steering table.
 SLOTS, ROWS = 8, 32
@@ -66,7 +126,7 @@ class GaitTables(NamedTuple):
                    np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
                    np.ones((SLOTS, ROWS)), np.zeros(legs))
 
-    def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: GaitPlan
+    def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
         """Take in a gait.
 
@@ -80,12 +140,12 @@ class GaitTables(NamedTuple):
         self.turns[slot] = not timetable.hops
         self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
         self.expected[slot] = _filled(expected.table, SPEEDS, 'an efference copy')
-        steering = program.motion.steering
+        steering = plan.motion.steering
         self.steered[slot] = steering is not None
         if steering is not None:
             self.at[slot] = _filled(np.array(steering.speed), ROWS, 'a steering table')
             self.turn[slot] = _filled(np.array(steering.turn), ROWS, 'a steering table')
-            self.sides[:] = np.where(program.robot.left, -0.5, 0.5)
+            self.sides[:] = np.where(plan.robot.left, -0.5, 0.5)
 
 
 def _filled(rows: np.ndarray, size: int, what: str) -> np.ndarray:

@@ -24,10 +24,10 @@ from functools import cached_property
 import math
 from typing import NamedTuple
 
-from cpg_ros.errors import InputError
-from cpg_ros.integration.jit import entry, jit
-from cpg_ros.robots.body_keys import BodyGeometry
-from cpg_ros.robots.robot import Robot
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.motion.body_file import BodyGeometry
+from cpg_ros.motion.robot import Robot
 import numpy as np
 
 #: Of free fall, m/s^2.
@@ -247,7 +247,7 @@ def move_foot(leg, columns, angles, foot, way):
     angles[columns[2]] += wrapped(then[2] - now[2])
 
 
-@entry
+@jit_entry
 def _feet(rows, columns, angles, out):
     for k in range(angles.shape[0]):
         for leg in range(rows.shape[0]):

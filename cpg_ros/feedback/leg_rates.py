@@ -21,9 +21,9 @@ mounted turned about the vertical contradicts nothing but this.
 
 from collections.abc import Callable
 
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry, specialised
 from cpg_ros.feedback.estimate import SensorData, TOUCH, velocity_by_leg
 from cpg_ros.feedback.kinematics import foot_of, Geometry
-from cpg_ros.integration.jit import bound, entry, jit
 import numpy as np
 
 #: Ways of mounting the IMU, each with the measured x and y axis in the base's frame: as it should
@@ -66,12 +66,12 @@ def _add(leg, other, turning, dt, memory):
         off[k] = (ex * ex + ey * ey + ez * ez - along * along / square) / square
         least = min(least, off[k])
     memory[count] += dt
-    share = min(dt / min(MEAN, memory[count]), 1.0) / (1.0 + least / SLIPS**2)
+    fraction = min(dt / min(MEAN, memory[count]), 1.0) / (1.0 + least / SLIPS**2)
     for k in range(count):
-        memory[k] += share * (off[k] - memory[k])
+        memory[k] += fraction * (off[k] - memory[k])
 
 
-@entry
+@jit_entry
 def compare_rates(legs, sensors, dt, memory, seen, scratch):
     """Update memory with what is measured now; return an index into MOUNTED, 0 for good.
 
@@ -133,5 +133,5 @@ class RatesCheck:
         """
         arguments = self._legs, sensors, dt, self._memory, *self._scratch
         if self._kernel is None:
-            self._kernel = bound(compare_rates, *arguments)
+            self._kernel = specialised(compare_rates, *arguments)
         return MOUNTED[self._kernel(*arguments)]

@@ -17,7 +17,12 @@
 import math
 from typing import NamedTuple
 
-from cpg_ros.feedback import (
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.efference_copy import expect, SIGNALS
+from cpg_ros.feedback.estimate import update
+from cpg_ros.feedback.gait_tables import POINTS
+from cpg_ros.feedback.kinematics import foot_of, move_foot
+from cpg_ros.feedback.laws import (
     clearance,
     heading,
     pace,
@@ -32,11 +37,6 @@ from cpg_ros.feedback import (
     touchdown,
     virtual_stiffness,
 )
-from cpg_ros.feedback.efference_copy import expect, SIGNALS
-from cpg_ros.feedback.estimate import update
-from cpg_ros.feedback.kinematics import foot_of, move_foot
-from cpg_ros.feedback.timetable import POINTS
-from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.strides import approach
 import numpy as np
 
@@ -102,24 +102,24 @@ def _deviation(tables, memory, sensors, planned, run, level):
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
     """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
-    stride, (dt, share, _, _) = memory.stride[run], step
+    stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
         return
     longer = uneven = 0.0
     if gains.speed:
         memory.speed_integral[run] = speed.integrate(memory.speed_integral[run], missing, gains,
-                                                     share * dt)
-        longer = share * speed.stride_change(missing, memory.speed_integral[run], gains)
+                                                     fraction * dt)
+        longer = fraction * speed.stride_change(missing, memory.speed_integral[run], gains)
     if gains.heading:
         rate = heading.response(tables.at[slot], tables.turn[slot],
                                 memory.wanted_velocity[run, 0, 0])
-        uneven = share * heading.yaw_rate(headings[0], headings[1], gains) / rate
+        uneven = fraction * heading.yaw_rate(headings[0], headings[1], gains) / rate
     for leg in range(stride.shape[0]):
         stride[leg] = longer + uneven * tables.sides[leg]
 
 
-@entry
+@jit_entry
 def tick(legs, tables, gains, memory, sensors, planned, step, out):
     """Correct planned angles: fill out, rad, shape (runs, joints), and memory's outputs.
 
@@ -135,7 +135,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         out: filled.
 
     """
-    rows, columns, (dt, share, level, delay) = legs.rows, legs.columns, step
+    rows, columns, (dt, fraction, level, delay) = legs.rows, legs.columns, step
     quick = 1.0 - math.exp(-dt / gains.smooth)
     foot, feet = memory.scratch[0], memory.leg_velocities
     for run in range(out.shape[0]):
@@ -171,7 +171,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
             memory.commanded_turn[run], planned.turn[run], gains, dt)
         memory.sidestep_correction[run] = sidestep.correct_speed(
             memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
-            share * dt)
+            fraction * dt)
         sideways = left + memory.sidestep_correction[run]
         strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
         memory.last_phase[run] = phase
@@ -226,36 +226,36 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
                 memory.phase_correction[run] += touchdown.phase_change(
                     swings_now, progress, tables.duty[slot, leg], gains) / rows.shape[0]
             displacement = memory.displacement[run, leg]
-            displacement[0] += quick * (share * x - displacement[0])
-            displacement[1] += quick * (share * y - displacement[1])
-            displacement[2] += quick * (share * z - displacement[2])
+            displacement[0] += quick * (fraction * x - displacement[0])
+            displacement[1] += quick * (fraction * y - displacement[1])
+            displacement[2] += quick * (fraction * z - displacement[2])
             move_foot(rows[leg], columns[leg], out[run], foot, displacement)
 
         memory.clearance_share[run] = clearance.update(
-            memory.clearance_share[run], stumbling if share == 1.0 else 0.0, gains, dt)
+            memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
         scale, frequency = 1.0, max(strode / dt, 0.1)
         error = turns * pace.velocity_error(off.vx, off.vy, gains)
         if gains.pace and tables.steered[slot]:
-            scale += share * pace.frequency_change(error, memory.fatigue[run], gains)
+            scale += fraction * pace.frequency_change(error, memory.fatigue[run], gains)
         memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
         memory.kp_scale[run], memory.stiff[run] = 1.0, False
         if gains.stiffen:
             # Before the full gait is reached the body is not yet where the efference copy has it.
             memory.stiff_for[run] = stiffen.remaining(
-                memory.stiff_for[run], error if share == 1.0 else 0.0, gains, dt)
+                memory.stiff_for[run], error if fraction == 1.0 else 0.0, gains, dt)
             memory.stiff[run] = memory.stiff_for[run] > 0.0
             if gains.virtual_stiffness:
                 # Measurements of which the feedback lets go may be old.
                 spent = memory.virtual_spent[run]
                 memory.stiff[run] = virtual_stiffness.acts(
-                    spent, memory.stiff[run] and share == 1.0, delay, gains)
+                    spent, memory.stiff[run] and fraction == 1.0, delay, gains)
                 memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run],
                                                                     gains, dt)
             elif memory.stiff[run]:
                 memory.kp_scale[run] = gains.stiffen_kp
-        scale += share * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
+        scale += fraction * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
         if gains.touchdown:
-            change = share * touchdown.frequency_change(memory.phase_correction[run], frequency)
+            change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
             memory.phase_correction[run] -= change * strode
             scale += change
         memory.frequency_scale[run] = max(scale, SLOWEST)

@@ -12,26 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a network to moving joints: plan, readout, switching and steering.
+"""From a network to moving joints: the robot and its file, plan, readout and pattern; export.
 
-Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
+Imports ``dynamics``, ``networks`` and ``common``; knows nothing of ROS.
 """
 
-__all__ = [
-           'absorption',
-           'duty',
-           'joint_polynomial',
-           'joint_readout',
-           'network_kernels',
-           'pattern',
-           'phase_readout',
-           'plan',
-           'ramp',
-           'readout',
-           'resumption',
-           'retimed_waveform',
-           'runnable',
-           'smoothstep',
-           'strides',
-           'track',
-]
+__all__ = ['body_file', 'description', 'export', 'meshes', 'pattern', 'phase_readout', 'plan',
+           'readout', 'robot', 'robot_file', 'strides']

@@ -23,16 +23,322 @@ move whenever a joint would exceed the speed that the gaits themselves reach, an
 from collections import deque
 from collections.abc import Callable
 import math
+from typing import TypeVar
 
-from cpg_ros.motion.absorption import Absorption
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.motion.phase_readout import GaitCells, observe_phases, PhaseMap
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.ramp import Ramp
-from cpg_ros.motion.readout import confine
-from cpg_ros.motion.resumption import Resumption
-from cpg_ros.motion.smoothstep import smoothstep
-from cpg_ros.motion.strides import Drive, scale
-from cpg_ros.motion.track import Track
+from cpg_ros.motion.readout import confine, DrivenJoints, observe, read_retimed, Retiming, Waveform
+from cpg_ros.motion.strides import approach, lengthen, scale, StrideCommand
+from cpg_ros.networks.registry import find_network
 import numpy as np
+
+# One network running one gait, and the watchdog that compares it with the gait's orbit.
+
+#: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
+#: of the clock by this share of a cycle, for longer than this many strides.
+FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
+#: Strides the network gets to find its new gait by itself after a transition of 0 s.
+SETTLING = 40.0
+#: At rest: no state changes by more than this share of a cell's range in a stride.
+AT_REST = 0.05
+#: Such a transition starts with at least this share of the new gait in the state.
+KICK = 0.05
+
+
+class GaitRunner:
+    """A network running one program.
+
+    Attributes:
+        motion: the three that follow, and one of its own, in one array, shape (4, joints).
+        angle: of each joint from the stand, rad.
+        d_angle_d_phase: its derivative by phase, rad per cycle.
+        reach: its derivative by the stride of the joint's leg, rad; only with a drive.
+        legs: phase of each leg, cycles.
+
+    """
+
+    def __init__(self, plan: GaitPlan, transition: float,
+                 drive: StrideCommand | None = None) -> None:
+        """Run a program, its strides as long as a drive has them, if there is one."""
+        self.transition = transition
+        self.progress = 0.0
+        self.drive = drive
+        self._leg = plan.robot.leg_of_joint
+        self.motion = np.zeros((4, self._leg.size))
+        self.angle, self.d_angle_d_phase, self.reach, self._lift = self.motion
+        self.legs = np.zeros(len(plan.robot.legs))
+        self.stepper = plan.seed.copy()
+        self._clocks = plan.readout.clocks(0.0)
+        self.settling = self._calm = self._still = 0.0
+        self.follow(plan)
+
+    def follow(self, plan: GaitPlan) -> None:
+        """Read joints and judge health by this program from now on."""
+        self.plan = plan
+        self._least = AT_REST * float(plan.orbit.levels[0, 0, 1])
+        self._astray = 0.0
+        self._look(0.0)
+        self.phase = float(self.legs[0])
+
+    def _look(self, strides: float) -> float:
+        plan, now = self.plan, self.stepper.now
+        angle, d_angle_d_phase = self.angle, self.d_angle_d_phase
+        clocks = self._clocks
+        distance = plan.readout.look(now, strides, clocks, angle, d_angle_d_phase, self.legs)
+        if self.drive is not None:
+            plan.in_place.look(now, 0.0, clocks, self.reach, self._lift, self.legs)
+            lengthen(self.drive.stride, self._leg, plan.shift, self.motion)
+        else:
+            angle += plan.shift
+        return distance
+
+    def advance(self, strides: float) -> bool:
+        """Advance by some strides; tell whether the network is still on its orbit."""
+        self.stepper.advance(strides * self.plan.orbit.period)
+        distance = self._look(strides)
+        expected = self.phase + strides
+        if not math.isfinite(distance):
+            self.phase = expected % 1.0
+            return False
+        error = (self.legs[0] - expected + 0.5) % 1.0 - 0.5
+        # The clock follows the network's own phase within two strides.
+        self.phase = (expected + min(1.0, 0.5 * strides) * error) % 1.0
+        if self.settling > 0.0:
+            # A stride on the orbit is the end of it; for an instant a small state may look so.
+            self._calm = self._calm + strides if distance < FAR / 3 else 0.0
+            self.settling = 0.0 if self._calm > 1.0 else self.settling - strides
+            # Come to rest, where the network has a stable equilibrium beside the gait?
+            moving = np.abs(self.stepper.now[1]).max() * self.plan.orbit.period
+            self._still = self._still + strides if moving < self._least else 0.0
+            if self._still > 1.0:
+                self.settling, self._astray = 0.0, 2.0 * PATIENCE
+            self.phase = float(self.legs[0])
+        elif distance > FAR or abs(error) > ASTRAY:
+            self._astray += strides
+        else:
+            self._astray = 0.0
+        return self._astray <= PATIENCE
+
+    def reseed(self, phase: float | None = None) -> None:
+        """Put the network on its orbit where its first leg is at a phase, cycles.
+
+        The phase is the clock's if not given.
+        """
+        ahead = ((self.phase if phase is None else phase) - self.plan.readout.start) % 1.0
+        self.stepper = self.plan.seed.copy()
+        self.stepper.advance(ahead * self.plan.orbit.period)
+        self._clocks = self.plan.readout.clocks(ahead)
+        self._look(0.0)
+        self.phase = float(self.legs[0])
+        self.settling = self._astray = 0.0
+
+    def drift_to(self, plan: GaitPlan) -> None:
+        """Take a program's parameters and leave the change to the network's own dynamics.
+
+        A gait in whose class the state has nothing, as between any two gaits on their exact
+        orbits, gets a small start; the lock would otherwise hold the network at rest.
+        """
+        orbit = plan.orbit
+        self.stepper.set(orbit.network, plan.gain, orbit.symmetry)
+        mean, basis = plan.wave
+        at = (self.phase - plan.readout.start) % 1.0 * orbit.period
+        state, target = self.stepper.newest() - mean, orbit(np.array(at)) - mean
+        if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
+            self.stepper.superpose(lambda times: KICK * (orbit(at + times) - mean),
+                                   lambda times: KICK * orbit.derivative(at + times))
+        # On to the node where the change is, so that all of it shows at once.
+        self.stepper.advance(self.stepper.ahead)
+        self.follow(plan)
+        self.settling, self._calm, self._still = SETTLING, 0.0, 0.0
+
+
+# The smooth step by which ramps, cross-fades and approaches go.
+
+Real = TypeVar('Real', float, np.ndarray)
+
+
+def smoothstep(s: Real) -> tuple[Real, Real]:
+    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
+    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
+
+
+# Absorb jumps of a network's output: the difference decays smoothly.
+
+#: Jumps are absorbed over this time (s).
+ABSORB = 0.3
+
+
+class BumplessTransfer:
+    """What is left of a jump of joint positions and velocities."""
+
+    def __init__(self) -> None:
+        self._jump: tuple[np.ndarray, np.ndarray] | None = None
+        self._time = ABSORB
+
+    @property
+    def active(self) -> bool:
+        """Tell whether a jump is being absorbed."""
+        return self._time < ABSORB
+
+    def begin(self) -> None:
+        """Mark a jump of the output here; the next ``smooth`` measures it."""
+        self._jump, self._time = None, 0.0
+
+    def smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float,
+               before: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Add a difference that starts where the output was and decays.
+
+        Args:
+            wanted: positions, rad, (joints,).
+            rate: their velocities, rad/s.
+            dt: since the last time, s.
+            before: what was returned then.
+
+        """
+        if self._jump is None:
+            self._jump = (before[0] + dt * before[1] - wanted, before[1] - rate)
+        else:
+            self._time += dt
+        s = min(1.0, self._time / ABSORB)
+        fraction, share_rate = smoothstep(s)
+        gap, gap_rate = self._jump
+        wanted = wanted + (1.0 - fraction) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
+        rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
+        return wanted, rate
+
+
+# The ramp of a pattern between the stand and its gait, or to the stand: a level from 0 to 1.
+
+class Ramp:
+    """A level and its rate, on the way to its target.
+
+    Attributes:
+        level: 0 at the stand, 1 in the full gait, or where the joints were found.
+        rate: its derivative, 1/s of the pattern's clock.
+
+    """
+
+    def __init__(self, level: float = 0.0) -> None:
+        """Rest at a level."""
+        self.level, self.rate = level, 0.0
+        self._parts: deque[tuple[float, float, float, float]] = deque()
+        self._past = 0.0
+
+    @property
+    def active(self) -> bool:
+        """Whether the level is on its way."""
+        return bool(self._parts)
+
+    def go(self, end: float, time: float) -> None:
+        """Plan the level's way to its end in s, from its present value and rate, no overshoot.
+
+        Cubics that end at rest, each (start, rate, end, time). One that starts towards its end
+        stays in between if it takes no longer than 3 |end - start| / |rate|.
+        """
+        level, rate = self.level, self.rate
+        self._parts.clear()
+        self._past = 0.0
+        if rate * (end - level) < 0.0:
+            # Turned round half way: brake first, within half of the room that is left.
+            turn = level + 0.5 * ((1.0 if rate > 0.0 else 0.0) - level)
+            self._parts.append((level, rate, turn, 2.0 * (turn - level) / rate))
+            level, rate = turn, 0.0
+        if rate:
+            time = min(time, 3.0 * (end - level) / rate)
+        self._parts.append((level, rate, end, time))
+
+    def advance(self, clock: float) -> None:
+        """Advance by a time in s."""
+        start, start_rate, end, time = self._parts[0]
+        self._past += clock
+        s = self._past / time if time > 0.0 else 1.0
+        if s >= 1.0:
+            self._parts.popleft()
+            self._past = 0.0
+            self.level, self.rate = end, 0.0
+            return
+        fraction, share_rate = smoothstep(s)
+        self.level = start + fraction * (end - start) + s * (1.0 - s)**2 * time * start_rate
+        self.rate = share_rate * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * start_rate
+
+
+# Resume a pattern's clock after a stall: from where it stopped, slowed at first.
+
+#: A joint whose command stood still for this time (s) has come to rest.
+HOLD = 0.1
+#: The clock is slowed in for as long as the stall was, but no longer than this (s).
+LONGEST = 0.5
+
+
+class StallRecovery:
+    """The pace of a clock: 1, and less after a stall."""
+
+    def __init__(self) -> None:
+        self._time = self._past = self._low = 0.0
+
+    @property
+    def active(self) -> bool:
+        """Whether the clock is being slowed in."""
+        return self._time > 0.0
+
+    def begin(self, stall: float) -> None:
+        """Slow the clock in after a stall in s: the longer, the more the joints have stopped."""
+        fraction = self._share(self._past / self._time) if self.active else 1.0
+        self._low = fraction * max(0.0, 1.0 - stall / HOLD)
+        self._time = min(LONGEST, stall + self._time - self._past)
+        self._past = 0.0
+
+    def _share(self, s: float) -> float:
+        return self._low + (1.0 - self._low) * smoothstep(s)[0]
+
+    def advance(self, dt: float) -> tuple[float, float]:
+        """Return how far the clock goes in dt, s, and its pace at the end of it."""
+        time, low = self._time, self._low
+        before, after = self._past / time, min(1.0, (self._past + dt) / time)
+        # The integral of the smooth step.
+        risen = after**3 * (1.0 - 0.5 * after) - before**3 * (1.0 - 0.5 * before)
+        way = time * (low * (after - before) + (1.0 - low) * risen)
+        way += max(0.0, self._past + dt - time)
+        self._past += dt
+        if after == 1.0:
+            self._time = self._past = 0.0
+        return way, self._share(after)
+
+
+# Make every kernel of the real-time path ready, compiling those not yet on disk.
+
+def precompile(name: str) -> None:
+    """Run each kernel that a network needs once, on the types the generator uses.
+
+    Args:
+        name: as find_network takes it, and errors as of that.
+
+    """
+    preset = next(iter(find_network(name).presets().values()))
+    network = preset.network
+    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
+                      symmetry=network.symmetry(preset.gait))
+    stepper.advance(2.0 * network.step)
+    some, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
+    joints, one = DrivenJoints(cells, np.zeros((1, 6)), cells), np.ones((1, 3))
+    if network.readout == 'waveform':
+        wave = Waveform(1.0, 1.0, np.zeros(8), table, table)
+        observe(stepper.now, wave, joints, some, some, some)
+        read_retimed(stepper.now, wave, joints, Retiming(np.zeros((4, 2)), np.ones((4, 4)), one),
+                     some, some)
+    else:
+        simulate(network, np.zeros(network.components), network.step, network.step)
+        known = PhaseMap(np.ones((1, 4)), np.ones((1, 4)), np.ones((1, 4, 4)),
+                         np.zeros((1, 2, 2)), some)
+        observe_phases(stepper.now, 1.0, GaitCells(cells, np.zeros(1), one, known), joints,
+                       np.zeros((10, 1)), some, some, some)
+    confine(some, some, np.zeros((3, 1)), 1.0, some, some, np.zeros(1, dtype=bool))
+    approach(some, some, 0.1, some, some)
+    lengthen(some, cells, some, np.zeros((4, 1)))
+    scale(1.0, 1.0, some, cells, some, np.zeros((4, 1)), some, some)
+
 
 #: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
 SUBSTEP = 1e-3
@@ -62,10 +368,10 @@ class Pattern:
 
     """
 
-    def __init__(self, program: GaitPlan, ramp: float = 1.0, enabled: bool = True,
-                 drive: Drive | None = None) -> None:
+    def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,
+                 drive: StrideCommand | None = None) -> None:
         """Stand, then go into the gait within ``ramp`` s if enabled; a drive steers it."""
-        robot = program.robot
+        robot = plan.robot
         self.robot, self.drive = robot, drive
         self._leg = robot.leg_of_joint
         self.faults = self.held = 0
@@ -75,7 +381,7 @@ class Pattern:
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
         self._fastest = self._limits[2]
         self._requests: deque = deque()
-        self._tracks = [Track(program, 0.0, drive)]
+        self._tracks = [GaitRunner(plan, 0.0, drive)]
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self.restart(ramp, enabled)
 
@@ -88,11 +394,11 @@ class Pattern:
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
         self._behind = np.zeros(self._offset.size, dtype=bool)
         self._corrected, self._correction = np.zeros((2, self._offset.size))
-        self._absorption, self._recovering = Absorption(), False
+        self._absorption, self._recovering = BumplessTransfer(), False
         self._slowing = self._slower = 1.0
-        self._frequency = newest.program.frequency
+        self._frequency = newest.plan.frequency
         self._last_rate: np.ndarray | None = None
-        self._resumption = Resumption()
+        self._resumption = StallRecovery()
         self._ramp = Ramp()
         self._ramp.go(float(enabled), max(ramp, SHORTEST))
         self.enabled = enabled
@@ -116,11 +422,11 @@ class Pattern:
 
     # -- requests from other threads ------------------------------------------------------
 
-    def apply(self, program: GaitPlan, transition: float) -> None:
+    def apply(self, plan: GaitPlan, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
-        prepared = Track(program, max(transition, SHORTEST), self.drive)
-        self._requests.append((program, prepared if transition > 0.0 else None))
+        prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
+        self._requests.append((plan, prepared if transition > 0.0 else None))
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
@@ -137,24 +443,24 @@ class Pattern:
             raise ValueError('this pattern has no drive')
         self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
 
-    def attach(self, drive: Drive) -> None:
+    def attach(self, drive: StrideCommand) -> None:
         """Use a drive from now on; one that has no target yet changes nothing."""
         self.drive = drive
         for track in self._tracks:
             track.drive = drive
 
     @property
-    def program(self) -> GaitPlan:
+    def plan(self) -> GaitPlan:
         """The newest program in force."""
-        return self._tracks[-1].program
+        return self._tracks[-1].plan
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
         """The program that fades out, the newest in force, and the share of that."""
         if len(self._tracks) == 1:
-            return self._tracks[0].program, self._tracks[0].program, 0.0
+            return self._tracks[0].plan, self._tracks[0].plan, 0.0
         older, newest = self._tracks[-2:]
-        return older.program, newest.program, smoothstep(newest.progress)[0]
+        return older.plan, newest.plan, smoothstep(newest.progress)[0]
 
     @property
     def phases(self) -> np.ndarray:
@@ -193,15 +499,15 @@ class Pattern:
         if self._requests:
             self._take_requests()
         slow = self._resumption
-        clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
-        clock, share = self.frequency_scale * clock, self.frequency_scale * share
+        clock, fraction = slow.advance(dt) if slow.active else (dt, 1.0)
+        clock, fraction = self.frequency_scale * clock, self.frequency_scale * fraction
         calm = (len(self._tracks) == 1 and not (self._ramp.active or self._lead.active)
                 and not self._absorption.active)
         if not (calm and self._cruise(clock)):
             parts = max(1, math.ceil(clock / self.substep - 1e-9))
             for _ in range(parts):
                 self._step(clock / parts)
-        wanted, rate = self._wanted, self._rate if share == 1.0 else share * self._rate
+        wanted, rate = self._wanted, self._rate if fraction == 1.0 else fraction * self._rate
         if self.correct is not None:
             wanted = self.correct(wanted)
             now, before = self._correction, self._corrected
@@ -251,7 +557,7 @@ class Pattern:
         """
         self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
         track, drive = self._tracks[0], self.drive
-        frequency = track.program.frequency
+        frequency = track.plan.frequency
         if drive is not None:
             drive.advance(dt)
             frequency *= drive.pace
@@ -268,10 +574,10 @@ class Pattern:
             return True
         np.multiply(track.angle, self._ramp.level, out=self._wanted)
         self._wanted += self._offset
-        np.multiply(track.rise, self._ramp.level * frequency, out=self._rate)
+        np.multiply(track.d_angle_d_phase, self._ramp.level * frequency, out=self._rate)
         return True
 
-    def _recover(self, track: Track) -> None:
+    def _recover(self, track: GaitRunner) -> None:
         self.faults += 1
         self._recovering = True
         track.reseed()
@@ -283,14 +589,14 @@ class Pattern:
         self._slowing = self._slower
         tracks = self._tracks
         first = tracks[0]
-        frequency, moving = first.program.frequency, len(tracks) > 1
+        frequency, moving = first.plan.frequency, len(tracks) > 1
         fades = []
         if moving:
             for track in tracks[1:]:
                 track.progress = min(1.0, track.progress + clock / track.transition)
-                share, share_rate = smoothstep(track.progress)
-                fades.append((share, share_rate / track.transition))
-                frequency += share * (track.program.frequency - frequency)
+                fraction, share_rate = smoothstep(track.progress)
+                fades.append((fraction, share_rate / track.transition))
+                frequency += fraction * (track.plan.frequency - frequency)
         if self.drive is not None:
             self.drive.advance(dt)
             frequency *= self.drive.pace
@@ -301,10 +607,10 @@ class Pattern:
                 self._recover(track)
 
         wanted, rate = first.angle, self._rate_of(first, frequency)
-        for track, (share, share_rate) in zip(tracks[1:], fades, strict=True):
-            rate = (rate + share * (self._rate_of(track, frequency) - rate)
+        for track, (fraction, share_rate) in zip(tracks[1:], fades, strict=True):
+            rate = (rate + fraction * (self._rate_of(track, frequency) - rate)
                     + share_rate * (track.angle - wanted))
-            wanted = wanted + share * (track.angle - wanted)
+            wanted = wanted + fraction * (track.angle - wanted)
         while len(tracks) > 1 and tracks[1].progress >= 1.0:
             del tracks[0]
 
@@ -323,8 +629,8 @@ class Pattern:
             wanted, rate = wanted + self._lead.level * found, rate + self._lead.rate * found
         if moving:
             # The pattern slows where it would outrun the gaits at the next substep.
-            bound = SHORT_OF * np.minimum(np.max([t.program.speed + SHIFTING * (
-                np.abs(t.program.shift) + np.abs(found)) for t in tracks], axis=0), self._fastest)
+            bound = SHORT_OF * np.minimum(np.max([t.plan.speed + SHIFTING * (
+                np.abs(t.plan.shift) + np.abs(found)) for t in tracks], axis=0), self._fastest)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             self._last_rate = rate
             self._slower = 1.0 / max(1.0, float(np.max(np.abs(ahead) / np.maximum(bound, 1e-9))))
@@ -341,8 +647,8 @@ class Pattern:
             self._wanted += self._offset
             self._rate[:] = rate
 
-    def _rate_of(self, track: Track, frequency: float) -> np.ndarray:
-        rate = track.rise * frequency
+    def _rate_of(self, track: GaitRunner, frequency: float) -> np.ndarray:
+        rate = track.d_angle_d_phase * frequency
         if self.drive is not None:
             rate += self.drive.rate[self._leg] * track.reach
         return rate

@@ -33,12 +33,18 @@ from functools import lru_cache
 import math
 from typing import Any, NamedTuple
 
-from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.integration.jit import bound, entry
-from cpg_ros.motion import joint_polynomial
-from cpg_ros.motion.duty import retimed_phase
-from cpg_ros.motion.joint_polynomial import DrivenJoints, over_cycle, TURN
-from cpg_ros.motion.readout import NoPhase
+from cpg_ros.dynamics.integration.compilation import jit_entry, specialised
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.motion import readout
+from cpg_ros.motion.readout import (
+    DrivenJoints,
+    NoPhase,
+    over_cycle,
+    retimed_phase,
+    stance,
+    TURN,
+    WaveReadout,
+)
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -93,8 +99,8 @@ class GaitCells(NamedTuple):
     known: PhaseMap
 
 
-@entry
-def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
+@jit_entry
+def observe_phases(now, strides, gait, joints, clocks, angle, d_angle_d_phase, legs):
     """Advance the cells' clocks and read joints and legs off them.
 
     Args:
@@ -107,7 +113,7 @@ def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
             stride) is above 1 now and at the next look, amplitude, its rate (per stride)
             now and at the next look; and x, y and their derivatives by the strides.
         angle: filled with the joints' deviation from their offset, rad.
-        rise: filled with its derivative by the strides, rad per stride.
+        d_angle_d_phase: filled with its derivative by the strides, rad per stride.
         legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
 
     Returns:
@@ -119,7 +125,7 @@ def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
     cells, weights, leg_cells = joints
     distance, sum_ = 0.0, 0.0
     pull = PULL / (1.0 + 2.0 * PULL * strides)
-    share = strides / (SMOOTHING + strides)
+    fraction = strides / (SMOOTHING + strides)
     for cell in range(waves.shape[0]):
         wave = waves[cell]
         if strides > 0.0:
@@ -156,8 +162,8 @@ def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
             across = ((circle[1] * c1 - circle[0] * s1) * x
                       + (circle[3] * c1 - circle[2] * s1) * y)
             across = min(max(pull * across / TURN, -MOST), MOST)
-            clocks[2, cell] += share * (across - clocks[2, cell])
-            clocks[5, cell] += share * (pull * along - clocks[5, cell])
+            clocks[2, cell] += fraction * (across - clocks[2, cell])
+            clocks[5, cell] += fraction * (pull * along - clocks[5, cell])
         steep = 1.0
         if maps[cell, 0] != 1.0:
             phase, steep, _ = retimed_phase(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
@@ -188,8 +194,8 @@ def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
     for joint in range(cells.shape[0]):
         cell = cells[joint]
         x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
-        angle[joint] = joint_polynomial.value(weights[joint], x, y)
-        rise[joint] = joint_polynomial.rate(weights[joint], x, y, dx, dy)
+        angle[joint] = readout.value(weights[joint], x, y)
+        d_angle_d_phase[joint] = readout.rate(weights[joint], x, y, dx, dy)
     for leg in range(leg_cells.shape[0]):
         phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
         phase -= math.floor(phase)
@@ -299,14 +305,14 @@ class PhaseReadout:
         return clocks
 
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
-             rise: np.ndarray, legs: np.ndarray) -> float:
+             d_angle_d_phase: np.ndarray, legs: np.ndarray) -> float:
         """Advance clocks by some strides to a state and read joints and legs.
 
         See observe_phases; arrays are C-contiguous and of float64.
         """
-        arguments = now, strides, self.gait, self.joints, clocks, angle, rise, legs
+        arguments = now, strides, self.gait, self.joints, clocks, angle, d_angle_d_phase, legs
         if self._observe is None:
-            self._observe = bound(observe_phases, *arguments)
+            self._observe = specialised(observe_phases, *arguments)
         return self._observe(*arguments)
 
 
@@ -318,3 +324,48 @@ def _crest(terms: np.ndarray) -> float:
         slope, bend = (float(evaluate(terms, np.array(place), order)) for order in (1, 2))
         place -= float(np.clip(slope / bend / TURN, -1 / 512, 1 / 512)) if bend else 0.0
     return place % 1.0
+
+
+# The readout of a network's joints: of the waveform or of the phase, as the network states.
+
+#: Phases at which troughs are looked for, cycles.
+GRID = np.arange(1024) / 1024
+
+
+def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,
+                  harmonics: int, maps: np.ndarray | None = None) -> WaveReadout | PhaseReadout:
+    """Return what reads joints and legs off the states of a gait.
+
+    Args:
+        orbit: the gait.
+        cells: the cell behind each joint, from 0, shape (joints,).
+        weights: in rad, shape (joints, 6).
+        leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
+        harmonics: of a waveform that joints follow by its phase.
+        maps: what the duty factor makes of the phase of each joint's cell, shape (joints, 3).
+
+    Raises:
+        NoPhase: the phase does not follow from a waveform.
+
+    """
+    if orbit.network.readout == 'waveform':
+        return WaveReadout(orbit, cells, weights, leg_cells, maps)
+    return PhaseReadout(orbit, cells, weights, leg_cells, harmonics, maps)
+
+
+def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Return when each leg begins to stand by itself, and for which share of the stride.
+
+    A leg stands while the signal of its cell falls. Phases are those of the cell, cycles; two
+    arrays of shape (legs,).
+    """
+    begin, fraction = np.empty((2, len(leg_cells)))
+    for leg, cell in enumerate(leg_cells):
+        if orbit.network.readout == 'waveform':
+            begin[leg], fraction[leg] = 0.0, stance(orbit.waveform(GRID), 0.0)
+            continue
+        known, wave = phase_map(orbit, harmonics), orbit.waves[cell]
+        begin[leg] = known.crests[wave]
+        fraction[leg] = stance(evaluate(known.terms[wave], GRID), float(begin[leg]))
+    return begin, fraction

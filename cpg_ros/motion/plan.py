@@ -18,21 +18,63 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
+from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
-from cpg_ros.dynamics.orbit import Orbit, solve_preset
+from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
-from cpg_ros.errors import CpgError, InputError
-from cpg_ros.integration.stepper import Stepper
-from cpg_ros.motion.duty import Duty
-from cpg_ros.motion.joint_readout import joint_readout, standing
-from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.motion.readout import extremes, WaveReadout
-from cpg_ros.motion.runnable import obstacle
+from cpg_ros.motion.body_file import GAIT_SPEEDS
+from cpg_ros.motion.phase_readout import joint_readout, PhaseReadout, standing
+from cpg_ros.motion.readout import Duty, extremes, NoPhase, WaveReadout
+from cpg_ros.motion.robot import Joint, Motion, Robot, SteeringTable
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.robots.biped_keys import SPEEDS
-from cpg_ros.robots.robot import Joint, Motion, Robot, SteeringTable
-from cpg_ros.short_repr import ShortRepr
 import numpy as np
+
+# Whether the generator can run a gait at all, whatever the robot.
+
+#: A period needs this many steps for the integrator to stay on the orbit.
+STEPS_A_PERIOD = 40
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """Why the generator cannot run a gait.
+
+    Attributes:
+        message: of a gait that is named, such as 'has a period of ...'.
+        aside: the same of one that has been named, in fewer words, such as 'its period of ...'.
+
+    """
+
+    message: str
+    aside: str
+
+
+def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None:
+    """Find why the generator cannot run a gait: its period, its stability, or its waveform.
+
+    Args:
+        orbit: the gait's.
+        judged: its stability.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+
+    """
+    shortest = STEPS_A_PERIOD * orbit.network.step
+    if orbit.period < shortest:
+        period = f'period of {orbit.period:.3g} model time units'
+        return Obstacle(f'has a {period}, too short for steps of {orbit.network.step}: at least '
+                        f'{shortest:g} is needed', f'its {period} is below {shortest:g}')
+    if judged.flaw:
+        return Obstacle(f'exists at these parameters but does not attract: {judged.flaw}',
+                        f'it does not attract: {judged.flaw}')
+    try:
+        joint_readout(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
+    except NoPhase as error:
+        return Obstacle(f'at these parameters cannot drive joints: {error}',
+                        f'it cannot drive joints: {error}')
+    return None
+
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
@@ -122,7 +164,7 @@ class GaitPlan(ShortRepr):
     @property
     def balanced(self) -> bool:
         """Whether it is a gait of a biped whose feedback places the feet, and so steers it."""
-        return self.robot.biped is not None and self.gait in SPEEDS
+        return self.robot.biped is not None and self.gait in GAIT_SPEEDS
 
     @cached_property
     def own_speed(self) -> float:
@@ -282,9 +324,9 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         if key == 'velocity':
             cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
         raise OutOfLimits(cause, message, excess, key)
-    gain = judged.chosen if gain < 0.0 else gain
+    gain = judged.args if gain < 0.0 else gain
     return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
-                    in_place, span, speed, stands.shares)
+                    in_place, span, speed, stands.fractions)
 
 
 def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:

@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.integration.jit import entry
+from cpg_ros.dynamics.integration.compilation import jit_entry
 import numpy as np
 
 #: Targets are approached with this time constant, s.
@@ -24,7 +24,7 @@ TIME_CONSTANT = 0.2
 _NOTHING = np.zeros(0)
 
 
-@entry
+@jit_entry
 def approach(targets, trim, dt, now, rate):
     """Advance strides and pace towards their targets by dt in s.
 
@@ -48,7 +48,7 @@ def approach(targets, trim, dt, now, rate):
         rate[k] = (rate[k] - pull * dt / TIME_CONSTANT) * decay
 
 
-@entry
+@jit_entry
 def lengthen(stride, leg, shift, motion):
     """Scale the joints' motion to the strides of their legs.
 
@@ -63,15 +63,15 @@ def lengthen(stride, leg, shift, motion):
 
     """
     # angle = in_place + stride (angle - in_place), and so its derivatives.
-    angle, rise, reach, lift = motion
+    angle, d_angle_d_phase, reach, lift = motion
     for joint in range(len(leg)):
         longer = stride[leg[joint]] - 1.0
         reach[joint] = angle[joint] - reach[joint]
-        rise[joint] += longer * (rise[joint] - lift[joint])
+        d_angle_d_phase[joint] += longer * (d_angle_d_phase[joint] - lift[joint])
         angle[joint] += longer * reach[joint] + shift[joint]
 
 
-@entry
+@jit_entry
 def scale(level, frequency, change, leg, offset, motion, wanted, speed):
     """Fill in the joints' angles, rad, and velocities, rad/s, of a gait, shape (joints,).
 
@@ -86,13 +86,14 @@ def scale(level, frequency, change, leg, offset, motion, wanted, speed):
         speed: filled, rad/s.
 
     """
-    angle, rise, reach, _ = motion
+    angle, d_angle_d_phase, reach, _ = motion
     for joint in range(len(leg)):
         wanted[joint] = level * angle[joint] + offset[joint]
-        speed[joint] = level * (frequency * rise[joint] + change[leg[joint]] * reach[joint])
+        speed[joint] = level * (frequency * d_angle_d_phase[joint] + change[leg[joint]]
+                                * reach[joint])
 
 
-class Drive:
+class StrideCommand:
     """Strides of the legs and their pace, on the way to their targets.
 
     Each approaches its target as a critically damped oscillator does, so that a change of

@@ -12,12 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The networks: equations, symmetry, gaits, and which cell drives which leg.
+"""Networks: their definition, equations, symmetry, presets, and the library of shipped ones.
 
-Imports ``files``; knows nothing of ROS.
+Imports ``common``; knows nothing of ROS.
 """
 
-__all__ = ['biped', 'cell', 'delayed', 'derivation', 'equations', 'field', 'generated',
-           'hk_theorem', 'leg_numbers', 'leg_pairs', 'morris_lecar', 'network', 'network_check',
-           'network_definition', 'oscillators', 'parameter_line', 'preset_files', 'quadruped',
-           'registry', 'rings', 'stated_gait', 'symmetry', 'terms']
+__all__ = ['definition', 'derivation', 'equations', 'leg_numbers', 'library', 'network',
+           'network_options', 'presets', 'registry', 'stated_gait', 'symmetry']

@@ -18,7 +18,7 @@ from collections.abc import Iterable, Sequence
 from itertools import combinations_with_replacement, product
 from typing import Any, Protocol
 
-from cpg_ros.networks.cell import Argument
+from cpg_ros.networks.definition import Argument
 import sympy
 from sympy.printing.numpy import NumPyPrinter
 

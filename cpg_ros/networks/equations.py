@@ -19,20 +19,86 @@ written once for a cell (``Network.equations``); here they are read as texts, an
 rates and their derivatives, exactly, as numpy code that is kept on disk.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 import hashlib
+import importlib.util
 from itertools import permutations
 from math import prod
+from pathlib import Path
 import re
+import sys
 from types import ModuleType
-from typing import Any
+from typing import Any, Generic
 
-from cpg_ros.networks import generated
-from cpg_ros.networks.cell import Cell, Parameters
-from cpg_ros.networks.network_definition import NetworkDefinition
-from cpg_ros.networks.terms import Term
+from cpg_ros.common.cache_folder import cache_folder, writing
+from cpg_ros.common.files import write_atomically
+from cpg_ros.networks.definition import AnyDefinition, Cell, NetworkDefinition, Parameters, Term
 import numpy as np
+
+# What is compiled and generated from a network's equations, kept on disk between processes.
+
+#: Subpackages with compiled code, and with the numbers that it takes from elsewhere.
+_COMPILED = ('networks', 'dynamics', 'motion', 'feedback')
+
+
+def folder(key: str = 'package') -> Path | None:
+    """Return where code is kept: of the package, or what follows from a network's equations.
+
+    Its name has a digest of the sources. numba's own cache watches only the file that a kernel
+    stands in, not those of the functions it calls; here any edit leads to another folder.
+
+    Args:
+        key: of the equations, see Equations.key.
+
+    Returns:
+        The folder, None if nothing can be written.
+
+    """
+    return cache_folder(f'{key}-{_sources_digest()}')
+
+
+@cache
+def _sources_digest() -> str:
+    """Return a word that changes whenever a file with compiled code does."""
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for room in _COMPILED:
+        for source in sorted((package / room).rglob('*.py')):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:14]
+
+
+def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
+    """Return a generated module, written first where it is not on disk yet.
+
+    Args:
+        key: of the equations that it follows from.
+        name: of the module.
+        write: makes the text.
+
+    """
+    known = f'cpg_ros_generated_{key}_{name}'
+    if known in sys.modules:
+        return sys.modules[known]
+    place = folder(key)
+    path = None if place is None else place / f'{name}.py'
+    if path is None or not path.exists():
+        text = write()
+        if path is not None:
+            with writing():
+                write_atomically(path, text)
+        if path is None or not path.exists():
+            module = sys.modules[known] = ModuleType(known)
+            exec(compile(text, known, 'exec'), vars(module))
+            return module
+    spec = importlib.util.spec_from_file_location(known, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # Under its name, or numba's disk cache does not find the module of what it has compiled.
+    sys.modules[known] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 class Equations:
@@ -79,11 +145,11 @@ class Equations:
 
     @cached_property
     def _first(self) -> ModuleType:
-        return generated.load(self.key, 'rates', lambda: _derivation().first(self))
+        return load(self.key, 'rates', lambda: _derivation().first(self))
 
     @cached_property
     def _higher(self) -> ModuleType:
-        return generated.load(self.key, 'higher', lambda: _derivation().higher(self))
+        return load(self.key, 'higher', lambda: _derivation().higher(self))
 
     def rates(self, x: Sequence[Any], p: Sequence[Any]) -> list[Any]:
         """Return the rate of each variable.
@@ -154,3 +220,114 @@ def values_of(network: NetworkDefinition) -> list[np.ndarray]:
     return [np.array([getattr(network, name) for name in equations.by_cell[row]])
             if row in equations.by_cell else np.array(getattr(network, row))
             for row in equations.rows]
+
+
+# A network's right-hand side on arrays, with exact derivatives, on all cells or a quotient.
+
+#: States now and a delay ago, shape (..., d) each; None where there is no delay.
+States = tuple[np.ndarray, np.ndarray | None]
+
+
+class Field(Generic[AnyDefinition]):
+    """``dx/dt = f(x(t), x(t - tau); p)`` of a network, or of one cell of each class.
+
+    Attributes:
+        size: cells that are left.
+        kept: components of the network that stand for all, shape (d,).
+        place: where each component of the network finds its value among these.
+
+    """
+
+    def __init__(self, network: AnyDefinition, classes: np.ndarray | None = None) -> None:
+        """Look at a network.
+
+        Args:
+            network: parameters.
+            classes: number of each cell's class, from 0, shape (cells,); each cell is its own
+                by default.
+
+        """
+        cells, variables = network.cells, network.variables
+        classes = np.arange(cells) if classes is None else classes
+        first = np.unique(classes, return_index=True)[1]
+        blocks = np.arange(variables)[:, None]
+        self.network, self.size = network, first.size
+        self.kept = (first + blocks * cells).ravel()
+        self.place = (classes + blocks * self.size).ravel()
+        self._equations = equations_of(type(network))
+        own = np.arange(cells)
+        #: For each argument, where the kept cells find it.
+        self._heard = [self.place[one.variable * cells + np.asarray(
+            own if one.source is None else one.source)[first]]
+            for one in self._equations.arguments]
+        self._p = [value[first] if value.ndim else value for value in values_of(network)]
+        columns = list(network.parameters())
+        #: For each row of parameters, the columns of the kept cells.
+        by_cell = self._equations.by_cell
+        self._columns = [np.array([columns.index(name) for name in by_cell[row]])[first]
+                         if row in by_cell else columns.index(row)
+                         for row in self._equations.rows]
+
+    def _arguments(self, now: np.ndarray, past: np.ndarray | None) -> list[np.ndarray]:
+        return [(past if one.delayed and past is not None else now)[..., heard]
+                for one, heard in zip(self._equations.arguments, self._heard, strict=True)]
+
+    def _filled(self, rates: list, shape: tuple[int, ...]) -> np.ndarray:
+        out = np.empty(shape)
+        for v, rate in enumerate(rates):
+            out[..., v * self.size:(v + 1) * self.size] = rate
+        return out
+
+    def rates(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Right-hand side at states, shape (..., d).
+
+        Args:
+            now: states, shape (..., d).
+            past: the states a delay ago; those of now by default, as at rest.
+
+        """
+        return self._filled(self._equations.rates(self._arguments(now, past), self._p), now.shape)
+
+    def linearised(self, now: np.ndarray, past: np.ndarray | None = None
+                   ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rates, shape (..., d), and Jacobians by now and by past, shape (..., d, d).
+
+        Without a delay the last one is empty: its last two axes have the length 0.
+        """
+        rates, slopes = self._equations.slopes(self._arguments(now, past), self._p)
+        delays = any(one.delayed for one in self._equations.arguments)
+        d = now.shape[-1]
+        by_now = np.zeros((*now.shape, d))
+        by_past = np.zeros((*now.shape, d) if delays else (*now.shape[:-1], 0, 0))
+        i = np.arange(self.size)
+        for (v, k), slope in slopes.items():
+            into = by_past if self._equations.arguments[k].delayed else by_now
+            into[..., i + v * self.size, self._heard[k]] += slope
+        return self._filled(rates, now.shape), by_now, by_past
+
+    def multilinear(self, at: States, *sets: States) -> np.ndarray:
+        """Return the second or third derivative of the rates, B(a, b) or C(a, b, c), (..., d).
+
+        Args:
+            at: the states.
+            sets: two or three disturbances of them, which may be complex.
+
+        """
+        find = self._equations.second if len(sets) == 2 else self._equations.third
+        out = np.zeros(sets[0][0].shape, dtype=complex)
+        for v, rate in multilinear(find(self._arguments(*at), self._p),
+                                   [self._arguments(*one) for one in sets]).items():
+            out[..., v * self.size:(v + 1) * self.size] = rate
+        return out
+
+    def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Return the rates' derivative by the network's parameters, shape (..., d, parameters).
+
+        What the delay does is not in it: that depends on the slope of the past.
+        """
+        out = np.zeros((*now.shape, len(self.network.parameters())))
+        i = np.arange(self.size)
+        found = self._equations.by_parameter(self._arguments(now, past), self._p)
+        for (v, r), slope in found.items():
+            out[..., i + v * self.size, self._columns[r]] += slope
+        return out

@@ -29,8 +29,8 @@ from functools import cache
 import re
 from typing import Any
 
-from cpg_ros.errors import InputError
-from cpg_ros.networks.network_definition import AnyDefinition, leg_count
+from cpg_ros.common.errors import InputError
+from cpg_ros.networks.definition import AnyDefinition, leg_count
 
 BIPED = ('left', 'right')
 #: Number of legs -> the shipped robot that a network of so many legs starts with.
@@ -127,13 +127,13 @@ def for_legs(legs: int) -> Callable[[type[Any]], type[Any]]:
     return decorate
 
 
-def restored(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
+def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
              ) -> AnyDefinition:
     """Return a network from its family, number of legs and parameters: what pickle calls."""
     return with_legs(family, legs)(*values)
 
 
-def parted(name: str) -> tuple[str, int] | None:
+def split_name(name: str) -> tuple[str, int] | None:
     """Split a name such as 'delayed6' into that of the family and the number of legs."""
     found = _NUMBERED.fullmatch(name)
     return (found['family'], int(found['legs'])) if found and len(found['legs']) < 4 else None

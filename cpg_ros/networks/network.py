@@ -20,19 +20,17 @@ What it states of its parameters, cells and equations is in network_definition.
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 import dataclasses
+from dataclasses import dataclass, replace
 from functools import wraps
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
-from cpg_ros.errors import InputError
-from cpg_ros.networks import preset_files
-from cpg_ros.networks.equations import values_of
-from cpg_ros.networks.field import Field
-from cpg_ros.networks.leg_numbers import restored
-from cpg_ros.networks.network_definition import leg_count, NetworkDefinition, Range
+from cpg_ros.common.errors import InputError
+from cpg_ros.networks import presets as preset_files
+from cpg_ros.networks.definition import leg_count, NetworkDefinition
+from cpg_ros.networks.equations import Field, values_of
+from cpg_ros.networks.leg_numbers import unpickle
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-
-__all__ = ['Network', 'Preset', 'Range', 'known']
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
 Preset: TypeAlias = preset_files.Preset['Network']
@@ -60,7 +58,7 @@ class Network(NetworkDefinition):
     def __reduce__(self) -> Any:
         if self.family is None:
             return super().__reduce__()
-        return restored, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
+        return unpickle, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
 
     def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Right-hand side at states now and a delay ago, by default the same; shaped like x."""
@@ -211,3 +209,67 @@ def known(gait: str, gaits: tuple[str, ...]) -> str:
     if gait not in gaits:
         raise InputError(f"gait '{gait}' is not one of {', '.join(gaits)}")
     return gait
+
+
+# A line in a network's parameter space: parameters that move together, each with a sign.
+
+
+
+@dataclass(frozen=True)
+class ParameterLine:
+    """Parameters that are set to plus or minus one value; written ``alpha=-beta``.
+
+    Attributes:
+        names: of the parameters.
+        signs: 1.0 or -1.0 for each; the first is 1.
+
+    """
+
+    names: tuple[str, ...]
+    signs: tuple[float, ...]
+
+    @classmethod
+    def parse(cls, text: str, network: type[Network]) -> 'ParameterLine':
+        """Read ``tau``, ``alpha=beta``, ``alpha=-beta`` or a group of the network, ``w_a``.
+
+        Raises:
+            InputError: a name that is not a parameter of the network, or given twice.
+
+        """
+        names: list[str] = []
+        signs: list[float] = []
+        for part in text.split('='):
+            name = part.strip().removeprefix('-')
+            members = network.members(name)
+            for member in members:
+                if member in names:
+                    raise InputError(f"'{text}' names {member} twice")
+            sign = -1.0 if part.strip().startswith('-') else 1.0
+            if not names and sign < 0.0:
+                raise InputError(f"'{text}' must not begin with a minus")
+            names.extend(members)
+            signs.extend([sign] * len(members))
+        return cls(tuple(names), tuple(signs))
+
+    @classmethod
+    def of(cls, line: 'ParameterLine | str', network: type[Network]) -> 'ParameterLine':
+        """Return the line itself, or the one that a text such as ``tau`` names; see parse."""
+        return cls.parse(line, network) if isinstance(line, str) else line
+
+    def __str__(self) -> str:
+        return '='.join(('' if sign > 0.0 else '-') + name
+                        for name, sign in zip(self.names, self.signs, strict=True))
+
+    def value(self, network: Network) -> float:
+        """Where a network is on the line: the value of its first parameter."""
+        return network.as_dict()[self.names[0]]
+
+    def direction(self, network: Network) -> np.ndarray:
+        """Return the parameters' derivative by the value on the line, (parameters,)."""
+        signs = dict(zip(self.names, self.signs, strict=True))
+        return np.array([signs.get(name, 0.0) for name in network.parameters()])
+
+    def at(self, network: AnyNetwork, value: float) -> AnyNetwork:
+        """Return the network with the parameters set."""
+        return replace(network, **{  # type: ignore[type-var]
+            name: sign * value for name, sign in zip(self.names, self.signs, strict=True)})

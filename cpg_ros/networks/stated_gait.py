@@ -21,7 +21,7 @@ its offsets are the gait. They make the named gait whose leg phases are nearest.
 from collections.abc import Mapping
 from functools import lru_cache
 
-from cpg_ros.errors import InputError
+from cpg_ros.common.errors import InputError
 from cpg_ros.networks.network import Network
 import numpy as np
 

@@ -12,15 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Physics: a robot's body in MuJoCo, tuned gaits, pictures of it and of its footfalls.
+"""Simulated robots in MuJoCo, tuning of gaits and gains, and set-up of one's own robot.
 
-Imports ``feedback``, ``motion``, ``robots`` and what is below; knows nothing of ROS.
+Imports ``analysis``, ``feedback`` and the rooms below them; knows nothing of ROS.
 """
 
-__all__ = ['batch', 'biped_description', 'biped_run', 'biped_tuning', 'bodies', 'body', 'camera',
-           'closed_loop', 'efference_measurement', 'feedback_benefit', 'feedback_tuning',
-           'foot_path', 'footfall_diagram', 'gait_design', 'inertia', 'inertial_unit',
-           'labelled_walks', 'leg_geometry', 'mesh_hull', 'mjcf_description', 'model_indices',
-           'nearest_design', 'pattern_batch', 'proprioception', 'robot_model', 'run_metrics',
-           'run_recorder', 'scenario', 'servo_gains', 'soft_start', 'sprawled_leg',
-           'steering_table', 'terrain', 'tuned_gait', 'tuning', 'urdf_model', 'walk_bag']
+__all__ = ['biped_run', 'bodies', 'body', 'closed_loop', 'recorder', 'robot_model', 'robot_setup',
+           'run_metrics', 'scenario', 'sensors', 'soft_start', 'terrain', 'tuning', 'urdf_model']

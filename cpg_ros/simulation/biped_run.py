@@ -17,16 +17,16 @@
 from dataclasses import dataclass, field
 import math
 
+from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.pattern import GaitRunner
 from cpg_ros.motion.readout import confine
-from cpg_ros.motion.track import Track
-from cpg_ros.robots.robot import Robot
-from cpg_ros.short_repr import ShortRepr
+from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.proprioception import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.scenario import PUSH, SensorNoise
+from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 import numpy as np
 
@@ -139,7 +139,7 @@ class BipedRun:
         path, poses, work, moved, began = [], [], 0.0, np.zeros(2), math.inf
         count = flown = 0
         wishes, forces = sorted(commands), sorted(pushes)
-        changes = [(when, Track(gait_plan(self.robot, gait), 0.0))
+        changes = [(when, GaitRunner(gait_plan(self.robot, gait), 0.0))
                    for when, gait in sorted(gaits, key=lambda change: change[0])]
         was = feedback.memory.swinging.copy()
         for k in range(round(duration / dt)):

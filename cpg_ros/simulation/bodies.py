@@ -17,14 +17,19 @@
 Physics is MuJoCo's own ``rollout``, native threads.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 import copy
 import os
 from typing import Any
 
-from cpg_ros.simulation.body import add_payload, Body
-from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.feedback.efference_copy import periodic
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.simulation.body import add_payload, Anatomy, Body
 from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.run_metrics import judge, RunMetrics
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import lay, set_friction, Terrain
 import numpy as np
@@ -33,7 +38,7 @@ import numpy as np
 SLOW = 1e-3
 
 
-class Bodies:
+class BatchPhysics:
     """Any number of bodies, all of which begin in the stand.
 
     Attributes:
@@ -131,3 +136,87 @@ class Bodies:
                 lay(model, scenario.terrain)
             self._models[key] = model
         return self._models[key]
+
+
+# Many runs at once, open loop: what a program publishes, and bodies that follow it on all cores.
+
+#: Runs whose states are kept at the same time.
+TOGETHER = 12
+
+
+def targets(plan: GaitPlan, duration: float, timestep: float,
+            strides: Sequence[float] = (), pace: float = 1.0, ramp: float = 1.0) -> np.ndarray:
+    """Work out the angles that a generator publishes from the stand on.
+
+    The ramp is the generator's own; after it the orbit is what it is, and is looked up.
+
+    Args:
+        plan: the gait.
+        duration: s.
+        timestep: of the generator, s.
+        strides: factor of each leg's stride; none for the gait as it is.
+        pace: factor of the frequency.
+        ramp: from the stand into the gait, s.
+
+    Returns:
+        Angles in rad in the order of the robot's controllers, shape (steps, joints).
+
+    """
+    robot = plan.robot
+    drive, stride = None, np.ones(len(robot.legs))
+    if len(strides) or pace != 1.0:
+        drive, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
+        drive.set_target(stride, pace, at_once=True)
+    pattern = Pattern(plan, ramp, drive=drive)
+    steps = round(duration / timestep)
+    found = np.empty((steps, len(robot.order)))
+    done = 0
+    while done < steps and pattern.level < 1.0:
+        pattern.advance(timestep)
+        found[done] = pattern.position
+        done += 1
+    if done < steps:
+        ahead = (pattern.phases[0] - plan.readout.start
+                 + plan.frequency * pace * timestep * np.arange(1, steps - done + 1))
+        still, stride = plan.in_place.angles, stride[robot.leg_of_joint, None]
+        angles = still + stride * (plan.readout.angles - still)
+        base = robot.column('offset') + plan.shift
+        phases = plan.orbit.phases[robot.cells]
+        found[done:] = (base[:, None] + np.array([
+            periodic(row, ahead + phase) for row, phase in zip(angles, phases, strict=True)])).T
+    return found[:, robot.places]
+
+
+class OpenLoopBatch(BatchPhysics):
+    """Bodies of one robot, of which as many run at once as there are cores."""
+
+    def __init__(self, name: str, robot: Robot, kp: float | None = None,
+                 kd: float | None = None, timestep: float = 0.002, threads: int = 0,
+                 say: Callable[[str], None] = lambda line: None) -> None:
+        """Load the model; arguments as of ``robot_model.load``; threads: 0 for all cores.
+
+        Raises:
+            SimulationError: MuJoCo is missing, or the model cannot be used.
+
+        """
+        super().__init__(Body(name, robot, kp, kd, timestep, say=say), threads)
+
+    def run(self, runs: Sequence[tuple[np.ndarray, Scenario]]) -> list[RunMetrics]:
+        """Let bodies follow targets from the stand, and judge each run.
+
+        Args:
+            runs: targets of the joints, rad, shape (steps, joints), and what is met; all as long.
+
+        """
+        found = []
+        for first in range(0, len(runs), TOGETHER):
+            part = runs[first:first + TOGETHER]
+            control, joints, force = self.controls(len(part), len(part[0][0]))
+            for k, (angles, scenario) in enumerate(part):
+                joints[k], force[k] = angles, scenario.forces(len(angles), self.timestep)
+            state, sensors = self.rollout([self.model(scenario) for _, scenario in part],
+                                          np.tile(self.start, (len(part), 1)), control)
+            found += [judge(self.body, self.parts, angles, scenario.mass, one, sensed)
+                      for (angles, scenario), one, sensed
+                      in zip(part, state, sensors, strict=True)]
+        return found

@@ -20,36 +20,165 @@ many runs takes their sensor data. A run that has ended takes no more steps.
 
 from collections.abc import Mapping, Sequence
 import math
+from typing import NamedTuple
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.efference_copy import between_phases, EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.gait_tables import POINTS, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.timetable import Timetable
-from cpg_ros.feedback.virtual_stiffness import targets
+from cpg_ros.feedback.laws.virtual_stiffness import targets
+from cpg_ros.feedback.tick import PlannedMotion
+from cpg_ros.motion.pattern import smoothstep
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.simulation.bodies import Bodies
+from cpg_ros.motion.strides import approach
+from cpg_ros.simulation.bodies import BatchPhysics
 from cpg_ros.simulation.body import Body, FALLEN
-from cpg_ros.simulation.leg_geometry import read_geometry
-from cpg_ros.simulation.pattern_batch import PatternBatch
-from cpg_ros.simulation.proprioception import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.run_metrics import BEGINNING, torques
 from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
+from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground
+from cpg_ros.simulation.tuning.foot_path import read_geometry
 import numpy as np
 
+# The patterns of many runs: orbits looked up, ramped in, steered, switched, held to limits.
 
-class ClosedLoop(Bodies):
+#: From the stand into the gait, and from one gait into another, s.
+RAMP, TRANSITION = 1.0, 1.0
+
+_smoothstep = jit(smoothstep)
+
+
+class _Gaits(NamedTuple):
+    """The gaits that all runs know, at even phases, and the joints that they move."""
+
+    angles: np.ndarray
+    in_place: np.ndarray
+    frequency: np.ndarray
+    leg: np.ndarray
+    offset: np.ndarray
+
+
+class _Drives(NamedTuple):
+    """Strides of the legs and pace, as of motion.strides.Drive, and what else changes a run."""
+
+    target: np.ndarray
+    now: np.ndarray
+    rate: np.ndarray
+    faded: np.ndarray
+
+
+class PatternBatch:
+    """As many patterns as runs, which know the same gaits.
+
+    Attributes:
+        planned: the motion before any correction; its arrays are overwritten by advance.
+        level: 0 at the stand, 1 in the full gait.
+        limits: lowest and highest angles of the joints, rad, shape (joints,) each.
+
+    """
+
+    def __init__(self, plans: Mapping[str, GaitPlan], tables: Sequence[Timetable],
+                 scenarios: Sequence[Scenario], dt: float) -> None:
+        """Stand; the first program is the one that all runs begin with."""
+        self._programs, self._names, self._dt = list(plans.values()), list(plans), dt
+        robot, runs = self._programs[0].robot, len(scenarios)
+        self._gaits = _Gaits(
+            np.stack([one.angles for one in tables]), np.stack([one.in_place for one in tables]),
+            np.array([one.frequency for one in self._programs]), robot.leg_of_joint,
+            robot.column('offset'))
+        self.limits = robot.column('lower'), robot.column('upper')
+        self._reach = robot.column('velocity') * dt
+        self._last = np.tile(self._gaits.offset, (runs, 1))
+        self.planned = PlannedMotion(
+            self._last.copy(), np.array([one.phase for one in scenarios]),
+            np.zeros((runs, 2), dtype=np.int64), np.ones(runs),
+            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs))
+        strides = np.ones((runs, len(robot.legs) + 1))
+        self._drives = _Drives(strides, strides.copy(), np.zeros_like(strides), np.ones(runs))
+        for run in range(runs):
+            self._steer(run)
+        self._drives.now[:] = strides
+        self._time = self.level = 0.0
+        self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(
+            [(wish[0], run, '', wish[1:]) for run, one in enumerate(scenarios)
+             for wish in one.commands]
+            + [(when, run, name, ()) for run, one in enumerate(scenarios)
+               for when, name in one.switches], reverse=True)
+
+    def _steer(self, run: int) -> None:
+        plan, target = self._programs[self.planned.gaits[run, 1]], self._drives.target[run]
+        target[:] = 1.0
+        if plan.motion.steering is not None:
+            target[:-1], target[-1] = plan.steer(self.planned.velocity[run, 0],
+                                                    self.planned.turn[run])
+
+    def advance(self, stride: np.ndarray, frequency_scale: np.ndarray) -> None:
+        """Advance by one time step.
+
+        Args:
+            stride: added to each leg's stride, shape (runs, legs).
+            frequency_scale: factor of each run's clock, shape (runs,).
+
+        """
+        self._time += self._dt
+        while self._events and self._events[-1][0] <= self._time:
+            _, run, name, wish = self._events.pop()
+            if name:
+                self.planned.gaits[run] = self.planned.gaits[run, 1], self._names.index(name)
+                self._drives.faded[run] = 0.0
+            else:
+                self.planned.velocity[run], self.planned.turn[run] = wish[:2], wish[2]
+            self._steer(run)
+        self.level = smoothstep(min(1.0, self._time / RAMP))[0]
+        _advance(self._gaits, self._drives, stride, frequency_scale, self.level, self._dt,
+                 self.planned)
+
+    def confine(self, angles: np.ndarray) -> np.ndarray:
+        """Hold angles to the joints' limits and speeds."""
+        near = np.clip(angles, self._last - self._reach, self._last + self._reach)
+        return np.clip(near, *self.limits, out=self._last)
+
+
+@jit_entry
+def _advance(gaits, drives, strides, frequency_scales, level, dt, planned):
+    """Advance each run by dt in s and fill what is planned; see PatternBatch.advance."""
+    angles, still, frequency = gaits.angles, gaits.in_place, gaits.frequency
+    drive, faded = drives.now, drives.faded
+    for run in range(len(faded)):
+        old, new, clock = planned.gaits[run, 0], planned.gaits[run, 1], frequency_scales[run] * dt
+        faded[run] = min(1.0, faded[run] + clock / TRANSITION)
+        mix = planned.mix[run] = _smoothstep(faded[run])[0]
+        if faded[run] == 1.0:
+            old = planned.gaits[run, 0] = new
+        approach(drives.target[run], strides[run], clock, drive[run], drives.rate[run])
+        mixed = frequency[old] + mix * (frequency[new] - frequency[old])
+        phase = planned.phase[run] = (planned.phase[run] + mixed * drive[run, -1] * clock) % 1.0
+        planned.heading[run] += planned.turn[run] * dt
+        low, high, on = between_phases(phase * POINTS, POINTS)
+        for joint in range(len(gaits.offset)):
+            stride, found = drive[run, gaits.leg[joint]], 0.0
+            for gait, fraction in ((old, 1.0 - mix), (new, mix)):
+                rest = still[gait, low, joint] + on * (still[gait, high, joint]
+                                                       - still[gait, low, joint])
+                full = angles[gait, low, joint] + on * (angles[gait, high, joint]
+                                                        - angles[gait, low, joint])
+                found += fraction * (rest + stride * (full - rest))
+            planned.angles[run, joint] = gaits.offset[joint] + level * found
+
+
+class ClosedLoopBatch(BatchPhysics):
     """Bodies of one robot with feedback from their sensors.
 
     Attributes:
-        programs: the gaits that they know, by name; runs begin with the first.
+        plans: the gaits that they know, by name; runs begin with the first.
         geometry: of the legs.
 
     """
 
-    def __init__(self, name: str, *programs: GaitPlan, timestep: float = 0.002,
+    def __init__(self, name: str, *plans: GaitPlan, timestep: float = 0.002,
                  threads: int = 1, kp: float | None = None, kd: float | None = None) -> None:
         """Load the model of the programs' robot; name, kp and kd as of ``robot_model.load``.
 
@@ -57,17 +186,17 @@ class ClosedLoop(Bodies):
             SimulationError: MuJoCo is missing, or the model cannot be used.
 
         """
-        self._robot = programs[0].robot
+        self._robot = plans[0].robot
         super().__init__(Body(name, self._robot, kp, kd, timestep, add_ground), threads)
-        self.programs = {program.name: program for program in programs}
+        self.plans = {plan.name: plan for plan in plans}
         self.geometry = geometry_of(self._robot, self._robot.geometry
                                     or read_geometry(self.body, self.parts))
-        self._tables = [Timetable(program, self.geometry) for program in programs]
+        self._tables = [Timetable(plan, self.geometry) for plan in plans]
 
     @property
-    def program(self) -> GaitPlan:
+    def plan(self) -> GaitPlan:
         """The gait that runs begin with."""
-        return next(iter(self.programs.values()))
+        return next(iter(self.plans.values()))
 
     def run(self, scenarios: Sequence[Scenario], duration: float, gains: Gains | None = None,
             expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None = None,
@@ -89,13 +218,13 @@ class ClosedLoop(Bodies):
         model, dt, parts = self.body.model, self.timestep, self.parts
         runs, steps, legs = len(scenarios), round(duration / dt), len(self._robot.legs)
         if not isinstance(expected, Mapping):
-            expected = {} if expected is None else {self.program.name: expected}
+            expected = {} if expected is None else {self.plan.name: expected}
         feedback = Feedback(self.geometry, gains, runs, len(self._robot.joints))
-        for name, program in self.programs.items():
-            feedback.learn(program, expected.get(name))
+        for name, plan in self.plans.items():
+            feedback.learn(plan, expected.get(name))
         memory, state_of = feedback.memory, BodyState(self.geometry, runs)
         estimated = memory.velocity if gains is not None else state_of.velocity
-        pattern = PatternBatch(self.programs, self._tables, scenarios, dt)
+        pattern = PatternBatch(self.plans, self._tables, scenarios, dt)
         models = [self.model(one) for one in scenarios]
         stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
             self.model(one, gains.stiffen_kp) for one in scenarios]

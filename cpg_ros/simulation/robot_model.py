@@ -18,22 +18,83 @@ A model file gives bodies, masses, collision shapes and torque limits; which joi
 in which order, the robot file says.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 import difflib
 import importlib.util
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from cpg_ros.errors import CpgError
-from cpg_ros.files import regular_file
-from cpg_ros.files.shared_resources import share
-from cpg_ros.robots.description import DescriptionError
-from cpg_ros.robots.mesh_files import merged, Mesh
-from cpg_ros.robots.robot import Robot
-from cpg_ros.simulation.servo_gains import set_gains, set_servos
+from cpg_ros.common import files
+from cpg_ros.common.errors import CpgError
+from cpg_ros.common.files import resource_folder
+from cpg_ros.motion.body_file import BipedLink
+from cpg_ros.motion.description import DescriptionError
+from cpg_ros.motion.meshes import merged, Mesh
+from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.urdf_model import part_touching, read_urdf
 import numpy as np
+
+# Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
+
+#: Gains of the Go2's joints, N m / rad and N m s / rad, and the mass on each of its legs, kg.
+KP, KD, BORNE = 60.0, 2.0, 15.206 / 4.0
+#: Inertia of a motor whose file gives none: times kp timestep^2, below which control oscillates.
+STEADY = 2.0
+
+
+def usual_gains(mass: float, legs: int) -> tuple[float, float]:
+    """Return kp in N m / rad and kd in N m s / rad for a robot, in two digits.
+
+    Args:
+        mass: of all of it, kg.
+        legs: that bear it.
+
+    """
+    larger = mass / legs / BORNE
+    return float(f'{KP * larger**(4.0 / 3.0):.2g}'), float(f'{KD * larger**1.5:.2g}')
+
+
+def set_gains(model: Any, kp: float | None, kd: float | None, legs: int) -> None:
+    """Let the actuators of a ``mujoco.MjModel`` hold angles with these gains.
+
+    Args:
+        model: its actuators are those of joints.
+        kp: N m / rad; None takes that of ``usual_gains``.
+        kd: N m s / rad; the same.
+        legs: of the robot.
+
+    """
+    usual = usual_gains(float(model.body_mass.sum()), legs)
+    stiff, damped = usual[0] if kp is None else kp, usual[1] if kd is None else kd
+    model.actuator_gainprm[:, 0] = stiff
+    model.actuator_biasprm[:, 1:3] = -stiff, -damped
+    driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
+    armature = model.dof_armature[driven]
+    model.dof_armature[driven] = np.where(
+        armature > 0.0, armature, STEADY * stiff * model.opt.timestep**2)
+
+
+def set_servos(model: Any, links: Mapping[str, BipedLink], kp: float | None,
+               kd: float | None) -> None:
+    """Give each actuator the gains and the rotor of its joint's own servo, where none are given.
+
+    Args:
+        model: a ``mujoco.MjModel`` whose actuators have the names of joints.
+        links: by the names of their joints.
+        kp: N m / rad, of all instead; None takes each link's.
+        kd: N m s / rad; the same.
+
+    """
+    for k in range(model.nu):
+        link = links[model.actuator(k).name]
+        if kp is None:
+            model.actuator_gainprm[k, 0], model.actuator_biasprm[k, 1] = link.kp, -link.kp
+        if kd is None:
+            model.actuator_biasprm[k, 2] = -link.kd
+        if link.armature:
+            model.dof_armature[model.jnt_dofadr[model.actuator_trnid[k, 0]]] = link.armature
+
 
 #: Where the package mjlab keeps the model of the Unitree G1.
 G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
@@ -80,7 +141,7 @@ def find_model(name: str) -> Path:
         if not path.is_file():
             raise SimulationError(f'model {path}: no such file')
         return path
-    own = share() / 'models' / f'{name}.xml'
+    own = resource_folder() / 'models' / f'{name}.xml'
     if own.is_file():
         return own
     # Only files of packages are used: importing them would need others that nothing else does.
@@ -148,7 +209,7 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
             spec = read_urdf(path, robot.order, visual, say)
             _free(spec, path)
         else:
-            with regular_file.opened(path, SimulationError, 'model'):
+            with files.opened(path, SimulationError, 'model'):
                 spec = mujoco.MjSpec.from_file(str(path))
         joints = {joint.name: joint for joint in spec.joints}
         base = _base(spec, path)

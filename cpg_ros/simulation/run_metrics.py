@@ -20,9 +20,8 @@ from typing import Any
 
 from cpg_ros.feedback.estimate import rpy_of
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.gaits.steady_stretch import true_runs
-from cpg_ros.simulation.body import Body, FALLEN
-from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.fitting.gaits.steady_stretch import true_runs
+from cpg_ros.simulation.body import Anatomy, Body, FALLEN
 from cpg_ros.simulation.robot_model import engine
 import numpy as np
 

@@ -16,8 +16,8 @@
 
 from dataclasses import dataclass
 
+from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 

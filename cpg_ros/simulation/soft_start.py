@@ -14,7 +14,7 @@
 
 """The way to angles that joints are not at yet, or that are in motion already."""
 
-from cpg_ros.motion.smoothstep import smoothstep
+from cpg_ros.motion.pattern import smoothstep
 import numpy as np
 
 #: Angles this close are followed at once, rad.
@@ -58,6 +58,6 @@ class Approach:
         done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
         done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
         self._there = bool((done == steps).all())
-        share, _ = smoothstep(done / steps)
+        fraction, _ = smoothstep(done / steps)
         return np.where((done == steps)[self._legs], commanded,
-                        self._start + share[self._legs] * way)
+                        self._start + fraction[self._legs] * way)

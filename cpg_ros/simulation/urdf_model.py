@@ -24,13 +24,105 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from cpg_ros.files import regular_file
-from cpg_ros.robots.mesh_files import MeshError
-from cpg_ros.robots.mesh_paths import find_mesh
-from cpg_ros.robots.urdf import mesh_folder, numbers, read_tree
-from cpg_ros.simulation.inertia import ball, LEAST, LIGHTEST, possible
-from cpg_ros.simulation.mesh_hull import hull, trouble
+from cpg_ros.common import files
+from cpg_ros.motion.description import mesh_folder, numbers, read_tree
+from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
 import numpy as np
+
+# Meshes that MuJoCo cannot read: why, and the convex hulls that take their place.
+
+#: What each dimension of a mesh must exceed to have a hull, m.
+FLAT = 1e-6
+
+
+def trouble(path: Path) -> str:
+    """Say why MuJoCo cannot read a mesh, '' if it can."""
+    if path.suffix.lower() not in ('.stl', '.obj', '.msh'):
+        return f'MuJoCo does not read {path.suffix or "files without an ending"}'
+    import mujoco
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name='mesh', file=str(path.resolve()),
+                  inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname='mesh')
+    try:
+        spec.compile()
+    except ValueError as error:
+        return str(error).splitlines()[0].removeprefix('Error: ')
+    return ''
+
+
+def hull(path: Path) -> bytes:
+    """Return the convex hull of a mesh as OBJ, m.
+
+    Raises:
+        MeshError: the file cannot be read, or its points are in a plane.
+
+    """
+    from scipy.spatial import ConvexHull, QhullError
+    points = read_mesh(path).points
+    if len(points) < 4 or np.ptp(points, axis=0).min() < FLAT:
+        raise MeshError(f'{path}: {len(points)} points that enclose no volume')
+    try:
+        found = ConvexHull(points)
+    except QhullError as error:
+        raise MeshError(f'{path}: its points enclose no volume') from error
+    corners = points[found.vertices]
+    place = {int(vertex): k + 1 for k, vertex in enumerate(found.vertices)}
+    outward = found.equations[:, :3]
+    lines = [f'v {x:.9g} {y:.9g} {z:.9g}' for x, y, z in corners]
+    for (a, b, c), normal in zip(found.simplices, outward, strict=True):
+        if np.cross(points[b] - points[a], points[c] - points[a]) @ normal < 0.0:
+            b, c = c, b
+        lines.append(f'f {place[int(a)]} {place[int(b)]} {place[int(c)]}')
+    return ('\n'.join(lines) + '\n').encode()
+
+
+# Masses and inertias of URDF files that no body has, made such as one could have.
+
+#: Least second moment in any direction, as a share of their sum.
+THINNEST = 1e-3
+#: Violations of less than this share of the sum are rounding, which passes without a word.
+ROUNDING = 1e-4
+#: A body whose radius of gyration is smaller has none, m.
+POINT = 1e-4
+#: Of a body that has a mass but no extent, and of one without mass, kg/m^3.
+DENSITY = 1000.0
+#: Mass of a link that is moved by a joint and has none: a share of the robot's, and least, kg.
+LEAST, LIGHTEST = 1e-3, 1e-2
+
+
+def moments(matrix: np.ndarray) -> np.ndarray:
+    """Return the second moments of a body with this inertia, kg m^2, shape (3, 3)."""
+    return 0.5 * np.trace(matrix) * np.eye(3) - matrix
+
+
+def possible(matrix: np.ndarray, mass: float) -> tuple[np.ndarray, str]:
+    """Return the nearest inertia that a body can have, and what was wrong with this one.
+
+    Args:
+        matrix: about the centre of mass, kg m^2, shape (3, 3), symmetric.
+        mass: kg, above 0.
+
+    Returns:
+        The inertia, and '' where nothing was wrong but rounding.
+
+    """
+    sizes, axes = np.linalg.eigh(moments(matrix))
+    if not sizes.sum() > mass * POINT**2:
+        return ball(mass) * np.eye(3), 'is that of a point'
+    held = np.maximum(sizes, THINNEST * sizes.sum())
+    if np.array_equal(held, sizes):
+        return matrix, ''
+    made = np.trace(np.diag(held)) * np.eye(3) - (axes * held) @ axes.T
+    broken = sizes[0] < -ROUNDING * sizes.sum()
+    return made, 'breaks the triangle inequality (a + b >= c)' if broken else ''
+
+
+def ball(mass: float) -> float:
+    """Return the moment of inertia of a ball of DENSITY, kg m^2."""
+    radius = (3.0 * mass / (4.0 * np.pi * DENSITY))**(1.0 / 3.0)
+    return 0.4 * mass * radius**2
+
 
 #: Where an inertia has its numbers.
 _KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
@@ -158,7 +250,7 @@ class _Meshes:
         except MeshError:
             return '', f'meshes are not found, {lost} them'
         try:
-            with regular_file.opened(path, MeshError):
+            with files.opened(path, MeshError):
                 why = trouble(path)
         except MeshError as error:
             return '', f'{error}: {lost} meshes'

@@ -20,19 +20,22 @@ The page and the code must name the same things, or the build fails.
 
 from collections.abc import Iterable, Sequence
 import importlib
+from pathlib import Path
 import re
 from typing import Any
 
 import cpg_ros
-from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import find_network, SHIPPED
-from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_node, robot_sim
-from cpg_ros.nodes.parameter_spec import Spec
-from cpg_ros.nodes.servos import bridge as servo_bridge
-from cpg_ros.nodes.servos import bus as servo_bus
-from cpg_ros.nodes.unitree import parameters as unitree_parameters
-from cpg_ros.panel import panel_node
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.ros import generator_parameters, inversion_node, robot_sim
+from cpg_ros.ros.bridges.servos import bridge as servo_bridge
+from cpg_ros.ros.bridges.servos import bus as servo_bus
+from cpg_ros.ros.bridges.unitree import bridge as unitree_parameters
+from cpg_ros.ros.cli.executables import EXECUTABLES
+from cpg_ros.ros.feedback import switch
+from cpg_ros.ros.node.parameters import Spec
+from cpg_ros.ros.panel import panel_node
 from docutils import nodes
 import graph_names
 import launch_files
@@ -90,11 +93,11 @@ def parameters(what: str) -> str:
     if what == 'panel':
         return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'feedback':
-        return table(HEAD, parameter_rows(feedback_parameters.TOPICS))
+        return table(HEAD, parameter_rows(switch.TOPICS))
     if what == 'feedback_gains':
-        return table(HEAD, parameter_rows(feedback_parameters.GAINS))
+        return table(HEAD, parameter_rows(switch.GAINS))
     if what == 'biped_gains':
-        return table(HEAD, parameter_rows(feedback_parameters.BIPED_GAINS))
+        return table(HEAD, parameter_rows(switch.BIPED_GAINS))
     if what == 'inversion':
         return table(HEAD, parameter_rows(inversion_node.SPECS))
     usual = SHIPPED['delayed' if what == 'generator' else what]
@@ -107,7 +110,7 @@ def parameters(what: str) -> str:
                            **generator_parameters.specs(usual), **frequency})
     exclusive = parameter_rows({'exclusive': generator_parameters.exclusive('none')})[0]
     exclusive[2] = '`true` with `command`, else `false`'
-    feedback = parameter_rows({feedback_parameters.ENABLED: feedback_parameters.SWITCH})
+    feedback = parameter_rows({switch.ENABLED: switch.SWITCH})
     return table(HEAD, [*rows, exclusive, *feedback])
 
 
@@ -127,7 +130,8 @@ def presets(name: str) -> str:
 
 def options(name: str) -> str:
     """Return what a tool does, its options and exit codes, from its own argument parser."""
-    module = importlib.import_module(f'cpg_ros.tools.{name}')
+    place = 'fitting.inversion.inversion' if name == 'inversion' else EXECUTABLES[name]
+    module = importlib.import_module(f'cpg_ros.{place}')
     parser = (getattr(module, '_parser', None) or module.parser)()
     rows = []
     for action in parser._actions:
@@ -222,21 +226,23 @@ def door(_: str) -> str:
                for name, kind in kinds.items())
 
 
-def subpackage(name: str) -> str:
-    """Return the modules of a subpackage."""
+def room(name: str) -> str:
+    """Return the modules of a room, those of its subpackages after its own."""
     place = importlib.import_module(f'cpg_ros.{name}')
     # What only ROS brings cannot be imported here.
     listed = [one for one in place.__all__ if one not in ('launch_arguments', 'rosbag2_library')]
+    folders = {one for one in listed if (Path(place.__path__[0]) / one).is_dir()}
     return (place.__doc__ or '') + '\n\n' + '\n\n'.join(
         f'## `{name}.{one}`\n\n' + rst([
             f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'
             f'   :exclude-members: {", ".join(reexported(name, one))}\n'])
-        for one in listed)
+        for one in listed if one not in folders) + '\n\n' + '\n\n'.join(
+        room(f'{name}.{one}') for one in listed if one in folders)
 
 
-def reexported(subpackage: str, module: str) -> list[str]:
+def reexported(room: str, module: str) -> list[str]:
     """Return what a module passes on from elsewhere, where it is described."""
-    place = importlib.import_module(f'cpg_ros.{subpackage}.{module}')
+    place = importlib.import_module(f'cpg_ros.{room}.{module}')
     return [name for name in getattr(place, '__all__', ())
             if getattr(getattr(place, name, None), '__module__', place.__name__)
             != place.__name__ and not hasattr(place, '__path__')]
@@ -274,7 +280,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Name the directives."""
     for name, directive in {'parameters': made_by(parameters), 'presets': made_by(presets),
                             'options': made_by(options), 'launch': made_by(arguments),
-                            'door': made_by(door), 'subpackage': made_by(subpackage),
+                            'door': made_by(door), 'room': made_by(room),
                             'topics': Topics, 'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
     app.connect('autodoc-process-docstring', escaped, priority=400)

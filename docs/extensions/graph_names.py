@@ -20,11 +20,11 @@ import os
 import time
 from typing import Any
 
-from cpg_ros.nodes.generator import Generator
-from cpg_ros.nodes.inversion_node import Inversion
-from cpg_ros.nodes.node_base import StartedNode
-from cpg_ros.nodes.robot_sim import RobotSim
-from cpg_ros.nodes.unitree.bridge import UnitreeBridge
+from cpg_ros.ros.bridges.unitree.bridge import UnitreeBridge
+from cpg_ros.ros.generator import Generator
+from cpg_ros.ros.inversion_node import Inversion
+from cpg_ros.ros.node.node_base import StartedNode
+from cpg_ros.ros.robot_sim import RobotSim
 import rclpy
 
 #: Node -> what makes one, and the parameters under which it has all of its topics.

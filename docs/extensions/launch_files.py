@@ -20,7 +20,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LAUNCH = ROOT / 'launch'
 #: Declares the arguments that every launch file has.
-EVERY = ROOT / 'cpg_ros' / 'nodes' / 'launch_arguments.py'
+EVERY = ROOT / 'cpg_ros' / 'ros' / 'launch_arguments.py'
 
 
 def arguments(name: str) -> dict[str, tuple[str, str]]:

@@ -14,7 +14,8 @@
 
 """Writes the playground: a page that runs all networks in the browser, without a server.
 
-Equations in JavaScript come from the text that ``cpg_ros.export`` writes as C, from the same sympy
+Equations in JavaScript come from the text that ``cpg_ros.motion.export`` writes as C, from the
+same sympy
 expressions as the compiled kernels; gaits, their starts and what joints do with them from plans.
 """
 
@@ -25,13 +26,13 @@ import re
 import shutil
 from typing import Any
 
-from cpg_ros.errors import CpgError
-from cpg_ros.export.field_source import field_source
-from cpg_ros.export.gait_data import CFormat, distinct_joints, GaitData, leg_phases
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.integration.kernel_source import field_source
+from cpg_ros.motion.export.gait_data import CFormat, distinct_joints, GaitData, leg_phases
 from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.registry import find_network, SHIPPED
-from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 from sphinx.application import Sphinx
 

@@ -18,9 +18,9 @@ import re
 from typing import Any
 from unittest.mock import patch
 
-from cpg_ros.files.yaml_reader import YamlReader
+from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import SHIPPED
-from cpg_ros.robots.robot_file import load_robot
 
 #: Keys that are names of the user's own, or of the network's.
 NAMED = {'legs': 'LEG', 'gaits': 'GAIT', 'joints': 'JOINT', 'links': 'JOINT', 'soles': 'LEG'}

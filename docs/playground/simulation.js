@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A network with its history: the classical Runge-Kutta method with a ring of nodes, cubics in
-// between, and the symmetry lock, as integration/stepper.py has them.
+// between, and the symmetry lock, as dynamics/integration/stepper.py has them.
 'use strict';
 
 class Simulation {

@@ -16,18 +16,17 @@
 
 from functools import cache
 
-from cpg_ros.dynamics.bifurcation import bifurcations
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh.adaptation import collocate
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.switching import switch_branch
-from cpg_ros.errors import InputError
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import Delayed
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import PRESETS
 import numpy as np
 import pytest

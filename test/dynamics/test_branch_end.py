@@ -14,13 +14,14 @@
 
 """Branches of periodic orbits: a law they follow, where they end, and what is refused."""
 
+from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics import arclength
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.continuation import continue_orbit
-from cpg_ros.dynamics.orbit import NoOrbit, solve_preset
-from cpg_ros.errors import InputError
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from depth import in_depth
 import numpy as np

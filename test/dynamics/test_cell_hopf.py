@@ -16,17 +16,17 @@
 
 from functools import cache
 
-from cpg_ros.dynamics import hopf_search
+from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
+from cpg_ros.dynamics import hopf
+from cpg_ros.dynamics.arclength import crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.mesh.adaptation import collocate
-from cpg_ros.dynamics.sign_changes import crossings
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
-from cpg_ros.papers.theorem_4_2 import theorem_4_2
+from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine
 from depth import in_depth, spread
 import numpy as np
 import pytest
@@ -209,7 +209,7 @@ def test_table_12(network, gait, text, distance):
               if point.gait == gait)
     assert point.value - value == pytest.approx(distance, rel=0.01)
     assert point.stable and not point.supercritical
-    verdict = theorem_4_2(point.network, gait)
+    verdict = theorem_verdict(point.network, gait)
     assert verdict.stable is (None if gait == 'trot' else True)
 
 
@@ -230,7 +230,7 @@ def test_theorem_4_2_against_the_roots(sign, alpha):
     along = ParameterLine.parse('gamma=delta', Quadruped)
     judged = 0
     for point in hopf_points(network, along, -1.3, 0.4):
-        verdict = theorem_4_2(point.network, point.gait)
+        verdict = theorem_verdict(point.network, point.gait)
         if verdict.applies and not verdict.overlooked:
             assert verdict.stable == point.stable, str(verdict)
             judged += 1
@@ -246,17 +246,17 @@ def test_theorem_4_2_fails_where_its_proof_does(alpha, gait, gamma, words):
     points = hopf_points(Quadruped(alpha, -alpha, 0.0, 0.0), along, gamma - 0.01,
                          gamma + 0.01)
     point = min(points, key=lambda point: (point.gait != gait, abs(point.value - gamma)))
-    verdict = theorem_4_2(point.network, gait)
+    verdict = theorem_verdict(point.network, gait)
     assert verdict.stable and not point.stable and words in str(verdict)
 
 
 def test_theorem_4_2_names_what_it_lacks():
-    assert str(theorem_4_2(Quadruped(0.3, 0.3, -0.32, -0.32), 'pace')).endswith(
+    assert str(theorem_verdict(Quadruped(0.3, 0.3, -0.32, -0.32), 'pace')).endswith(
         'the bifurcation to pace is stable, as alpha > 0 and gamma < 0 holds')
-    assert theorem_4_2(Quadruped(0.3, 0.2, -0.3, -0.2, 0.1), 'walk').unmet == (
+    assert theorem_verdict(Quadruped(0.3, 0.2, -0.3, -0.2, 0.1), 'walk').unmet == (
         'delta = gamma', 'xi = 0', 'beta = -alpha')
     with pytest.raises(ValueError, match="'canter' is not one of"):
-        theorem_4_2(PACE, 'canter')
+        theorem_verdict(PACE, 'canter')
 
 
 def test_crossings_come_in_pairs_between_points_of_the_grid():
@@ -274,7 +274,7 @@ def test_a_crossing_beside_a_gap_between_points_of_the_grid_is_found(zero, found
 
 
 def test_refusals(monkeypatch):
-    monkeypatch.setattr(hopf_search, 'GRID', 5)
+    monkeypatch.setattr(hopf, 'GRID', 5)
     along = ParameterLine.parse('gamma=delta', Quadruped)
     with pytest.raises(ValueError, match='low 1 must be less than high 0'):
         hopf_points(PACE, along, 1, 0)

@@ -17,12 +17,13 @@
 from dataclasses import replace
 from functools import cache
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Preset
-from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 from depth import examples, spread
 from hypothesis import given

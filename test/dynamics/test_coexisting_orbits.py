@@ -17,14 +17,14 @@
 from pathlib import Path
 import re
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import leading_within, multipliers
-from cpg_ros.dynamics.orbit import NoOrbit
-from cpg_ros.integration.simulate import simulate, Trajectory
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import Delayed
+from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
+from cpg_ros.dynamics.settling import last_cycle
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.registry import find_network, PRESETS
-from cpg_ros.search.settled_cycle import last_cycle
 from depth import in_depth
 import numpy as np
 import pytest

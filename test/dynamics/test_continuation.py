@@ -18,16 +18,17 @@ from dataclasses import replace
 from functools import cache
 import math
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.continuation import continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.fourier import curve
-from cpg_ros.dynamics.mesh.adaptation import collocate
-from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import Delayed
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.dynamics.fourier import solve
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from depth import examples
@@ -167,8 +168,8 @@ def test_a_subcritical_hopf_point_of_the_delayed_network_has_a_fold(name):
     gaps = [np.subtract(*(one.peak for one in branch.at(fold.value + mu))) for mu in ahead]
     assert abs(gaps[1] / gaps[0]) == pytest.approx(2.0, rel=1e-3)
     # Between them are two orbits; below the fold is none, and on the far side of the Hopf one.
-    for share in (0.02, 0.5):
-        low, high = branch.at(fold.value + share * (tau - fold.value))
+    for fraction in (0.02, 0.5):
+        low, high = branch.at(fold.value + fraction * (tau - fold.value))
         assert low.network == high.network and low.peak < fold.amplitude < high.peak
         assert max(gap_of_the_delay_equations(orbit) for orbit in (low, high)) < 1e-9
     assert not branch.at(fold.value - 1e-9) and len(branch.at(1.1 * tau)) == 1
@@ -248,8 +249,9 @@ def test_pace_has_a_fold_beside_its_subcritical_hopf_point():
 def test_what_is_below_and_above_the_fold_of_pace():
     fold = pace().folds[0]
     starts = []
-    for share, stays in ((0.98, False), (1.02, True)):
-        network = replace(fold.orbit.network, alpha=share * fold.value, beta=share * fold.value)
+    for fraction, stays in ((0.98, False), (1.02, True)):
+        network = replace(fold.orbit.network, alpha=fraction * fold.value,
+                          beta=fraction * fold.value)
         run = simulate(network, fold.orbit(np.array(0.0)), 1500.0, 0.02,
                        lock=(1.0, fold.orbit.symmetry), every=10)
         starts.append(np.ptp(run.x[-600:, 0]) / 2.0)
@@ -324,7 +326,7 @@ def test_a_branch_ends_where_its_period_has_grown():
 
 
 def test_a_waveform_too_steep_ends_the_branch(monkeypatch):
-    monkeypatch.setattr(curve, 'MOST_NODES', 255)
+    monkeypatch.setattr(solve, 'MOST_NODES', 255)
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL['pace'], hopf(*SUBCRITICAL['pace'])
     branch = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5, 5.0)
     assert branch.ends[1].why == 'steep' and branch.points[-1].orbit.values.size == 255

@@ -19,13 +19,13 @@ from functools import cache
 
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
-from cpg_ros.dynamics.hopf_point import first_hopf
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.isotypic import blocks
-from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
-from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import Delayed, PRESETS
+from cpg_ros.networks.library.delayed import Delayed, PRESETS
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -87,9 +87,9 @@ def leading_modes(series, count):
 
 @EVERY
 @pytest.mark.parametrize('share', [0.0, 0.3])
-def test_transverse_disturbances_grow_in_simulation_as_the_multipliers_say(name, share):
+def test_transverse_disturbances_grow_in_simulation_as_the_multipliers_say(name, fraction):
     orbit = solved(name)
-    gain = share * smallest_gain(orbit)
+    gain = fraction * smallest_gain(orbit)
     mine = multipliers(orbit, gain)
     outside = np.eye(8) - projector(orbit)
     shape = outside @ SHAPE
@@ -124,7 +124,7 @@ def test_the_smallest_gain_parts_growth_from_decay(name):
     smallest = smallest_gain(orbit)
     assert 0.0 < smallest < orbit.network.sufficient_gain(0.5)
     assert multipliers(orbit, smallest).leading_transverse == pytest.approx(1.0, abs=1e-6)
-    assert multipliers(orbit, stability(orbit).chosen).leading < 1.0
+    assert multipliers(orbit, stability(orbit).args).leading < 1.0
     outside = np.eye(8) - projector(orbit)
     shape = outside @ SHAPE
     for factor, sign in ((0.95, 1.0), (1.05, -1.0)):

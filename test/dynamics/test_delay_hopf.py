@@ -21,14 +21,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
 
+from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.equilibrium import equilibria, equilibrium
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.hopf_search import hopf_points
+from cpg_ros.dynamics.hopf import first_hopf, hopf_points
 from cpg_ros.dynamics.isotypic import blocks
-from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.errors import InputError
-from cpg_ros.networks.network import Network, Range
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.networks.definition import Range
+from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.symmetry import Group, Symmetry
 from depth import in_depth
 import numpy as np

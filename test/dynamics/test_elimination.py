@@ -15,7 +15,7 @@
 """The compiled elimination of an interval's inner values, against the library's."""
 
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.elimination import chained, transfer
+from cpg_ros.dynamics.mesh.collocation import chained, transfer
 import numpy as np
 import pytest
 

@@ -16,11 +16,11 @@
 
 from dataclasses import replace
 
+from cpg_ros.analysis.papers.buono_linear import square_root, Tables
 from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.isotypic import blocks
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.quadruped import Quadruped
-from cpg_ros.papers.buono_tables import square_root, Tables
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -84,9 +84,9 @@ def test_stands_are_all_equilibria_with_equal_cells(network):
 @given(COUPLINGS)
 def test_the_stand_is_followed_from_the_uncoupled_cells(network):
     # Small steps of fsolve on all sixteen equations.
-    state, shares = np.repeat([0.30962696, 0.52404883], 8), np.linspace(0.0, 1.0, 401)
-    for share in shares:
-        part = Quadruped(*(share * value for value in network.as_dict().values()))
+    state, fractions = np.repeat([0.30962696, 0.52404883], 8), np.linspace(0.0, 1.0, 401)
+    for fraction in fractions:
+        part = Quadruped(*(fraction * value for value in network.as_dict().values()))
         new, _, ok, _ = fsolve(part.rates, state, fprime=part.jacobian, full_output=True)
         lost = ok != 1 or np.abs(new - state).max() > 0.05 * (1.0 + np.abs(state).max())
         if lost:

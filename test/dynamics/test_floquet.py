@@ -18,15 +18,14 @@ from functools import cache
 
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
-from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
-from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh.floquet import eigenvalues
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import RATE, stability
-from cpg_ros.integration.simulate import simulate
 from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.network import Preset
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import ParameterLine, Preset
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth, spread
 import numpy as np
@@ -125,12 +124,12 @@ def test_small_disturbances_grow_by_the_multipliers(network, name):
 @EVERY
 def test_shipped_gaits_attract(network, name):
     orbit, mine, judged = solved(network, name)
-    assert judged.flaw == '' and multipliers(orbit, judged.chosen).leading < 1.0
+    assert judged.flaw == '' and multipliers(orbit, judged.args).leading < 1.0
     # The gain chosen lets what is transverse decay by RATE at least, and none is spent beyond.
-    slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - judged.chosen
-    assert slowest <= -RATE + 1e-9 and (judged.chosen == 0.0 or slowest >= -RATE - 1e-9)
+    slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - judged.args
+    assert slowest <= -RATE + 1e-9 and (judged.args == 0.0 or slowest >= -RATE - 1e-9)
     enough = smallest_gain(orbit)
-    assert judged.enough == enough <= judged.chosen
+    assert judged.enough == enough <= judged.args
     assert np.abs(mine.transverse).max(initial=0.0) <= np.exp(enough * orbit.period) + 1e-9
 
 
@@ -141,7 +140,7 @@ def test_shipped_gaits_survive_noise(network, name):
     readout = PhaseReadout(orbit, cells, np.zeros((cells.size, 6)), cells, 3)
     scratch = np.zeros((2, cells.size))
     runs = simulate(orbit.network, [orbit, orbit], 500.0, orbit.network.step, every=20,
-                    lock=(judged.chosen, orbit.symmetry), noise=0.01, seed=3)
+                    lock=(judged.args, orbit.symmetry), noise=0.01, seed=3)
     for x, slopes in zip(runs.x, runs.slopes, strict=True):
         phases, clocks = np.empty((len(x), cells.size)), readout.clocks(0.0)
         for k, now in enumerate(zip(x, slopes, slopes, strict=True)):
@@ -188,7 +187,7 @@ def test_a_gait_attracts_only_if_disturbances_outside_its_class_decay_too():
     alone = multipliers(orbit)
     assert np.abs(alone.within).max() < 1.0 < np.abs(alone.transverse).max()
     assert not alone.attracts
-    locked = multipliers(orbit, stability(orbit).chosen)
+    locked = multipliers(orbit, stability(orbit).args)
     assert np.abs(locked.transverse).max() < 1.0 and locked.attracts
 
 

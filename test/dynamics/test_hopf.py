@@ -16,15 +16,14 @@
 
 from dataclasses import replace
 
+from cpg_ros.analysis.papers.liu_zhang import published_normal_form
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.hopf_search import hopf_points
+from cpg_ros.dynamics.hopf import first_hopf, hopf_points
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.isotypic import blocks
-from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import Delayed, PRESETS
-from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.papers.published_normal_form import published_normal_form
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.networks.library.delayed import Delayed, PRESETS
+from cpg_ros.networks.network import ParameterLine
 from depth import examples
 from hypothesis import assume, given
 from hypothesis import strategies as st

@@ -16,11 +16,11 @@
 
 from dataclasses import replace
 
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import Delayed, PRESETS
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.hopf import first_hopf, hopf_points
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.networks.library.delayed import Delayed, PRESETS
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.symmetry import GAITS
 from depth import examples
 from hypothesis import assume, given

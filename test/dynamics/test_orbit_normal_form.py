@@ -16,17 +16,16 @@
 
 from dataclasses import replace
 
-from cpg_ros.dynamics.bifurcation import bifurcations
+from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh.adaptation import collocate
-from cpg_ros.dynamics.orbit import solve_from_path, solve_preset
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh.solve import collocate
 from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.orbit_normal_form import orbit_normal_form
-from cpg_ros.dynamics.switching import switch_branch
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.dynamics.solve_orbit import solve_from_path, solve_preset
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from depth import in_depth
 from late_two_rhythms import LateTwoRhythms
@@ -152,10 +151,10 @@ def test_where_a_torus_is_hard_disturbances_grow_beyond_its_size_only():
     size = np.sqrt(-growth / cubic)
     mode = disturbance(orbit, point)
     curve = cKDTree(orbit(np.linspace(0.0, orbit.period, 40000)))
-    for share in (0.75, 1.25):
-        start = orbit(np.zeros(1))[0] + 2.0 * share * size * mode(np.zeros(1))[0]
+    for fraction in (0.75, 1.25):
+        start = orbit(np.zeros(1))[0] + 2.0 * fraction * size * mode(np.zeros(1))[0]
         run = simulate(orbit.network, start, 50.0 * orbit.period, orbit.period / 1000,
                        progress=False)
         # Ten cycles at either end, in which the disturbance turns once or more.
         begin, end = (curve.query(part)[0].max() for part in (run.x[:10000], run.x[-10000:]))
-        assert (end > 1.2 * begin) if share > 1.0 else (end < 0.85 * begin)
+        assert (end > 1.2 * begin) if fraction > 1.0 else (end < 0.85 * begin)

@@ -14,16 +14,16 @@
 
 """Gaits reduced to their phase, against forced and noisy simulations and closed forms."""
 
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.phase_reduction import (
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.phase_response import (
     coupling_function,
     entrainment_range,
     locking,
     phase_diffusion,
+    phase_response,
     simulated_diffusion,
 )
-from cpg_ros.dynamics.phase_response import phase_response
-from cpg_ros.errors import InputError
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np

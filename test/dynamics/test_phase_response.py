@@ -17,11 +17,12 @@
 from dataclasses import replace
 import math
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import NoOrbit, solve_preset
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.phase_response import phase_response
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np
@@ -56,7 +57,7 @@ def shifts(orbit, pairs, times, step):
 
     With a symmetry lock with which the gait attracts, until all else has decayed.
     """
-    gain = stability(orbit).chosen
+    gain = stability(orbit).args
     leading = multipliers(orbit, gain).leading
     cycles = math.ceil(math.log(1e-8) / math.log(max(leading, 1e-4)))
     steps = math.ceil(cycles * orbit.period / step)

@@ -16,12 +16,11 @@
 
 import math
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.biped.balance import BalancedPattern
-from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.biped.feedback import BalancedPattern, BipedFeedback, gait_plan
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.biped import Biped
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.library.biped import Biped
 import numpy as np
 import pytest
 
@@ -39,9 +38,9 @@ class Walker:
     def __init__(self):
         self.run = BipedRun('humanoid', load_robot('humanoid'))
         robot, preset = self.run.robot, Biped.presets()['walk']
-        program = plan(robot, 'walk', preset, preset.network, 1.65)
-        self.pattern = BalancedPattern(program, 1.0, enabled=False)
-        self.pattern.balance = BipedFeedback(robot, program=program)
+        gait_plan = plan(robot, 'walk', preset, preset.network, 1.65)
+        self.pattern = BalancedPattern(gait_plan, 1.0, enabled=False)
+        self.pattern.balance = BipedFeedback(robot, plan=gait_plan)
         self.before = self.run.body.rates[None].copy()
         self.blind, self.tilt, self.turned = False, 0.0, 0.0
         self.lower, self.upper, self.fastest = (robot.column(name) for name in (
@@ -254,4 +253,4 @@ def test_a_robot_without_soles_has_no_balance():
     robot = load_robot('biped')
     preset = Biped.presets()['walk']
     with pytest.raises(InputError, match='no part biped'):
-        BipedFeedback(robot, program=plan(robot, 'walk', preset, preset.network, 1.0))
+        BipedFeedback(robot, plan=plan(robot, 'walk', preset, preset.network, 1.0))

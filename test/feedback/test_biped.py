@@ -18,14 +18,14 @@ import importlib.util
 import subprocess
 import sys
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.biped import clock, flight, placement, stance, swing
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.biped import stepping, support
 from cpg_ros.feedback.biped.feedback import gait_plan, KINDS
 from cpg_ros.feedback.biped.gains import BipedGains, GAINS
 from cpg_ros.feedback.biped.links import add_torques, blank_pose, kinematics, links_of, rotation
-from cpg_ros.networks.biped import Biped
-from cpg_ros.robots.biped_keys import SPEEDS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.body_file import GAIT_SPEEDS
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.library.biped import Biped
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -96,7 +96,7 @@ def test_kinematics_and_weights_are_those_of_mujoco(name):
 
 
 def test_the_laws_need_no_physics_engine():
-    code = ("import sys; import cpg_ros.feedback.biped.feedback as f; from cpg_ros.robots."
+    code = ("import sys; import cpg_ros.feedback.biped.feedback as f; from cpg_ros.motion."
             "robot_file import load_robot; f.BipedFeedback(load_robot('humanoid')); "
             "print('mujoco' in sys.modules)")
     ran = subprocess.run([sys.executable, '-P', '-c', code], text=True, capture_output=True,
@@ -116,10 +116,10 @@ def test_a_pendulum_that_steps_as_it_is_told_repeats_itself(speed, sideways):
     """An independent pendulum with the law's own steps keeps its speed, step after step."""
     gains = BipedGains()._replace(place_offset=0.0, place_x=1.0, place_y=1.0)
     height, time, wanted = 0.65, 0.5 / gains.frequency, (speed, sideways)
-    rate = placement.growth_rate(height)
+    rate = stepping.growth_rate(height)
     assert rate == pytest.approx(np.sqrt(G / height), rel=1e-12)
     side, feet = 1, np.zeros(2)  # the left foot swings first
-    forward, inward, left = placement.offsets(speed, sideways, rate, gains)
+    forward, inward, left = stepping.offsets(speed, sideways, rate, gains)
     # Of all motions on this capture point, one whose centre of mass begins near the middle.
     xi = np.array([forward, side * inward + left])
     place = np.array([-0.5 * speed * time, side * 0.4 * inward])
@@ -130,10 +130,10 @@ def test_a_pendulum_that_steps_as_it_is_told_repeats_itself(speed, sideways):
         early = np.array([pendulum(place[i], velocity[i], feet[i], height, time / 3)
                           for i in range(2)])
         xi = early[:, 0] + early[:, 1] / rate - feet
-        error = placement.capture_error(tuple(xi), side, time / 3, rate, wanted, gains)
+        error = stepping.capture_error(tuple(xi), side, time / 3, rate, wanted, gains)
         # Rounding grows as exp(w t) as well, which the steps correct.
         np.testing.assert_allclose(error, 0.0, atol=1e-8)
-        step = placement.step(error, side, 2.0 * time / 3, rate, wanted, gains)
+        step = stepping.step(error, side, 2.0 * time / 3, rate, wanted, gains)
         end = np.array([pendulum(place[i], velocity[i], feet[i], height, time)
                         for i in range(2)])
         place, velocity = end[:, 0], end[:, 1]
@@ -147,40 +147,40 @@ def test_a_pendulum_that_steps_as_it_is_told_repeats_itself(speed, sideways):
 def test_a_step_catches_an_error_of_the_capture_point():
     """With gains of 1 the foot lands so that the next step has no error, whatever the push."""
     gains = BipedGains()._replace(place_offset=0.0, place_x=1.0, place_y=1.0)
-    time, rate = 0.5 / gains.frequency, placement.growth_rate(0.65)
-    forward, inward, _ = placement.offsets(0.3, 0.0, rate, gains)
+    time, rate = 0.5 / gains.frequency, stepping.growth_rate(0.65)
+    forward, inward, _ = stepping.offsets(0.3, 0.0, rate, gains)
     xi = np.array([forward + 0.02, inward + 0.03])
-    error = placement.capture_error(tuple(xi), 1, 0.0, rate, (0.3, 0.0), gains)
+    error = stepping.capture_error(tuple(xi), 1, 0.0, rate, (0.3, 0.0), gains)
     np.testing.assert_allclose(error, [0.02, 0.03], atol=1e-12)
-    foot = np.array(placement.step(error, 1, time, rate, (0.3, 0.0), gains))
+    foot = np.array(stepping.step(error, 1, time, rate, (0.3, 0.0), gains))
     at_touchdown = np.exp(rate * time) * xi - foot
-    after = placement.capture_error(tuple(at_touchdown), -1, 0.0, rate, (0.3, 0.0), gains)
+    after = stepping.capture_error(tuple(at_touchdown), -1, 0.0, rate, (0.3, 0.0), gains)
     np.testing.assert_allclose(after, 0.0, atol=1e-9)
-    assert placement.speed_up(error, gains) == 1.0
-    assert placement.speed_up((0.1, 0.0), gains) == pytest.approx(
+    assert stepping.speed_up(error, gains) == 1.0
+    assert stepping.speed_up((0.1, 0.0), gains) == pytest.approx(
         1.0 + gains.speed_up * (0.1 - gains.speed_up_from))
 
 
 def test_steps_keep_to_the_reach():
     gains = BipedGains()
-    assert placement.step((9.0, 9.0), 1, 0.1, 4.0, (0.0, 0.0), gains) == (
+    assert stepping.step((9.0, 9.0), 1, 0.1, 4.0, (0.0, 0.0), gains) == (
         gains.reach_x, gains.reach_y)
-    assert placement.step((-9.0, 9.0), -1, 0.1, 4.0, (0.0, 0.0), gains) == (
+    assert stepping.step((-9.0, 9.0), -1, 0.1, 4.0, (0.0, 0.0), gains) == (
         -gains.reach_x, -gains.narrowest)
 
 
 def test_the_clock_shares_the_weight():
-    gains, shares = BipedGains(), np.zeros(2)
+    gains, fractions = BipedGains(), np.zeros(2)
     landed = np.zeros(2, dtype=bool)
     for phase in np.linspace(0.0, 1.0, 200, endpoint=False):
         phases = np.array([phase, (phase + 0.5) % 1.0])
-        clock.load_shares(phases, landed, gains, shares)
-        assert shares.sum() == pytest.approx(1.0)
+        stepping.load_shares(phases, landed, gains, fractions)
+        assert fractions.sum() == pytest.approx(1.0)
         for leg in range(2):
             if phases[leg] < 1.0 - gains.duty:
-                assert shares[leg] == 0.0
+                assert fractions[leg] == 0.0
     # The flexor's peak is the middle of the swing.
-    assert clock.stride_phase(0.0, gains) == pytest.approx(0.5 * (1.0 - gains.duty))
+    assert stepping.stride_phase(0.0, gains) == pytest.approx(0.5 * (1.0 - gains.duty))
 
 
 def test_the_ground_force_turns_the_body_by_what_is_wanted():
@@ -188,26 +188,28 @@ def test_the_ground_force_turns_the_body_by_what_is_wanted():
     center = np.array([0.02, -0.03, 0.0])
     pressure = (0.01, 0.02, -gains.height)
     moment = (7.0, -5.0)
-    up = stance.upward_force(gains.height, gains.height, 0.0, mass, gains)
-    force = np.array(stance.ground_force(center, pressure, up, moment, gains))
+    up = support.upward_force(gains.height, gains.height, 0.0, mass, gains)
+    force = np.array(support.ground_force(center, pressure, up, moment, gains))
     about = np.cross(np.array(pressure) - center, force)
     np.testing.assert_allclose(about[:2], moment, atol=1e-9)
     assert force[2] == pytest.approx(mass * G)
 
 
-@pytest.mark.parametrize(('gait', 'kind'), [('run', flight.RUNS), ('two_legged_hop', flight.HOPS)])
+@pytest.mark.parametrize(('gait', 'kind'),
+                         [('run', stepping.RUNS), ('two_legged_hop', stepping.HOPS)])
 def test_a_stance_throws_the_body_as_far_as_its_flight_takes(gait, kind):
     gains, dt = BipedGains.of({}, gait), 1e-4
-    stance_time, cycle = flight.spans(kind, gains)
+    stance_time, cycle = stepping.spans(kind, gains)
     flying = cycle - stance_time
     assert stance_time == pytest.approx(gains.duty / gains.frequency) and flying > 0.0
-    shares = np.linspace(0.0, 1.0, 2001)
-    heights, rises, forces = np.array([flight.course(share, kind, gains) for share in shares]).T
+    fractions = np.linspace(0.0, 1.0, 2001)
+    heights, rises, forces = np.array([stepping.course(fraction, kind,
+                                                       gains) for fraction in fractions]).T
     # Newton: the force less the weight accelerates, from falling to rising for half the flight.
     assert rises[[0, -1]] == pytest.approx([-0.5 * G * flying, 0.5 * G * flying])
-    np.testing.assert_allclose(np.gradient(rises, stance_time * shares)[1:-1],
+    np.testing.assert_allclose(np.gradient(rises, stance_time * fractions)[1:-1],
                                G * (forces - 1.0)[1:-1], atol=dt * G)
-    np.testing.assert_allclose(np.gradient(heights, stance_time * shares)[1:-1], rises[1:-1],
+    np.testing.assert_allclose(np.gradient(heights, stance_time * fractions)[1:-1], rises[1:-1],
                                atol=1e-5)
     # The impulse bears the weight through the whole cycle; height at the end is as at the start.
     assert forces.mean() * stance_time == pytest.approx(cycle, rel=1e-3)
@@ -218,32 +220,33 @@ def test_a_stance_throws_the_body_as_far_as_its_flight_takes(gait, kind):
 
 def test_the_force_of_a_stance_corrects_the_height_and_never_pulls():
     gains = BipedGains.of({}, 'run')
-    at, speed, force = flight.course(0.5, flight.RUNS, gains)
-    on_course = flight.upward_force(0.5, flight.RUNS, at, speed, 33.0, gains)
+    at, speed, force = stepping.course(0.5, stepping.RUNS, gains)
+    on_course = stepping.upward_force(0.5, stepping.RUNS, at, speed, 33.0, gains)
     assert on_course == pytest.approx(33.0 * G * force)
-    lower = flight.upward_force(0.5, flight.RUNS, at - 0.01, speed, 33.0, gains)
+    lower = stepping.upward_force(0.5, stepping.RUNS, at - 0.01, speed, 33.0, gains)
     assert lower - on_course == pytest.approx(0.01 * gains.flight_kp)
-    assert flight.upward_force(0.5, flight.RUNS, at + 9.0, speed, 33.0, gains) == 0.0
-    assert flight.upward_force(0.5, flight.RUNS, at - 9.0, speed, 33.0, gains) == pytest.approx(
-        flight.MOST * 33.0 * G)
+    assert stepping.upward_force(0.5, stepping.RUNS, at + 9.0, speed, 33.0, gains) == 0.0
+    assert stepping.upward_force(0.5, stepping.RUNS, at - 9.0, speed, 33.0,
+                                 gains) == pytest.approx(
+        stepping.MOST * 33.0 * G)
 
 
 def test_a_foot_in_flight_lands_below_where_the_body_will_be():
     gains = BipedGains.of({}, 'run')._replace(place_offset=0.0)
     stance_time = gains.duty / gains.frequency
-    ahead, left = flight.foothold((0.5, 0.0), (0.5, 0.0), 1, 0.1, gains)
+    ahead, left = stepping.foothold((0.5, 0.0), (0.5, 0.0), 1, 0.1, gains)
     assert ahead == pytest.approx(0.5 * (0.1 + gains.flight_ahead * stance_time))
     assert left == pytest.approx(0.5 * gains.flight_width * gains.step_width)
-    faster, _ = flight.foothold((0.6, 0.0), (0.5, 0.0), 1, 0.1, gains)
+    faster, _ = stepping.foothold((0.6, 0.0), (0.5, 0.0), 1, 0.1, gains)
     # Too fast: the foot is further ahead, which brakes.
     assert faster - ahead == pytest.approx(0.1 * (0.1 + gains.flight_ahead * stance_time
                                                   + gains.flight_x))
-    _, right = flight.foothold((0.0, 0.0), (0.0, 0.0), -1, 0.1, gains)
+    _, right = stepping.foothold((0.0, 0.0), (0.0, 0.0), -1, 0.1, gains)
     assert right == pytest.approx(-left)
 
 
 def test_every_gait_with_a_law_has_speeds_and_a_preset():
-    assert set(KINDS) == set(SPEEDS) <= set(Biped.presets())
+    assert set(KINDS) == set(GAIT_SPEEDS) <= set(Biped.presets())
     with pytest.raises(InputError, match="cannot be balanced in the gait 'skip', only in"):
         gait_plan(load_robot('humanoid'), 'skip')
     # Gains of a robot file are for the walk; they spare what only another gait has.
@@ -255,15 +258,15 @@ def test_a_foots_path_is_as_smooth_as_its_derivatives_say():
     gains = BipedGains()
     start, target, dt = np.array([-0.1, 0.2, 0.0]), np.array([0.2, 0.25, 0.01]), 1e-5
     out = np.zeros((3, 3, 3))
-    for share in np.linspace(0.02, 0.95, 20):
+    for fraction in np.linspace(0.02, 0.95, 20):
         for k in range(3):
-            swing.path(share + (k - 1) * dt / 0.3, 0.3, start, target, gains, out[k])
+            stepping.path(fraction + (k - 1) * dt / 0.3, 0.3, start, target, gains, out[k])
         # Of the height only the lift is in the derivatives, by design.
         np.testing.assert_allclose(out[1, 1, :2], (out[2, 0] - out[0, 0])[:2] / (2 * dt),
                                    atol=1e-6)
         np.testing.assert_allclose(out[1, 2, :2], (out[2, 1] - out[0, 1])[:2] / (2 * dt),
                                    atol=1e-4)
-    swing.path(0.0, 0.3, start, target, gains, out[0])
+    stepping.path(0.0, 0.3, start, target, gains, out[0])
     np.testing.assert_allclose(out[0, 0], start)
 
 

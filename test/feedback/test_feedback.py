@@ -18,7 +18,7 @@ from dataclasses import replace
 import importlib.util
 import math
 
-from cpg_ros.errors import InputError
+from cpg_ros.common.errors import InputError
 from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, expect, fold, SIGNALS
 from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
@@ -26,7 +26,7 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import forward, Geometry, GRAVITY
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.strides import Drive
+from cpg_ros.motion.strides import StrideCommand
 from depth import examples
 from go2 import displace, DT, GO2, inverse, jacobian, program
 from hypothesis import given
@@ -38,8 +38,8 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body  # noqa: I100
-from cpg_ros.simulation.closed_loop import ClosedLoop
-from cpg_ros.simulation.efference_measurement import measure_efference
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import heights, Terrain
 from pattern_follower import Proprioception
@@ -51,7 +51,7 @@ REACHED = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.08, 0.08), st.floats(-0.0
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoop('go2', program('trot'))
+    return ClosedLoopBatch('go2', program('trot'))
 
 
 @pytest.fixture(scope='module')
@@ -148,8 +148,8 @@ def standing(loads, rates=None, push=(0.0, 0.0, GRAVITY)):
 def test_contact_has_hysteresis(loop):
     weight, estimate = loop.geometry.weight, BodyState(loop.geometry)
     seen = []
-    for share in (0.07, 0.2, 0.07, 0.01, 0.07):
-        estimate.update(standing([share * weight] * 4), DT)
+    for fraction in (0.07, 0.2, 0.07, 0.01, 0.07):
+        estimate.update(standing([fraction * weight] * 4), DT)
         seen.append(bool(estimate.contact.all()))
     assert seen == [False, True, True, False, False]
 
@@ -244,7 +244,7 @@ def patterns(loop, expected, gains, steps=1500):
     """Return angles and speeds told, ticks held by a limit and the place, m, of a real pattern."""
     made = program('trot')
     body = Body('go2', GO2)
-    pattern = Pattern(made, drive=Drive(4))
+    pattern = Pattern(made, drive=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
     if gains is not None:
         feedback = Feedback(loop.geometry, gains)
@@ -285,7 +285,7 @@ def test_a_drive_taken_in_mid_walk_changes_no_bit():
     one, other = Pattern(program('trot')), Pattern(program('trot'))
     for k in range(1500):
         if k == 700:
-            one.attach(Drive(4))
+            one.attach(StrideCommand(4))
         if k == 1000:
             for pattern in (one, other):
                 pattern.apply(program('walk'), 0.5)
@@ -344,7 +344,8 @@ def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
 def test_a_gait_that_sways_keeps_its_frequency(loop):
     """Undisturbed, the pace ran at twice its frequency: its sway at one passed for a push."""
     swaying = program('pace')
-    ran = ClosedLoop('go2', swaying).run([Scenario(phase=k / 3) for k in range(3)], 10.0, GAINS)
+    ran = ClosedLoopBatch('go2',
+                          swaying).run([Scenario(phase=k / 3) for k in range(3)], 10.0, GAINS)
     strides = np.diff(np.unwrap(2.0 * np.pi * ran.phase, axis=1)[:, [2500, -1]], axis=1)
     assert ran.upright.all()
     assert strides / (2.0 * np.pi * 2499 * 0.002) == pytest.approx(swaying.frequency, rel=0.02)
@@ -352,7 +353,7 @@ def test_a_gait_that_sways_keeps_its_frequency(loop):
 
 def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
     """To the left while it walks, turning, and another gait; then once more with dull senses."""
-    loop = ClosedLoop('go2', program('trot'), program('walk'))
+    loop = ClosedLoopBatch('go2', program('trot'), program('walk'))
     wishes = [Scenario(speed=0.3, commands=((1.5, 0.3, 0.1, 0.0),)),
               Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
               Scenario(speed=0.3, switches=((1.5, 'walk'),))]

@@ -17,11 +17,17 @@
 from dataclasses import replace
 import math
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.froude_scaling import dimensionless, leg_length, robot_gains, scaled_gains
-from cpg_ros.feedback.gains import GAINS, Gains
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.gains import (
+    dimensionless,
+    GAINS,
+    Gains,
+    leg_length,
+    robot_gains,
+    scaled_gains,
+)
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.robots.feedback_keys import OwnFeedback
+from cpg_ros.motion.body_file import OwnFeedback
 from go2 import GO2
 import numpy as np
 import pytest

@@ -14,13 +14,13 @@
 
 """Limits of the feedback's gains: what is outside is refused, and nothing inside is fatal."""
 
-from cpg_ros.errors import InputError
+from cpg_ros.common.errors import InputError
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import GAINS, Gains, LAWS
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.tick import PlannedMotion
-from cpg_ros.nodes.feedback_parameters import PREFIX, SPECS
+from cpg_ros.ros.feedback.switch import PREFIX, SPECS
 from go2 import DT, GO2, program
 import numpy as np
 import pytest

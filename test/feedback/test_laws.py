@@ -16,7 +16,8 @@
 
 import math
 
-from cpg_ros.feedback import (
+from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.laws import (
     clearance,
     heading,
     pace,
@@ -30,7 +31,6 @@ from cpg_ros.feedback import (
     touchdown,
     virtual_stiffness,
 )
-from cpg_ros.feedback.gains import Gains
 from go2 import DT
 import numpy as np
 import pytest
@@ -147,17 +147,17 @@ def test_virtual_targets_give_the_torque_of_stiffer_servos():
 
 
 def test_feet_that_stumble_are_lifted_higher_and_lower_again_later():
-    share = 0.0
+    fraction = 0.0
     assert not clearance.stumbles(True, True, 0.1) and clearance.stumbles(True, True, 0.4)
     assert not clearance.stumbles(True, False, 0.4) and not clearance.stumbles(False, True, 0.4)
     for _ in range(round(2.0 * GAINS.clearance_rise / DT)):
-        share = clearance.update(share, 1, GAINS, DT)
-    assert share == 1.0
-    assert clearance.lift(share, 0.5, GAINS) == pytest.approx(GAINS.clearance_most)
-    assert clearance.lift(share, 0.0, GAINS) == clearance.lift(share, 1.0, GAINS) == 0.0
+        fraction = clearance.update(fraction, 1, GAINS, DT)
+    assert fraction == 1.0
+    assert clearance.lift(fraction, 0.5, GAINS) == pytest.approx(GAINS.clearance_most)
+    assert clearance.lift(fraction, 0.0, GAINS) == clearance.lift(fraction, 1.0, GAINS) == 0.0
     for _ in range(round(GAINS.clearance_memory / DT)):
-        share = clearance.update(share, 0, GAINS, DT)
-    assert share == pytest.approx(math.exp(-1.0))
+        fraction = clearance.update(fraction, 0, GAINS, DT)
+    assert fraction == pytest.approx(math.exp(-1.0))
 
 
 def test_feet_stand_under_the_body_on_a_slope():

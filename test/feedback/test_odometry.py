@@ -17,10 +17,9 @@
 import importlib.util
 import math
 
-from cpg_ros.feedback import odometry as module
-from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback import estimate as module
+from cpg_ros.feedback.estimate import Odometry, SensorData
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.odometry import Odometry
 from go2 import DT, GO2, program
 import numpy as np
 import pytest
@@ -83,10 +82,10 @@ def test_its_covariance_is_that_of_draws():
                                          * (speed**2 + 0.1**2)))
     error = rng.normal(0.0, module.STILL, (2, count))
     drift, place = np.zeros(count), np.zeros((2, count))
-    share = 1.0 + rng.normal(0.0, module.SCALE, count)
+    fraction = 1.0 + rng.normal(0.0, module.SCALE, count)
     for heading in headings:
         angle = heading + drift
-        forward, left = speed * share + error[0], 0.1 * share + error[1]
+        forward, left = speed * fraction + error[0], 0.1 * fraction + error[1]
         place += dt * np.array([np.cos(angle) * forward - np.sin(angle) * left,
                                 np.sin(angle) * forward + np.cos(angle) * left])
         place += rng.normal(0.0, module.PLACE * math.sqrt(dt), (2, count))
@@ -162,12 +161,12 @@ def test_a_base_that_went_on_unseen_is_within_its_covariance():
 def test_it_drifts_as_little_as_it_says_on_simulated_ground():
     """A Go2 that trots and turns: below 3 % of the way, and NEES not above its 99.5 %."""
     from cpg_ros.feedback.gains import Gains
-    from cpg_ros.simulation.closed_loop import ClosedLoop
-    from cpg_ros.simulation.efference_measurement import measure_efference
+    from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+    from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
     from cpg_ros.simulation.scenario import Scenario, SensorNoise
     from cpg_ros.simulation.terrain import Terrain
     from scipy.stats import chi2
-    loop = ClosedLoop('go2', program('trot'))
+    loop = ClosedLoopBatch('go2', program('trot'))
     noise = SensorNoise(0.004, 0.05, 0.05, 0.005, 0.02, 0.002, 0.1, 0.05, seed=41)
     ran = loop.run([Scenario(phase=k / 4, speed=0.4, commands=((5.0, 0.3, 0.05, 0.3 - 0.1 * k),),
                              terrain=Terrain('height_field', 0.06, k) if k % 2 else None)

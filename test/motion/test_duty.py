@@ -19,14 +19,14 @@ from functools import cache
 import math
 from pathlib import Path
 
+from cpg_ros.feedback.gait_tables import Timetable
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.timetable import Timetable
-from cpg_ros.motion.duty import Duty, retimed_phase
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
+from cpg_ros.motion.readout import Duty, retimed_phase
+from cpg_ros.motion.robot import Motion
+from cpg_ros.motion.robot_file import read_robot, RobotError
 from cpg_ros.networks.registry import find_network
-from cpg_ros.robots.robot import Motion
-from cpg_ros.robots.robot_file import read_robot, RobotError
 from depth import examples, in_depth
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,7 +39,7 @@ CASES = [('quadruped', 'delayed', 'walk'), ('quadruped', 'quadruped', 'trot'),
 
 
 @cache
-def program(robot, network, gait, duty=0.0):
+def gait_plan(robot, network, gait, duty=0.0):
     """A gait on legs of one joint more, which is the driving signal itself."""
     known = read_robot(CONFIG / f'{robot}.yaml')
     legs = {}
@@ -85,7 +85,7 @@ def test_the_map_takes_stance_to_stance_and_is_smooth(own, asked, begin, phase):
 @pytest.mark.parametrize('duty', [0.3, 0.75, *in_depth(0.5, 0.62, 0.9)])
 @pytest.mark.parametrize('case', CASES, ids=' '.join)
 def test_legs_stand_for_as_long_as_was_asked(case, duty):
-    one = program(*case, duty)
+    one = gait_plan(*case, duty)
     assert np.allclose(one.duty, duty)
     pattern = Pattern(one, ramp=0.01)
     falling(pattern, 1)
@@ -94,8 +94,8 @@ def test_legs_stand_for_as_long_as_was_asked(case, duty):
 
 @pytest.mark.parametrize('case', CASES, ids=' '.join)
 def test_without_being_asked_nothing_changes(case):
-    own = program(*case)
-    pattern, other = Pattern(own, ramp=0.01), Pattern(program(*case, float(own.duty[0])), 0.01)
+    own = gait_plan(*case)
+    pattern, other = Pattern(own, ramp=0.01), Pattern(gait_plan(*case, float(own.duty[0])), 0.01)
     for _ in range(300):
         pattern.advance(0.004)
         other.advance(0.004)
@@ -107,7 +107,7 @@ def test_without_being_asked_nothing_changes(case):
 
 @pytest.mark.parametrize('case', CASES, ids=' '.join)
 def test_phases_between_legs_stay_and_paths_too(case):
-    first, other = program(*case), program(*case, 0.75)
+    first, other = gait_plan(*case), gait_plan(*case, 0.75)
     assert np.allclose(first.readout.angles.max(axis=1), other.readout.angles.max(axis=1),
                        atol=1e-3)
     assert np.allclose(first.readout.angles.min(axis=1), other.readout.angles.min(axis=1),
@@ -122,7 +122,7 @@ def test_phases_between_legs_stay_and_paths_too(case):
        st.sampled_from([0.3, 1.0]))
 def test_a_change_is_smooth_within_the_gaits_speeds_and_velocities_are_derivatives(
         case, before, after, transition):
-    one, two = program(*case, before), program(*case, after)
+    one, two = gait_plan(*case, before), gait_plan(*case, after)
     pattern, dt = Pattern(one, ramp=0.1), 0.0005
     for _ in range(round(0.7 / dt)):
         pattern.advance(dt)
@@ -143,7 +143,7 @@ def test_a_change_is_smooth_within_the_gaits_speeds_and_velocities_are_derivativ
 
 def test_what_weights_were_made_for_can_be_said(tmp_path):
     case = CASES[0]
-    one = program(*case)
+    one = gait_plan(*case)
     preset = find_network('delayed').presets()['walk']
     robot = replace(one.robot, motions={'walk': Motion(duty=0.8, stance=(-0.1, 0.6))})
     made = plan(robot, 'walk', preset, preset.network, 1.0)
@@ -171,7 +171,7 @@ def test_feet_of_a_tuned_walk_go_back_for_as_long_as_was_asked(duty):
 def test_what_is_no_share_of_a_stride_is_refused(tmp_path):
     for duty in (0.29, 0.91, 1e-3):
         with pytest.raises(PlanError, match=r'is not from 0\.3 to 0\.9'):
-            program(*CASES[0], duty)
+            gait_plan(*CASES[0], duty)
     for line, message in (('duty: 0.2', r'gaits\.walk\.duty: 0\.2 is not from 0\.3'),
                           ('stance: [0.1]', 'takes a phase'),
                           ('stance: [0, 1.2]', 'takes a')):
@@ -183,7 +183,7 @@ def test_what_is_no_share_of_a_stride_is_refused(tmp_path):
 
 
 def test_a_duty_needs_cells_of_legs():
-    one = program(*CASES[0])
+    one = gait_plan(*CASES[0])
     legs = one.robot.leg_cells
     maps = Duty(one.orbit, legs, np.zeros(4), np.full(4, 0.5), np.full(4, 0.7))
     found = maps.of_cells(np.array([0, 0]), np.array([0, 6]))

@@ -16,11 +16,10 @@
 
 from functools import cache
 
-from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.pattern import HOLD, Pattern
 from cpg_ros.motion.plan import plan, PlanError
-from cpg_ros.motion.resumption import HOLD
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,7 +38,7 @@ EACH = pytest.mark.parametrize('network', PRESETS)
 
 
 @cache
-def programs(network):
+def plans(network):
     """All gaits of a network that the robot can take at this frequency."""
     robot, found = load_robot('biped' if network == 'biped' else 'quadruped'), []
     for name, preset in PRESETS[network].items():
@@ -70,7 +69,7 @@ def check(pattern, dt, time, before, tolerance):
 @examples(20)
 @given(story=st.lists(st.tuples(ACTIONS, PAUSES), min_size=1, max_size=8))
 def test_no_story_outruns_a_limit(network, rate, tolerance, story):
-    gaits = programs(network)
+    gaits = plans(network)
     pattern = Pattern(gaits[0], 0.0)
     before = check(pattern, 1.0 / rate, 0.3, (pattern.position.copy(), pattern.velocity.copy()),
                    tolerance)
@@ -87,7 +86,7 @@ def test_no_story_outruns_a_limit(network, rate, tolerance, story):
 
 @EACH
 def test_a_stop_on_the_way_to_the_stand_shortens_it(network):
-    pattern = Pattern(programs(network)[0], 0.0)
+    pattern = Pattern(plans(network)[0], 0.0)
     before = check(pattern, 0.002, 1.3, (pattern.position.copy(), pattern.velocity.copy()), 0.04)
     assert np.abs(before[1]).max() > 0.1
     pattern.restart(10.0)
@@ -99,7 +98,7 @@ def test_a_stop_on_the_way_to_the_stand_shortens_it(network):
 
 
 def test_a_leap_of_a_correction_is_followed_no_faster_than_joints_may():
-    pattern, dt = Pattern(programs('delayed')[0], 0.0), 0.002
+    pattern, dt = Pattern(plans('delayed')[0], 0.0), 0.002
     for _ in range(500):
         pattern.advance(dt)
     most = pattern.robot.column('velocity') * dt

@@ -18,13 +18,13 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from cpg_ros.integration.stepper import Stepper
+from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
-from cpg_ros.networks.delayed import Delayed, PRESETS
+from cpg_ros.motion.robot import JointMotion, Motion
+from cpg_ros.motion.robot_file import read_robot
+from cpg_ros.networks.library.delayed import Delayed, PRESETS
 from cpg_ros.networks.symmetry import GAITS
-from cpg_ros.robots.robot import JointMotion, Motion
-from cpg_ros.robots.robot_file import read_robot
 from depth import spread
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ PAIRS = [(old, new) for old in GAITS for new in GAITS if old != new]
 
 
 @cache
-def program(gait, frequency=1.0, amplitude=1.0, robot='goat', gain=-1.0):
+def gait_plan(gait, frequency=1.0, amplitude=1.0, robot='goat', gain=-1.0):
     preset = PRESETS[gait]
     return plan(ROBOTS[robot], gait, preset, preset.network, frequency, amplitude, gain)
 
@@ -54,13 +54,13 @@ def in_swing(one, phase=0.0):
     return pattern
 
 
-def check_smooth(run, dt, *programs):
+def check_smooth(run, dt, *plans):
     """No joint outruns or outreaches the gaits; velocity is the derivative of position."""
-    deviation, velocity = run[0] - programs[0].robot.column('offset'), run[1]
-    steps, speed = np.diff(run[0], axis=0), np.max([one.speed for one in programs], axis=0)
+    deviation, velocity = run[0] - plans[0].robot.column('offset'), run[1]
+    steps, speed = np.diff(run[0], axis=0), np.max([one.speed for one in plans], axis=0)
     assert (np.abs(steps) <= speed * dt * (1 + 1e-3)).all()
-    assert (deviation >= np.min([one.span[0] for one in programs], axis=0) - 1e-6).all()
-    assert (deviation <= np.max([one.span[1] for one in programs], axis=0) + 1e-6).all()
+    assert (deviation >= np.min([one.span[0] for one in plans], axis=0) - 1e-6).all()
+    assert (deviation <= np.max([one.span[1] for one in plans], axis=0) + 1e-6).all()
     # Trapezoids are off by (omega dt)^2 / 12, and where a transition's clock changes its pace.
     error = np.abs(steps / dt - (velocity[1:] + velocity[:-1]) / 2.0)
     assert (error <= (0.01 + 2.0 * dt) * speed + 1e-9).all()
@@ -78,7 +78,7 @@ def check_in_gait(pattern, one, tolerance):
     ahead = phases[-1] - one.orbit.phases[:4]  # the first four cells give the legs' phases
     assert np.abs((ahead - ahead[0] + 0.5) % 1.0 - 0.5).max() < tolerance
     assert np.allclose(np.ptp(position, axis=0), np.ptp(one.span, axis=0), 5.0 * tolerance, 1e-9)
-    assert (pattern.program, pattern.in_transition, pattern.recovering) == (one, False, False)
+    assert (pattern.plan, pattern.in_transition, pattern.recovering) == (one, False, False)
 
 
 @pytest.mark.parametrize(('requests', 'waits', 'dt'), [
@@ -90,30 +90,30 @@ def check_in_gait(pattern, one, tolerance):
     # More than may fade into one another at once: the others wait, and the last one counts.
     *(([[gait] for gait in GAITS], [wait] * 4 + [6.0], 0.001) for wait in (0.0, 0.1))])
 def test_switches_are_smooth(requests, waits, dt):
-    programs = [program(*request) for request in requests]
-    pattern = in_swing(programs[0])
-    for one, wait in zip(programs[1:], waits, strict=True):
+    plans = [gait_plan(*request) for request in requests]
+    pattern = in_swing(plans[0])
+    for one, wait in zip(plans[1:], waits, strict=True):
         pattern.apply(one, 1.0)
         run = drive(pattern, wait, dt)
-        check_smooth(run, dt, *programs)
+        check_smooth(run, dt, *plans)
         # The first leg's phase goes on, never backward and never faster than the strides.
         pace = np.diff(np.unwrap(run[2][:, 0], period=1.0)) / dt
-        assert ((pace > -1e-3) & (pace < 1.05 * max(one.frequency for one in programs))).all()
-    check_in_gait(pattern, programs[-1], 1e-4)
+        assert ((pace > -1e-3) & (pace < 1.05 * max(one.frequency for one in plans))).all()
+    check_in_gait(pattern, plans[-1], 1e-4)
     assert (pattern.faults, pattern.held) == (0, 0)
 
 
 @pytest.mark.parametrize(('old', 'new'), spread(PAIRS, 4))
 def test_without_a_transition_the_network_settles_by_itself(old, new):
-    pattern = in_swing(program(old), 0.1 * PAIRS.index((old, new)))
-    pattern.apply(program(new), 0.0)
+    pattern = in_swing(gait_plan(old), 0.1 * PAIRS.index((old, new)))
+    pattern.apply(gait_plan(new), 0.0)
     check_the_robot_can_follow(ROBOTS['goat'], run := drive(pattern, 0.5, 1e-3), 1e-3)
     drive(pattern, 14.0, 0.02)
     assert pattern.faults == 0
-    check_in_gait(pattern, program(new), 0.02)
+    check_in_gait(pattern, gait_plan(new), 0.02)
     # A joint did what its velocity said and stayed about where both gaits have it.
     assert np.abs(np.diff(run[0], axis=0) / 1e-3 - run[1][1:]).max() < 1.0
-    assert (np.abs(run[0]) <= 1.2 * program(old).span[1]).all()
+    assert (np.abs(run[0]) <= 1.2 * gait_plan(old).span[1]).all()
 
 
 @pytest.mark.parametrize(('gait', 'frequency', 'hertz'), [
@@ -122,10 +122,10 @@ def test_without_a_transition_the_network_settles_by_itself(old, new):
     # network.
     ('trot', 0.0, 1.0 / 1.27827056), ('walk', 0.0, 1.0 / 1.09048163)])
 def test_strides_a_second_and_amplitudes_of_goat_yaml_are_exact(gait, frequency, hertz):
-    position, velocity, phases = drive(in_swing(program(gait, frequency)), 20.0, 0.02)
+    position, velocity, phases = drive(in_swing(gait_plan(gait, frequency)), 20.0, 0.02)
     assert np.ptp(np.unwrap(phases[:, 0], period=1.0)) == pytest.approx(20.0 * hertz, abs=1e-5)
     assert np.allclose([position.max(axis=0), -position.min(axis=0)], [0.40, 0.25] * 4, 0.0, 1e-4)
-    assert np.allclose(np.abs(velocity).max(axis=0), program(gait, frequency).speed, 1e-3, 0.0)
+    assert np.allclose(np.abs(velocity).max(axis=0), gait_plan(gait, frequency).speed, 1e-3, 0.0)
 
 
 def test_a_joint_that_a_gait_only_moves_elsewhere_does_not_hold_up_the_ramp():
@@ -143,7 +143,7 @@ def test_a_joint_that_a_gait_only_moves_elsewhere_does_not_hold_up_the_ramp():
 @pytest.mark.parametrize('ramps', [[(1.0, 2.5), (1.0, 2.5)], [(0.5, 0.3), (2.0, 3.0)]])
 def test_ramps_from_and_to_the_stand(ramps, dt):
     # The second is turned round half way: (duration of the ramp, time until the next request).
-    one = program('trot', robot='quadruped')
+    one = gait_plan('trot', robot='quadruped')
     pattern, stand = Pattern(one, ramps[0][0]), one.robot.column('offset')
     assert np.array_equal(pattern.position, stand) and not pattern.velocity.any()
     for k, (ramp, time) in enumerate(ramps):
@@ -158,8 +158,8 @@ def test_ramps_from_and_to_the_stand(ramps, dt):
     ('trot', np.nan), ('trot', np.inf), ('trot', 1e6), ('pace', 0.0), (np.zeros(8), 0.0),
     (np.array([2.0, -2.0] * 4), 0.0)], ids=['nan', 'inf', 'far', 'pace', 'rest', 'latched'])
 def test_watchdog(history, offset, dt, gain):
-    pattern = in_swing(one := program('trot', gain=gain))
-    history = program(history).orbit if isinstance(history, str) else history
+    pattern = in_swing(one := gait_plan('trot', gain=gain))
+    history = gait_plan(history).orbit if isinstance(history, str) else history
     stepper = Stepper(one.orbit.network, history, gain=one.gain, symmetry=one.orbit.symmetry)
     stepper.disturb(np.full(8, offset))
     pattern._tracks[-1].stepper = stepper
@@ -178,4 +178,4 @@ def test_refused(change, words):
     with pytest.raises(PlanError, match=words):
         plan(ROBOTS['goat'], 'x', PRESETS['trot'],
              **{'network': PRESETS['trot'].network, **change})
-    program('trot', 1.0, 2.5)  # 0.40 rad * 2.5 is right at the limit, which is not refused
+    gait_plan('trot', 1.0, 2.5)  # 0.40 rad * 2.5 is right at the limit, which is not refused

@@ -18,12 +18,12 @@ from functools import cache
 from itertools import permutations
 from pathlib import Path
 
-from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import read_robot
 from depth import in_full, spread
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ WEIGHTS = np.random.default_rng(6).uniform(-0.5, 0.5, (8, 6))
 
 
 @cache
-def program(network, name, frequency=1.0):
+def gait_plan(network, name, frequency=1.0):
     preset = PRESETS[network][name]
     return plan(ROBOTS[network], name, preset, preset.network, frequency)
 
@@ -49,8 +49,8 @@ class Theory:
         self.k = np.arange(-harmonics, harmonics + 1)
         self.terms = np.fft.fft(orbit(cycle * orbit.period)[:, :cells], axis=0)[self.k] / 8192
         # Lanczos' factors.
-        share = self.k / (harmonics + 1)
-        self.terms *= (np.sin(np.pi * share) / np.pi / np.where(self.k, share, 1.0)
+        fraction = self.k / (harmonics + 1)
+        self.terms *= (np.sin(np.pi * fraction) / np.pi / np.where(self.k, fraction, 1.0)
                        + (self.k == 0))[:, None]
         x = self.sum(cycle, 0)
         self.middle, self.half = (x.max(axis=0) + x.min(axis=0)) / 2, np.ptp(x, axis=0) / 2
@@ -184,7 +184,7 @@ def in_swing(one, ticks=65):
 
 @EVERY
 def test_the_pattern_moves_as_planned(network, name):
-    one, robot = program(network, name, 1.5), ROBOTS[network]
+    one, robot = gait_plan(network, name, 1.5), ROBOTS[network]
     position, velocity, phases = drive(pattern := in_swing(one), 1334)
     lower, upper = robot.column('lower'), robot.column('upper')
     assert (position >= lower).all() and (position <= upper).all()
@@ -211,16 +211,16 @@ def test_the_pattern_moves_as_planned(network, name):
 def test_no_switch_outruns_or_outreaches_the_gaits(network):
     pairs = list(enumerate(permutations(PRESETS[network], 2)))
     for k, (old, new) in pairs if in_full() else pairs[::4]:
-        programs = program(network, old), program(network, new)
-        pattern = in_swing(programs[0], 65 + 7 * k % 50)
-        pattern.apply(programs[1], 1.0)
+        plans = gait_plan(network, old), gait_plan(network, new)
+        pattern = in_swing(plans[0], 65 + 7 * k % 50)
+        pattern.apply(plans[1], 1.0)
         position, velocity, _ = drive(pattern, 1300)
-        steps, speed = np.diff(position, axis=0), np.max([one.speed for one in programs], axis=0)
+        steps, speed = np.diff(position, axis=0), np.max([one.speed for one in plans], axis=0)
         assert (np.abs(steps) <= 1.001e-3 * speed + 1e-9).all(), (old, new)
         deviation = position - ROBOTS[network].column('offset')
-        assert (deviation >= np.min([one.span[0] for one in programs], axis=0) - 1e-6).all()
-        assert (deviation <= np.max([one.span[1] for one in programs], axis=0) + 1e-6).all()
+        assert (deviation >= np.min([one.span[0] for one in plans], axis=0) - 1e-6).all()
+        assert (deviation <= np.max([one.span[1] for one in plans], axis=0) + 1e-6).all()
         error = np.abs(steps / 1e-3 - (velocity[1:] + velocity[:-1]) / 2.0)
         assert (error <= 0.012 * speed + 1e-9).all(), (old, new)
         assert (pattern.faults, pattern.held, pattern.in_transition) == (0, 0, False)
-        assert pattern.program is programs[1]
+        assert pattern.plan is plans[1]

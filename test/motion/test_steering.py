@@ -18,10 +18,10 @@ from dataclasses import replace
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
-from cpg_ros.motion.strides import Drive
+from cpg_ros.motion.robot import SteeringTable
+from cpg_ros.motion.robot_file import read_robot, RobotError, write_robot
+from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot import SteeringTable
-from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from depth import examples
 import go2
 from hypothesis import given
@@ -39,7 +39,7 @@ def robot(tmp_path_factory):
     return read_robot(steered.write(tmp_path_factory.mktemp('robot')))
 
 
-def program(robot, gait='trot', network='delayed', **more):
+def gait_plan(robot, gait='trot', network='delayed', **more):
     preset = PRESETS[network][gait]
     return plan(robot, gait, preset, preset.network, **{'frequency': 2.0} | more)
 
@@ -74,8 +74,8 @@ def angles(one, phases, strides):
 
 @pytest.mark.parametrize('strides', [[1.0] * 4, [0.0] * 4, [-0.7, 0.9, -0.7, 0.9]])
 def test_the_joints_are_what_the_file_says(robot, strides):
-    one = program(robot)
-    pattern = Pattern(one, ramp=0.2, drive=Drive(4))
+    one = gait_plan(robot)
+    pattern = Pattern(one, ramp=0.2, drive=StrideCommand(4))
     pattern.steer(np.array(strides), 0.5)
     run(pattern, 1.5)
     position, velocity, phases = run(pattern, 2.0)
@@ -87,8 +87,8 @@ def test_the_joints_are_what_the_file_says(robot, strides):
 
 
 def test_without_a_drive_it_moves_as_with_full_strides(robot):
-    one = program(robot)
-    plain, driven = (run(Pattern(one, drive=drive), 3.0) for drive in (None, Drive(4)))
+    one = gait_plan(robot)
+    plain, driven = (run(Pattern(one, drive=drive), 3.0) for drive in (None, StrideCommand(4)))
     for a, b in zip(plain, driven, strict=True):
         assert np.abs(a - b).max() < 1e-12
 
@@ -97,8 +97,8 @@ def test_without_a_drive_it_moves_as_with_full_strides(robot):
 @given(asked=st.lists(st.tuples(*[st.floats(-1.0, 1.0)] * 4, st.floats(0.4, 1.0)), min_size=1,
                       max_size=4), dt=st.sampled_from([0.001, 0.005, 0.02]))
 def test_whatever_is_asked_the_joints_move_smoothly(robot, asked, dt):
-    one = program(robot)
-    drive = Drive(4)
+    one = gait_plan(robot)
+    drive = StrideCommand(4)
     pattern = Pattern(one, ramp=0.2, drive=drive)
     run(pattern, 0.4, dt)
     rows = []
@@ -118,7 +118,7 @@ def test_whatever_is_asked_the_joints_move_smoothly(robot, asked, dt):
 
 
 def test_strides_are_at_once_what_is_asked_while_nothing_moves(robot):
-    pattern = Pattern(program(robot), enabled=False, drive=Drive(4))
+    pattern = Pattern(gait_plan(robot), enabled=False, drive=StrideCommand(4))
     pattern.steer(np.array([0.2, 0.4, 0.6, 0.8]), 0.7)
     pattern.advance(0.01)
     assert pattern.drive.stride.tolist() == [0.2, 0.4, 0.6, 0.8] and pattern.drive.pace == 0.7
@@ -126,7 +126,7 @@ def test_strides_are_at_once_what_is_asked_while_nothing_moves(robot):
 
 def test_a_drive_approaches_as_a_critically_damped_oscillator():
     # Against a fine integration of s'' = (target - s) / T^2 - 2 s' / T.
-    drive, s, v, dt = Drive(1), 1.0, 0.0, 1e-5
+    drive, s, v, dt = StrideCommand(1), 1.0, 0.0, 1e-5
     drive.set_target(np.array([-0.5]), 1.0)
     for tick in range(100):
         if tick == 20:
@@ -154,16 +154,16 @@ def test_the_steering_table_is_inverted(speed, turn):
 
 def test_a_gait_without_steering_says_so(robot):
     with pytest.raises(ValueError, match=r"'steered' .* 'pace' \(gaits.pace.steering\)"):
-        program(robot, 'pace').steer(0.1, 0.0)
+        gait_plan(robot, 'pace').steer(0.1, 0.0)
 
 
 def test_presets_of_a_gait_move_like_it(robot):
-    assert program(robot, 'liu2024_trot').motion is robot.motions['trot']
-    assert program(robot, 'bound').motion.joints == {}
+    assert gait_plan(robot, 'liu2024_trot').motion is robot.motions['trot']
+    assert gait_plan(robot, 'bound').motion.joints == {}
 
 
 def test_the_offset_of_a_gait_ramps_with_the_level(robot):
-    one = program(robot)
+    one = gait_plan(robot)
     pattern = Pattern(one, ramp=1.0, enabled=False)
     assert np.array_equal(pattern.position, robot.column('offset'))
     pattern.enable(True, 1.0)
@@ -185,10 +185,10 @@ def test_strides_backward_must_stay_within_the_limits_too(robot, tmp_path):
     path = tmp_path / 'steered.yaml'
     path.write_text(steered.yaml.safe_dump(tree))
     with pytest.raises(PlanError, match=r'_calf_joint to -0\.550 rad, above its limit -0.7'):
-        program(read_robot(path))
+        gait_plan(read_robot(path))
     del tree['gaits']['trot']['steering']
     path.write_text(steered.yaml.safe_dump(tree))
-    program(read_robot(path))
+    gait_plan(read_robot(path))
 
 
 def test_motions_survive_writing(robot, tmp_path):
@@ -232,7 +232,7 @@ def test_a_wrong_entry_is_named(tmp_path, place, value, why):
 
 
 def test_beyond_full_strides_legs_are_faster_as_far_as_joints_go():
-    slow, preset = go2.program('trot'), PRESETS['delayed']['trot']
+    slow, preset = go2.plan('trot'), PRESETS['delayed']['trot']
     fast = plan(go2.GO2, 'trot', preset, preset.network, 2.9)
     table = slow.motion.steering
     assert table.stride[-1] == 1.0 and table.frequency[-1] > slow.motion.frequency

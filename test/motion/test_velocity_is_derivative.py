@@ -25,11 +25,11 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-from cpg_ros.integration.stepper import Stepper
+from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import read_robot
 from depth import in_depth, spread
 import numpy as np
 import pytest
@@ -49,7 +49,7 @@ RATES = pytest.mark.parametrize('rate', [500.0, *in_depth(100.0, 2000.0)])
 
 
 @cache
-def programs(network):
+def plans(network):
     """Random sets of a network that run, after the known steep ones of the quadruped's."""
     rng, robot = np.random.default_rng(19), ROBOTS['biped' if network == 'biped' else 'quadruped']
 
@@ -77,8 +77,8 @@ def programs(network):
 class Twins:
     """A pattern at a rate, and one that does the same at four times that rate."""
 
-    def __init__(self, program, rate):
-        self.pair, self.dt = [Pattern(program, 0.3), Pattern(program, 0.3)], 1.0 / rate
+    def __init__(self, plan, rate):
+        self.pair, self.dt = [Pattern(plan, 0.3), Pattern(plan, 0.3)], 1.0 / rate
 
     def both(self, method, *arguments):
         for pattern in self.pair:
@@ -88,10 +88,10 @@ class Twins:
         for pattern in self.pair:
             pattern._tracks[0].stepper.disturb(offset)
 
-    def check(self, time, *programs):
+    def check(self, time, *plans):
         """Advance by a time and hold every tick against the velocities."""
         one, twin = self.pair
-        speed = np.max([program.speed for program in programs], axis=0)
+        speed = np.max([plan.speed for plan in plans], axis=0)
         for _ in range(round(time / self.dt)):
             before, rates = one.position.copy(), [twin.velocity.copy()]
             one.advance(self.dt)
@@ -114,18 +114,18 @@ def run(pattern, time, rate, before=lambda: None):
     return rows
 
 
-def check_own(rows, dt, program):
+def check_own(rows, dt, plan):
     """Hold ticks, as ``run`` gives them, against their own velocities."""
     position, velocity = rows[:, 0], rows[:, 1]
     mean = (13.0 * (velocity[1:-2] + velocity[2:-1]) - velocity[:-3] - velocity[3:]) / 24.0
     step = (position[2:-1] - position[1:-2]) / dt
-    assert (np.abs(step - mean) <= 0.005 * program.speed + 1e-9).all()
+    assert (np.abs(step - mean) <= 0.005 * plan.speed + 1e-9).all()
 
 
 @EACH
 @RATES
 def test_in_a_gait_in_switches_and_after_a_re_seed(network, rate):
-    sets = programs(network)
+    sets = plans(network)
     for old, new in zip(sets, sets[1:] + sets[:1], strict=True):
         twins = Twins(old, rate)
         twins.check(0.9, old)
@@ -140,38 +140,38 @@ def test_in_a_gait_in_switches_and_after_a_re_seed(network, rate):
 @EACH
 @RATES
 def test_on_the_way_back_to_the_orbit(network, rate):
-    for k, program in enumerate(programs(network)):
-        orbit, rng = program.orbit, np.random.default_rng([20, k])
+    for k, gait_plan in enumerate(plans(network)):
+        orbit, rng = gait_plan.orbit, np.random.default_rng([20, k])
         middle = orbit(np.arange(64) / 64 * orbit.period).mean(axis=0)
         # Where swing is a fifth of the stride, legs that far out of step are out of the gait.
         most = 0.1 if network == 'hopf' else 0.2
         factor = 1.0 + most * rng.uniform(-1.0, 1.0, middle.size)
-        pattern = Pattern(program, 0.2)
+        pattern = Pattern(gait_plan, 0.2)
         # Every component comes with a size of its own.
         pattern._tracks[0].stepper = Stepper(
             orbit.network, lambda t, orbit=orbit, middle=middle, factor=factor: (
                 middle + factor * (orbit(t) - middle)),
-            gain=program.gain, symmetry=orbit.symmetry)
+            gain=gait_plan.gain, symmetry=orbit.symmetry)
         run(pattern, 0.3, rate)
-        check_own(run(pattern, 1.2, rate), 1.0 / rate, program)
+        check_own(run(pattern, 1.2, rate), 1.0 / rate, gait_plan)
         assert pattern.faults == 0
 
 
 @pytest.mark.parametrize('network', ['quadruped', 'biped'])
 @RATES
 def test_with_noise(network, rate):
-    for k, program in enumerate(programs(network)):
-        pattern, rng = Pattern(program, 0.2), np.random.default_rng([21, k])
-        size = np.repeat(program.orbit.levels[0, :, 1], program.orbit.network.cells)
+    for k, gait_plan in enumerate(plans(network)):
+        pattern, rng = Pattern(gait_plan, 0.2), np.random.default_rng([21, k])
+        size = np.repeat(gait_plan.orbit.levels[0, :, 1], gait_plan.orbit.network.cells)
         stepper, late = pattern._tracks[0].stepper, []
 
-        def kick(pattern=pattern, program=program, rng=rng, size=size, stepper=stepper,
+        def kick(pattern=pattern, gait_plan=gait_plan, rng=rng, size=size, stepper=stepper,
                  late=late):
             stepper.disturb(0.2 * size / np.sqrt(rate) * rng.standard_normal(size.size))
-            late.append(pattern.phases - program.orbit.phases[program.robot.leg_cells])
+            late.append(pattern.phases - gait_plan.orbit.phases[gait_plan.robot.leg_cells])
 
         run(pattern, 0.5, rate)
-        check_own(run(pattern, 1.5, rate, kick), 1.0 / rate, program)
+        check_own(run(pattern, 1.5, rate, kick), 1.0 / rate, gait_plan)
         # The legs feel it, each in its own way.
         apart = (np.array(late) - late[0] + late[0][0] - np.array(late)[:, :1] + 0.5) % 1.0
         assert np.ptp(apart, axis=0).max() > 1e-3 and pattern.faults == 0
@@ -179,7 +179,7 @@ def test_with_noise(network, rate):
 
 @pytest.mark.parametrize('network', ['quadruped', 'biped'])
 def test_a_transition_of_0_s_hardly_outruns_the_gaits(network):
-    sets = programs(network)
+    sets = plans(network)
     for old, new in zip(sets, sets[1:] + sets[:1], strict=True):
         run(pattern := Pattern(old, 0.2), 2.0, 500.0)
         pattern.apply(new, 0.0)

@@ -19,16 +19,16 @@ from fractions import Fraction
 from itertools import combinations
 import pickle
 
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
-from cpg_ros.dynamics.periodic import richer
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.orbit import extra_symmetry
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.errors import CpgError
-from cpg_ros.gaits.leg_phases import match_gait
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import Delayed, PRESETS
+from cpg_ros.fitting.gaits.leg_phases import match_gait
 from cpg_ros.networks.leg_numbers import footfall_order
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.library.delayed import Delayed, PRESETS
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import find_network, NETWORKS, numbered
 from cpg_ros.networks.symmetry import Symmetry
 from depth import in_depth
@@ -99,16 +99,16 @@ class Less:
 def test_what_an_orbit_has_beyond_the_symmetry_known_is_seen(legs):
     for gait, preset in find_network(f'delayed{legs}').presets().items():
         orbit = solve_preset(preset)
-        assert richer(orbit) == '', gait
+        assert extra_symmetry(orbit) == '', gait
         shifts = dict(orbit.symmetry.shifts)
         for some in combinations(shifts, 2):
             part = Symmetry.of(orbit.symmetry.group, {name: shifts[name] for name in some})
-            found = richer(Less(orbit, part))
+            found = extra_symmetry(Less(orbit, part))
             if len(part.shifts) == len(shifts):
                 assert found == ''
                 continue
-            one, share = found.removesuffix(' of a cycle').split(' shifts it by ')
-            assert one not in part.h and shifts[one] == Fraction(share), (gait, some)
+            one, fraction = found.removesuffix(' of a cycle').split(' shifts it by ')
+            assert one not in part.h and shifts[one] == Fraction(fraction), (gait, some)
 
 
 @pytest.mark.parametrize(('legs', 'gait', 'same'), [
@@ -130,7 +130,7 @@ def test_simulation_and_orbit_agree_on_six_legs(gait):
     orbit = solve_preset(preset)
     network = preset.network
     run = simulate(network, orbit, 3.0 * orbit.period, network.step,
-                   lock=(stability(orbit).chosen, orbit.symmetry))
+                   lock=(stability(orbit).args, orbit.symmetry))
     assert np.abs(run.x[:, :12] - orbit(run.t)).max() < 1e-6
 
 

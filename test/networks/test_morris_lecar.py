@@ -18,11 +18,11 @@ from dataclasses import replace
 from itertools import pairwise
 import math
 
-from cpg_ros.integration.jit import exp
-from cpg_ros.integration.machine_code import OPTIONS
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.dynamics.integration.compilation import exp
+from cpg_ros.dynamics.integration.machine_code import OPTIONS
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.networks.library.biped import Biped
+from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 from depth import examples
 from hypothesis import assume, given
@@ -42,7 +42,7 @@ Z4_Z2 = (2, 3, 4, 5, 6, 7, 0, 1), (1, 0, 3, 2, 5, 4, 7, 6)
 D2 = (1, 0, 3, 2), (2, 3, 0, 1), (3, 2, 1, 0)
 
 
-def share(v, middle, width):
+def fraction(v, middle, width):
     return (1 + np.tanh((v - middle) / width)) / 2
 
 
@@ -53,17 +53,17 @@ def equations(kind, values, x):
     for i in range(kind.cells):
         if kind is Quadruped:
             last, beside, across = i - 2, i + 1 - 2 * (i % 2), (i + 4) % 8
-            out[:, i] = (-3 * share(v[i], 0.2, 0.4) * (v[i] - 1) - 0.6 * (v[i] + 1.8)
+            out[:, i] = (-3 * fraction(v[i], 0.2, 0.4) * (v[i] - 1) - 0.6 * (v[i] + 1.8)
                          - 1.8 * w[i] * (v[i] + 0.8) + 1
                          + p['alpha'] * v[last] + p['gamma'] * v[beside] + p['xi'] * v[across],
-                         0.2 * np.cosh((v[i] - 0.3) / 0.4) * (share(v[i], 0.3, 0.2) - w[i])
+                         0.2 * np.cosh((v[i] - 0.3) / 0.4) * (fraction(v[i], 0.3, 0.2) - w[i])
                          + p['beta'] * w[last] + p['delta'] * w[beside] + p['eta'] * w[across])
         else:
-            out[:, i] = (-0.9 * share(v[i], 0.01, 0.15) * (v[i] - 1) - 2 * w[i] * (v[i] + 0.7)
+            out[:, i] = (-0.9 * fraction(v[i], 0.01, 0.15) * (v[i] - 1) - 2 * w[i] * (v[i] + 0.7)
                          - 0.5 * (v[i] + 0.5) + p['current']
                          - sum(p[f'w_{j + 1}{i + 1}'] * (v[i] - v[j]) for j in {*range(4)} - {i}),
                          p['phi'] * (1 + np.cosh((v[i] - 0.1) / 0.3)) / 2
-                         * (share(v[i], 0.1, 0.15) - w[i]))
+                         * (fraction(v[i], 0.1, 0.15) - w[i]))
     return out.ravel()
 
 
@@ -81,8 +81,8 @@ def numbers(network):
     return np.array(list(network.as_dict().values()))
 
 
-def close(got, want, share):
-    return np.allclose(got, want, 0.0, share * (1.0 + np.abs(want).max()))
+def close(got, want, fraction):
+    return np.allclose(got, want, 0.0, fraction * (1.0 + np.abs(want).max()))
 
 
 @KINDS
@@ -169,7 +169,7 @@ def test_batches_single_runs_and_some_of_their_rows_agree(kind, batch, monkeypat
     sets = [kind(*numbers(WALK[kind]) * rng.uniform(0.8, 1.2)) for _ in starts]
     single = [simulate(*pair, 10.0, 0.02).x for pair in zip(sets, starts, strict=True)]
     for chunk in (50_000, 10**7):
-        monkeypatch.setattr('cpg_ros.integration.simulate.CHUNK', chunk)
+        monkeypatch.setattr('cpg_ros.dynamics.integration.simulate.CHUNK', chunk)
         run, few = (simulate(sets, starts, 9.94, 0.02, every=every) for every in (1, 7))
         assert np.allclose(run.x, np.array(single)[:, :498], 0.0, 1e-12)
         assert np.array_equal([few.x, few.slopes], [run.x[:, ::7], run.slopes[:, ::7]])
@@ -184,9 +184,9 @@ def test_batches_single_runs_and_some_of_their_rows_agree(kind, batch, monkeypat
 def test_the_stand_of_the_quadruped():
     # Section 6: where an uncoupled cell rests, found on w = n(v) of this file's equations.
     def on_nullcline(v):
-        return np.repeat([v, share(v, 0.3, 0.2)], 8)
+        return np.repeat([v, fraction(v, 0.3, 0.2)], 8)
     v = brentq(lambda v: equations(Quadruped, [0.0] * 6, on_nullcline(v))[0], 0.2, 0.4, xtol=1e-15)
-    assert (v, share(v, 0.3, 0.2)) == pytest.approx((0.3096, 0.5240), abs=5e-5)
+    assert (v, fraction(v, 0.3, 0.2)) == pytest.approx((0.3096, 0.5240), abs=5e-5)
     stand, network = on_nullcline(v), Quadruped(0.0, 0.0, 0.0, 0.0)
     assert np.trace(network.jacobian(stand)) / 8 == pytest.approx(-1.2407, abs=5e-5)
     assert np.abs(simulate(network, stand, 10.0, 0.01).x - stand).max() < 1e-13

@@ -19,18 +19,19 @@ Matsuoka's trot is followed exactly from kink to kink by matrix exponentials.
 
 from dataclasses import replace
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
+from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.integration.simulate import simulate
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.oscillators import shipped
-from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks import shipped
+from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.networks.stated_gait import stated_gait
-from cpg_ros.robots.robot_file import load_robot
 from depth import examples, in_depth, spread
 from hypothesis import given
 from hypothesis import strategies as st
@@ -62,7 +63,7 @@ def test_every_gait_is_an_orbit_of_the_papers_equations_and_attracts(network, ga
     end = followed(preset.network, orbit(np.zeros(1))[0], orbit.period)
     assert np.abs(end - orbit(np.zeros(1))[0]).max() < 1e-7
     assert orbit.residual < 1e-9 and stability(orbit).flaw == ''
-    assert multipliers(orbit, stability(orbit).chosen).attracts
+    assert multipliers(orbit, stability(orbit).args).attracts
     assert multipliers(orbit).trivial == pytest.approx(1.0, abs=1e-9)
     # Cell 1 peaks at phase 0, and every cell does what its phase and wave say.
     theta = np.linspace(0.0, 1.0, 37)
@@ -100,7 +101,7 @@ def test_simulation_and_orbit_agree_and_noise_is_survived(network, gait):
     assert off(phases, orbit.phases) < 1e-3
     judged = stability(orbit)
     noisy = simulate(preset.network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=3,
-                     lock=(judged.chosen, orbit.symmetry), progress=False)
+                     lock=(judged.args, orbit.symmetry), progress=False)
     period, phases = rhythm(noisy, orbit.period, kind.cells)
     assert period == pytest.approx(orbit.period, rel=0.01)
     assert off(phases, orbit.phases) < 0.03
@@ -110,21 +111,21 @@ def test_simulation_and_orbit_agree_and_noise_is_survived(network, gait):
                          + in_depth('phase'))
 def test_every_ordered_pair_switches_within_the_two_gaits_speeds(network):
     robot = load_robot('quadruped')
-    programs = {name: plan(robot, name, preset, preset.network, 2.0)
+    plans = {name: plan(robot, name, preset, preset.network, 2.0)
                 for name, preset in PRESETS[network].items()}
-    for old in programs:
-        for new in (name for name in programs if name != old):
-            pattern = Pattern(programs[old], ramp=0.05)
+    for old in plans:
+        for new in (name for name in plans if name != old):
+            pattern = Pattern(plans[old], ramp=0.05)
             for _ in range(20):
                 pattern.advance(0.02)
-            pattern.apply(programs[new], 0.3)
-            speed = np.maximum(programs[old].speed, programs[new].speed) * (1.0 + 1e-3) + 1e-9
+            pattern.apply(plans[new], 0.3)
+            speed = np.maximum(plans[old].speed, plans[new].speed) * (1.0 + 1e-3) + 1e-9
             for _ in range(45):
                 before = pattern.position.copy()
                 pattern.advance(0.02)
                 assert (np.abs(pattern.position - before) <= 0.02 * speed).all(), (old, new)
                 assert (np.abs(pattern.velocity) <= speed).all(), (old, new)
-            wanted = programs[new].orbit.phases[:4]
+            wanted = plans[new].orbit.phases[:4]
             assert off(np.array(pattern.phases), wanted) < 0.01, (old, new)
 
 
@@ -286,13 +287,13 @@ def test_a_simulation_over_kinks_is_of_second_order():
 
 @pytest.mark.deep  # the papers' reproduction has the same
 @pytest.mark.parametrize('share', [0.5, 1.0, 2.0])
-def test_two_neurons_obey_matsuokas_laws(share):
+def test_two_neurons_obey_matsuokas_laws(fraction):
     """Scale with c, speed with the time constants, oscillate for 1 + tau/tau_v < a < 1 + beta."""
     network = alone('matsuoka', 'trot')
     known, scaled = (solve_orbit(one, 'trot') for one in (
-        network, replace(network, c=share, tau=0.15 * share, tau_v=0.6 * share)))
-    assert scaled.period == pytest.approx(share * known.period, rel=1e-9)
-    assert scaled.peak == pytest.approx(share * known.peak, rel=1e-9)
+        network, replace(network, c=fraction, tau=0.15 * fraction, tau_v=0.6 * fraction)))
+    assert scaled.period == pytest.approx(fraction * known.period, rel=1e-9)
+    assert scaled.peak == pytest.approx(fraction * known.peak, rel=1e-9)
     for a in (1.25 - 0.01, 3.5 + 0.01):
         with pytest.raises(NoOrbit):
             solve_orbit(replace(network, a=a), 'trot')

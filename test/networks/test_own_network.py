@@ -26,8 +26,10 @@ from fractions import Fraction
 from pathlib import Path
 
 from cpg_ros import solve_orbit
-from cpg_ros.dynamics.orbit import NoOrbit, solve_preset
-from cpg_ros.networks.network import known, Network, Preset, Range
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.networks.definition import Range
+from cpg_ros.networks.network import known, Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
 import pytest
@@ -183,7 +185,7 @@ HARMONIC = np.linspace(0.0, 1.0, 33)
 @pytest.mark.parametrize(('gait', 'k'), [('walk', -0.5), ('walk', 0.3), ('hop', 0.4)])
 def test_its_orbit_and_multipliers_are_the_exact_ones(gait, k):
     from cpg_ros.dynamics.floquet import multipliers
-    from cpg_ros.dynamics.orbit import solve_orbit
+    from cpg_ros.dynamics.solve_orbit import solve_orbit
     network = replace(WALK, k=k)
     square = network.mu + (k if gait == 'hop' else -k)
     orbit = solve_orbit(network, gait)
@@ -209,9 +211,9 @@ def test_its_orbit_and_multipliers_are_the_exact_ones(gait, k):
 
 def test_its_hopf_point_and_branch_are_the_exact_ones():
     from cpg_ros.dynamics.continuation import continue_orbit
-    from cpg_ros.dynamics.hopf_search import hopf_points
-    from cpg_ros.dynamics.orbit import solve_orbit
-    from cpg_ros.networks.parameter_line import ParameterLine
+    from cpg_ros.dynamics.hopf import hopf_points
+    from cpg_ros.dynamics.solve_orbit import solve_orbit
+    from cpg_ros.networks.network import ParameterLine
     line = ParameterLine.parse('mu', TwoLegs)
     points = {point.gait: point for point in hopf_points(WALK, line, -1.0, 3.0)}
     assert points['walk'].value == pytest.approx(-0.5, abs=1e-10)
@@ -237,9 +239,9 @@ def late_pace(network):
 
 def test_with_a_delay_its_orbit_is_the_exact_one():
     from cpg_ros.dynamics.floquet import multipliers
-    from cpg_ros.dynamics.hopf_point import first_hopf
-    from cpg_ros.dynamics.orbit import solve_orbit
-    from cpg_ros.integration.simulate import simulate
+    from cpg_ros.dynamics.hopf import first_hopf
+    from cpg_ros.dynamics.integration.simulate import simulate
+    from cpg_ros.dynamics.solve_orbit import solve_orbit
     network = late_network()(0.3, 6.0, -1.0, 0.1)
     pace, square = late_pace(network)
     point = first_hopf(replace(network, mu=-0.5), 'walk')

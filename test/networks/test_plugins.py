@@ -21,14 +21,14 @@ import shutil
 import subprocess
 import sys
 
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import fit_recording
+from cpg_ros.analysis.objectives import search_space
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.fitting.inversion.parameter_files import write_fitted
+from cpg_ros.fitting.inversion.recording_fit import fit_recording
+from cpg_ros.fitting.recordings.csv_reader import read_csv
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRESETS, SHIPPED
-from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
-from cpg_ros.search.search_space import search_space
 from depth import in_depth
 import numpy as np
 import pytest
@@ -38,7 +38,7 @@ CONFIG = Path(__file__).resolve().parents[2] / 'config'
 TWIN = '''\
 from dataclasses import dataclass
 
-from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.library.delayed import PRESETS, Delayed
 from cpg_ros.networks.network import Preset
 
 
@@ -102,7 +102,8 @@ def test_a_file_is_a_network_and_then_has_a_name(twin):
 
 def test_presets_stand_beside_the_file(tmp_path):
     (path := tmp_path / 'ring.py').write_text(
-        'from dataclasses import dataclass\nfrom cpg_ros.networks.quadruped import Quadruped\n'
+        'from dataclasses import dataclass\n'
+        'from cpg_ros.networks.library.quadruped import Quadruped\n'
         "@dataclass(frozen=True)\nclass Ring(Quadruped):\n    name = 'ring'\n")
     with pytest.raises(NetworkError, match=r'ring\.py: PresetError: .*No such file'):
         find_network(str(path))
@@ -207,7 +208,7 @@ def test_a_fit_names_the_file(tmp_path, twin):
 
 
 def analysed(network, **environment):
-    run = subprocess.run([sys.executable, '-P', '-m', 'cpg_ros.tools.analyze', '--network',
+    run = subprocess.run([sys.executable, '-P', '-m', 'cpg_ros.analysis.analyze', '--network',
                           network, '--json'], capture_output=True, text=True,
                          env={**os.environ, **environment})
     return run.returncode, run.stderr, json.loads(run.stdout) if run.stdout else None

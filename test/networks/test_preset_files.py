@@ -18,9 +18,9 @@ from dataclasses import replace
 import os
 from pathlib import Path
 
-from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.network import Preset
-from cpg_ros.networks.preset_files import PresetError, read_presets, write_presets
+from cpg_ros.networks.presets import PresetError, read_presets, write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from depth import examples
 from hypothesis import given

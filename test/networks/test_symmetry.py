@@ -18,8 +18,16 @@ from fractions import Fraction
 from itertools import chain, combinations, product
 from math import gcd
 
-from cpg_ros.networks.hk_theorem import admissible_pairs, label, subgroups, symmetries
-from cpg_ros.networks.symmetry import D2, Group, Symmetry, Z4_Z2
+from cpg_ros.networks.symmetry import (
+    admissible_pairs,
+    D2,
+    Group,
+    label,
+    subgroups,
+    symmetries,
+    Symmetry,
+    Z4_Z2,
+)
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st

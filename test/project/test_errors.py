@@ -16,11 +16,12 @@
 
 import inspect
 
-from cpg_ros.errors import CpgError
+from cpg_ros.analysis import analyze
+from cpg_ros.common.errors import CpgError
+from cpg_ros.fitting.inversion import inversion
 from cpg_ros.motion import plan as planning
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.tools import analyze, inversion
 from modules import modules
 import pytest
 

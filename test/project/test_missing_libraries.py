@@ -32,7 +32,8 @@ def run(missing, text):
 
 
 @pytest.mark.parametrize(('missing', 'module'), [
-    ('rosbags', 'cpg_ros.tools.inversion'), ('websockets', 'cpg_ros.panel.panel_node')])
+    ('rosbags', 'cpg_ros.fitting.inversion.inversion'),
+    ('websockets', 'cpg_ros.ros.panel.panel_node')])
 def test_one_line_says_how_to_get_it(missing, module):
     found = run(missing, f'import {module}')
     assert found.returncode == 1 and not found.stdout
@@ -44,7 +45,7 @@ def test_one_line_says_how_to_get_it(missing, module):
     ('numba', 'analyze'), ('numba', 'robot_sim'), ('numba', 'tune'), ('rosbags', 'inversion')])
 def test_an_executable_without_a_library_ends_in_one_line_with_its_name(missing, executable):
     found = run(missing, f"""
-from cpg_ros.tools.executables import start
+from cpg_ros.ros.cli.executables import start
 sys.exit(start({executable!r}))""")
     assert found.returncode == 2 and not found.stdout
     (line,) = found.stderr.splitlines()
@@ -52,9 +53,9 @@ sys.exit(start({executable!r}))""")
 
 
 @pytest.mark.parametrize(('missing', 'module'), [
-    ('numba', 'cpg_ros'), ('numba', 'cpg_ros.nodes.generator'),
-    ('rosbags', 'cpg_ros.nodes.generator'), ('matplotlib', 'cpg_ros.nodes.generator'),
-    ('mujoco', 'cpg_ros.nodes.generator'), ('pymoo', 'cpg_ros.nodes.generator')])
+    ('numba', 'cpg_ros'), ('numba', 'cpg_ros.ros.generator'),
+    ('rosbags', 'cpg_ros.ros.generator'), ('matplotlib', 'cpg_ros.ros.generator'),
+    ('mujoco', 'cpg_ros.ros.generator'), ('pymoo', 'cpg_ros.ros.generator')])
 def test_what_does_without_it(missing, module):
     found = run(missing, f'import {module}')
     assert found.returncode == 0, found.stderr
@@ -63,7 +64,7 @@ def test_what_does_without_it(missing, module):
 def test_other_errors_are_shown_as_ever():
     found = run('rosbags', """
 try:
-    import cpg_ros.tools.inversion
+    import cpg_ros.fitting.inversion.inversion
 except ImportError:
     1 / 0""")
     assert found.returncode == 1 and 'ZeroDivisionError' in found.stderr
@@ -77,7 +78,7 @@ def test_bags_are_read_by_ros_where_rosbags_is_missing(compression, tmp_path):
     found = run('nothing', f"""
 sys.path.insert(0, {str(SUPPORT)!r})
 import rosbag2_stand_in
-from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.fitting.recordings.bag_reader import read_bag
 print(*read_bag({str(bag)!r}, progress=False).positions.ravel().tolist())""")
     assert found.returncode == 0, found.stderr
     assert np.array_equal(np.array(found.stdout.split(), float).reshape(angles.shape), angles)
@@ -89,7 +90,7 @@ def test_a_bag_that_ros_cannot_read_is_one_line(tmp_path):
     found = run('nothing', f"""
 sys.path.insert(0, {str(SUPPORT)!r})
 import rosbag2_stand_in
-from cpg_ros.tools.inversion import main
+from cpg_ros.fitting.inversion.inversion import main
 sys.exit(main(['--bag', {str(tmp_path / 'bag')!r}]))""")
     (line,) = found.stderr.splitlines()
     assert found.returncode and str(tmp_path / 'bag') in line

@@ -18,11 +18,11 @@ import json
 from pathlib import Path
 import sys
 
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.integration.stepper import Stepper
+from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import find_network
-from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline

@@ -22,7 +22,8 @@ import sys
 import cpg_ros
 import pytest
 
-ROOMS = sorted(file.parent for file in Path(cpg_ros.__file__).parent.glob('*/__init__.py'))
+PACKAGE = Path(cpg_ros.__file__).parent
+ROOMS = sorted(file.parent for file in PACKAGE.glob('*/**/__init__.py'))
 
 
 def test_the_import_loads_nothing_and_sets_the_threads_of_blas_before_numpy():
@@ -59,7 +60,8 @@ def test_another_name_is_not():
 
 @pytest.mark.parametrize('room', ROOMS, ids=lambda room: room.name)
 def test_every_room_lists_its_modules(room):
-    listed = importlib.import_module(f'cpg_ros.{room.name}').__all__
+    name = '.'.join(room.relative_to(PACKAGE).parts)
+    listed = importlib.import_module(f'cpg_ros.{name}').__all__
     folders = [one.parent for one in room.glob('*/__init__.py')]
     assert listed == sorted(file.stem for file in (*room.glob('*.py'), *folders)
                             if file.stem != '__init__')

@@ -22,8 +22,8 @@ from pathlib import Path
 import sys
 from types import ModuleType
 
-from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.generator_io import COMMAND_TOPICS
 from launch_files import of_generator, Stub
 import pytest
 from snippets import blocks, ROOT

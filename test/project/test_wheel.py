@@ -21,7 +21,7 @@ import subprocess
 import sys
 import venv
 
-from cpg_ros.tools.executables import EXECUTABLES
+from cpg_ros.ros.cli.executables import EXECUTABLES
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +62,7 @@ def test_its_commands_begin_with_cpg(installed):
 
 def test_its_commands_find_what_it_brings(installed, tmp_path):
     python = installed / 'python'
-    load = "from cpg_ros.robots.robot_file import load_robot; print(load_robot('goat').name)"
+    load = "from cpg_ros.motion.robot_file import load_robot; print(load_robot('goat').name)"
     assert run(python, '-c', load, cwd=tmp_path) == 'goat\n'
     assert 'generator' in run(installed / 'cpg', '--help', cwd=tmp_path)
     package, = installed.parent.glob('lib/python3*/site-packages/cpg_ros')

@@ -21,19 +21,18 @@ import math
 import re
 
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
-from cpg_ros.feedback.biped.gains import BipedGains
-from cpg_ros.feedback.biped.memory import WALK
-from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.tools import check_robot
+from cpg_ros.feedback.biped.gains import BipedGains, WALK
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.simulation.robot_setup import check_robot
 from depth import in_depth
 import numpy as np
 import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
-from cpg_ros.simulation.biped_description import read_biped  # noqa: E402
 from cpg_ros.simulation.biped_run import BipedRun  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, SimulationError  # noqa: E402
+from cpg_ros.simulation.robot_setup.model_reading import read_biped  # noqa: E402
 from cpg_ros.simulation.scenario import impulse, SensorNoise  # noqa: E402
 from cpg_ros.simulation.terrain import PLACE, Terrain  # noqa: E402
 
@@ -94,7 +93,7 @@ def test_it_stands_walks_and_stands_again(rounds):
     ('run', 1.0, 0.3), ('two_legged_hop', 0.0, 0.25), *in_depth(('run', 0.5, 0.3))])
 def test_it_runs_and_hops_off_the_ground(name, gait, speed, flight):
     run = runner(name)
-    feedback = BipedFeedback(run.robot, program=gait_plan(run.robot, gait))
+    feedback = BipedFeedback(run.robot, plan=gait_plan(run.robot, gait))
     found = run.run(10.0, ((1.0, speed, 0.0, 0.0),), feedback=feedback, seed=13)
     assert math.isinf(found.fell) and not feedback.faults
     assert found.speed[0] == pytest.approx(speed, abs=0.03)
@@ -110,7 +109,7 @@ def test_it_changes_between_walk_run_hop_and_stand():
                 (26.0, *STOP), (30.0, 0.2, 0.0, 0.0))
     found = run.run(34.0, commands, feedback=feedback, seed=14, gaits=gaits)
     assert math.isinf(found.fell) and found.tilt < 0.25 and not feedback.faults
-    assert feedback.program.gait == 'walk' and feedback.mode == WALK and not feedback.changing
+    assert feedback.plan.gait == 'walk' and feedback.mode == WALK and not feedback.changing
     time, x = found.path[:, 0], found.path[:, 1]
     # It stands still before the hop, and after the run that was told to stand.
     for begin, end in ((14.5, 15.0), (29.5, 30.0)):
@@ -125,7 +124,7 @@ def test_it_changes_between_walk_run_hop_and_stand():
 def test_a_fast_run_slows_down_before_it_becomes_a_walk(name, wish, gait):
     # Turned into a walk at 1 m/s, it fell 14 times of 16.
     run = runner(name)
-    feedback = BipedFeedback(run.robot, program=gait_plan(run.robot, 'run'))
+    feedback = BipedFeedback(run.robot, plan=gait_plan(run.robot, 'run'))
     found = run.run(14.0, ((1.0, 1.0, 0.0, 0.0), (8.3, *wish)), feedback=feedback, seed=21,
                     gaits=((8.3, gait),))
     assert math.isinf(found.fell) and found.tilt < 0.3

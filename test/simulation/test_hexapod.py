@@ -20,23 +20,21 @@ import math
 from pathlib import Path
 import re
 
-from cpg_ros.checks.description_match import checked
-from cpg_ros.checks.robot_template import robot_from
-from cpg_ros.feedback.froude_scaling import robot_gains
+from cpg_ros.feedback.gains import robot_gains
+from cpg_ros.motion.description import load_urdf
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import load_robot, read_robot, write_robot
 from cpg_ros.networks.registry import find_network
-from cpg_ros.robots.robot_file import load_robot, read_robot, write_robot
-from cpg_ros.robots.urdf import load_urdf
-from cpg_ros.tools.check_robot import main
+from cpg_ros.simulation.robot_setup.check_robot import main, robot_from
+from cpg_ros.simulation.robot_setup.description_match import checked
 import numpy as np
 import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
-from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: E402
-from cpg_ros.simulation.model_indices import Anatomy  # noqa: E402
+from cpg_ros.simulation.body import Anatomy, Body  # noqa: E402
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, legs  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
@@ -47,7 +45,7 @@ LENGTH = 2 * (0.165 + 0.035)
 
 
 @cache
-def program(gait):
+def gait_plan(gait):
     preset = find_network('delayed6').presets()[gait]
     return plan(HEXAPOD, gait, preset, preset.network, HEXAPOD.motion(gait, gait).frequency)
 
@@ -67,20 +65,20 @@ def walked(pattern, body, time, standing=None):
     ('tripod', 4.0, (0.5, 0.7)), ('ripple', 3.0, (0.6, 0.8)), ('wave', 1.5, (0.75, 0.9))])
 def test_it_walks_for_ten_seconds(gait, lengths, duty):
     body, standing = Body('hexapod', HEXAPOD), []
-    walked(Pattern(program(gait)), body, 10.0, standing)
+    walked(Pattern(gait_plan(gait)), body, 10.0, standing)
     assert body.base[0] >= lengths * LENGTH
     assert abs(math.degrees(body.yaw)) <= 15.0
-    share = np.mean(standing[len(standing) // 2:], axis=0)
-    assert duty[0] <= share.mean() <= duty[1]
+    fraction = np.mean(standing[len(standing) // 2:], axis=0)
+    assert duty[0] <= fraction.mean() <= duty[1]
 
 
 def test_legs_of_the_physics_set_down_in_the_order_of_the_gait():
     body, standing = Body('hexapod', HEXAPOD), []
-    pattern = Pattern(program('wave'))
+    pattern = Pattern(gait_plan('wave'))
     walked(pattern, body, 4.0)
     walked(pattern, body, 6.0, standing)
     stood = np.array(standing, dtype=float)
-    turn = np.exp(-2j * np.pi * program('wave').frequency * DT * np.arange(len(stood)))
+    turn = np.exp(-2j * np.pi * gait_plan('wave').frequency * DT * np.arange(len(stood)))
     phases = dict(zip(legs(HEXAPOD), np.angle(turn @ stood) / (2.0 * np.pi), strict=True))
     # From hind to fore on each side, a sixth of a stride apart, and then the other side.
     for before, after in (('lh', 'lm'), ('lm', 'lf'), ('lf', 'rh'), ('rh', 'rm'), ('rm', 'rf')):
@@ -91,11 +89,11 @@ def test_legs_of_the_physics_set_down_in_the_order_of_the_gait():
 @pytest.mark.parametrize('tour', [
     ('tripod', 'wave', 'ripple', 'tripod'), ('ripple', 'wave', 'tripod', 'ripple')])
 def test_it_goes_from_gait_to_gait(tour):
-    body, pattern = Body('hexapod', HEXAPOD), Pattern(program(tour[0]))
+    body, pattern = Body('hexapod', HEXAPOD), Pattern(gait_plan(tour[0]))
     walked(pattern, body, 3.0)
     for before, gait in pairwise(tour):
-        pattern.apply(program(gait), 1.0)
-        fastest = np.maximum(program(before).speed, program(gait).speed)
+        pattern.apply(gait_plan(gait), 1.0)
+        fastest = np.maximum(gait_plan(before).speed, gait_plan(gait).speed)
         for _ in range(round(3.0 / DT)):
             walked(pattern, body, DT)
             assert (np.abs(pattern.velocity) <= 1.02 * fastest + 0.05).all()
@@ -172,7 +170,7 @@ def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, caps
 @pytest.mark.parametrize('gait', ['tripod', 'ripple'])
 def test_its_velocity_is_estimated_by_legs_that_reach_to_the_side(gait):
     """And with all laws on it keeps walking."""
-    loop = ClosedLoop('hexapod', program(gait))
+    loop = ClosedLoopBatch('hexapod', gait_plan(gait))
     ran = loop.run([Scenario(speed=speed) for speed in (0.1, 0.2)], 8.0, robot_gains(HEXAPOD))
     late = round(2.0 / DT)
     true, found = (one[:, late:, 0].mean(axis=1) for one in (ran.velocity, ran.estimated))

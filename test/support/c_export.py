@@ -20,14 +20,14 @@ from pathlib import Path
 import shutil
 import subprocess
 
-from cpg_ros.errors import CpgError
-from cpg_ros.export.c_project import CProject
-from cpg_ros.export.fixed_point import FixedData, FixedProject
-from cpg_ros.export.gait_data import CFormat, GaitData
+from cpg_ros.common.errors import CpgError
+from cpg_ros.motion.export.c_project import CProject
+from cpg_ros.motion.export.fixed_point import FixedData, FixedProject
+from cpg_ros.motion.export.gait_data import CFormat, GaitData
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot import Joint, Robot
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import find_network
-from cpg_ros.robots.robot import Joint, Robot
-from cpg_ros.robots.robot_file import load_robot
 import pytest
 
 GCC = shutil.which('gcc')
@@ -91,9 +91,9 @@ def compiled(folder, data, golden=None, shim='', options=STRICT, substep=0.001):
     return folder / 'test_cpg'
 
 
-def output(program, *arguments):
+def output(plan, *arguments):
     """Run a program; return what it prints."""
-    done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True,
+    done = subprocess.run([plan, *map(str, arguments)], capture_output=True, text=True,
                           timeout=300)
     assert done.returncode == 0, done.stdout + done.stderr[:2000]
     return done.stdout

@@ -36,8 +36,8 @@ def register() -> None:
 
 def examples(most: int, **options) -> settings:
     """Return settings with that many examples in depth, and the profile's share of them else."""
-    share = round(most * settings.default.max_examples / 100)
-    return settings(max_examples=max(share, min(FEWEST, most)), **options)
+    fraction = round(most * settings.default.max_examples / 100)
+    return settings(max_examples=max(fraction, min(FEWEST, most)), **options)
 
 
 def spread(cases, every: int = 3):

@@ -18,16 +18,16 @@ from dataclasses import dataclass
 import re
 from unittest import mock
 
-from cpg_ros.feedback.input_monitor import LATE
+from cpg_ros.feedback.input_checks import LATE
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.strides import Drive
-from cpg_ros.nodes import sensor_input
-from cpg_ros.nodes.feedback_loop import FeedbackLoop
-from cpg_ros.nodes.sensor_input import SensorInput
+from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.ros.feedback import sensor_input
+from cpg_ros.ros.feedback.loop import FeedbackLoop
+from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.scenario import SensorNoise
+from cpg_ros.simulation.sensors import InertialUnit
 from go2 import DT, GO2, program
 import numpy as np
 from sensor_faults import BEGINS, FaultySensors, Measured, Wire
@@ -45,14 +45,14 @@ class FaultOutcome:
     Attributes:
         fell: whether the body fell.
         crossed: commands beyond a limit of position, or of speed between two ticks.
-        shares: of the feedback, tick by tick.
+        fractions: of the feedback, tick by tick.
         faults: what was named as the reason why there is no feedback, in the order of appearance.
 
     """
 
     fell: bool
     crossed: int
-    shares: np.ndarray
+    fractions: np.ndarray
     faults: list[str]
 
 
@@ -67,7 +67,7 @@ class FaultyGo2:
         self.body = Body('go2', GO2)
         self._unit = InertialUnit(self.body, DT, SensorNoise(
             gyroscope_noise=0.02, accelerometer_noise=0.2, orientation_bias=0.008, seed=seed))
-        self.pattern = Pattern(self.gait, 1.0, False, Drive(4))
+        self.pattern = Pattern(self.gait, 1.0, False, StrideCommand(4))
         geometry = geometry_of(GO2)
         with mock.patch.object(sensor_input, 'PolledSubscription', Wire):
             inputs = SensorInput(None, GO2, geometry, 'imu', 'measured', 'foot_contacts',
@@ -114,13 +114,13 @@ class FaultyGo2:
 
     def run(self, seconds: float) -> FaultOutcome:
         """Walk on for some seconds, or until it has fallen."""
-        shares, faults = [], []
+        fractions, faults = [], []
         for _ in range(round(seconds / DT)):
             self.tick()
-            shares.append(self.loop.share)
+            fractions.append(self.loop.fraction)
             fault = FIGURES.sub('', self.loop.faults)
             if fault and fault not in faults:
                 faults.append(fault)
             if self.body.fallen:
                 break
-        return FaultOutcome(bool(self.body.fallen), self.crossed, np.array(shares), faults)
+        return FaultOutcome(bool(self.body.fallen), self.crossed, np.array(fractions), faults)

@@ -16,7 +16,7 @@
 
 from pathlib import Path
 
-from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.motion.robot_file import read_robot
 
 ROBOT = read_robot(Path(__file__).parents[1] / 'data' / 'walker.yaml')
 

@@ -17,12 +17,12 @@
 from dataclasses import replace
 from functools import cache
 
-from cpg_ros.errors import CpgError
+from cpg_ros.common.errors import CpgError
+from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import find_network
-from cpg_ros.recordings.recording import Recording
-from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 
 #: Samples a second, how long is recorded (s), and strides a second where no file says.

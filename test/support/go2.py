@@ -19,8 +19,8 @@ from pathlib import Path
 
 from cpg_ros.feedback.kinematics import joints_of, move_foot, slopes_of
 from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import read_robot
 import numpy as np
 
 FILE = Path(__file__).parents[2] / 'config' / 'unitree_go2.yaml'

@@ -17,16 +17,15 @@
 from collections import deque
 from functools import cache
 
-from cpg_ros.feedback.biped.balance import BalancedPattern
-from cpg_ros.feedback.biped.feedback import gait_plan
+from cpg_ros.feedback.biped.feedback import BalancedPattern, gait_plan
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.nodes import sensor_input
-from cpg_ros.nodes.balance_loop import BalanceLoop
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.feedback import sensor_input
+from cpg_ros.ros.feedback.loop import BalanceLoop
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
 from cpg_ros.simulation.scenario import SensorNoise
+from cpg_ros.simulation.sensors import InertialUnit
 from cpg_ros.simulation.terrain import set_friction
 import numpy as np
 from sensor_faults import FaultySensors, Measured, Wire

@@ -16,7 +16,7 @@
 
 from dataclasses import dataclass
 
-from cpg_ros.networks.network import Range
+from cpg_ros.networks.definition import Range
 from two_rhythms import OTHER, TwoRhythms
 
 

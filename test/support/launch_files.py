@@ -20,10 +20,10 @@ import sys
 from types import ModuleType, SimpleNamespace
 
 from ament_index_python.packages import get_package_share_directory
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.nodes.feedback_parameters import ENABLED, SWITCH
-from cpg_ros.nodes.generator_parameters import Planner, specs
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.ros.feedback.switch import ENABLED, SWITCH
+from cpg_ros.ros.generator_parameters import Planner, specs
 
 SOURCE = Path(__file__).resolve().parents[2]
 SHARE = Path(get_package_share_directory('cpg_ros'))
@@ -75,7 +75,7 @@ def describing(monkeypatch):
         module = ModuleType(name)
         vars(module).update(kinds)
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.delitem(sys.modules, 'cpg_ros.nodes.launch_arguments', raising=False)
+    monkeypatch.delitem(sys.modules, 'cpg_ros.ros.launch_arguments', raising=False)
 
     def run(name, **given):
         space = {'__file__': str(SOURCE / 'launch' / f'{name}.launch.py')}
@@ -107,7 +107,7 @@ def describing(monkeypatch):
         described.context = context
         return described
     yield run
-    sys.modules.pop('cpg_ros.nodes.launch_arguments', None)
+    sys.modules.pop('cpg_ros.ros.launch_arguments', None)
 
 
 def parameters(described, node):

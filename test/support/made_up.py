@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout
-from cpg_ros.robots.robot import HARMONICS
+from cpg_ros.motion.robot import HARMONICS
 import numpy as np
 
 

@@ -17,7 +17,7 @@
 from dataclasses import dataclass
 from functools import cache
 
-from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 import numpy as np
 
@@ -65,9 +65,9 @@ def stamps(rng, duration, rate, jitter=0.2, dropouts=0.01):
     return t - t[0]
 
 
-def noisy(rng, x, share=0.02):
+def noisy(rng, x, fraction=0.02):
     """Add noise of a share of each joint's range."""
-    return x + share * np.ptp(x, axis=0) * rng.standard_normal(x.shape)
+    return x + fraction * np.ptp(x, axis=0) * rng.standard_normal(x.shape)
 
 
 @cache

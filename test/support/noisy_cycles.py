@@ -14,7 +14,7 @@
 
 """Mean cycles made of known parameters, to be fitted."""
 
-from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.networks.registry import PRESETS
 from made_up import record, weights_of
 import numpy as np

@@ -48,7 +48,8 @@ def matrix(network):
 def logistic(network):
     """The equations of Righetti & Ijspeert 2008 without feedback."""
     k = matrix(network)
-    stance, swing = (np.pi * network.nu / share for share in (network.duty, 1.0 - network.duty))
+    stance, swing = (np.pi * network.nu / fraction for fraction in (network.duty,
+                                                                    1.0 - network.duty))
 
     def rates(t, state):
         x, y = state.reshape(2, -1)

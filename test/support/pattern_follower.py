@@ -14,11 +14,11 @@
 
 """A body that follows a pattern, tick by tick, as a robot follows the generator, and feels."""
 
-from cpg_ros.errors import CpgError
+from cpg_ros.common.errors import CpgError
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.proprioception import fill_sensor_data
+from cpg_ros.simulation.sensors import fill_sensor_data
 import numpy as np
 
 

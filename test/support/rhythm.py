@@ -16,8 +16,7 @@
 
 from dataclasses import dataclass
 
-from cpg_ros.networks.hk_theorem import symmetries
-from cpg_ros.networks.symmetry import D2, Group, Symmetry, Z4_Z2
+from cpg_ros.networks.symmetry import D2, Group, symmetries, Symmetry, Z4_Z2
 from hypothesis import strategies as st
 import numpy as np
 

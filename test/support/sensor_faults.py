@@ -90,9 +90,9 @@ class Fault:
     stall: float = 0.0
 
 
-def _all(value: float, share: float = 1.0) -> Change:
+def _all(value: float, fraction: float = 1.0) -> Change:
     def change(now: Measured, _: Measured, rng: np.random.Generator) -> Measured:
-        if rng.random() >= share:
+        if rng.random() >= fraction:
             return now
         return Measured(np.full(10, value), now.names, *(
             np.full(one.size, value) for one in (now.positions, now.velocities, now.efforts,

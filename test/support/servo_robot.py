@@ -20,8 +20,8 @@ import socket
 import threading
 import time
 
-from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.safety.tick_monitor import TickMonitor
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.bridges.watchdog_link import TickMonitor
 from graph import EXECUTABLE, Process
 import numpy as np
 import rclpy

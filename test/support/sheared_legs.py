@@ -22,8 +22,9 @@ the other leg heard a delay ago or at once. On the walk ``z = r exp(i pace t)`` 
 
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.orbit import solve_from_path
-from cpg_ros.networks.network import Preset, Range
+from cpg_ros.dynamics.solve_orbit import solve_from_path
+from cpg_ros.networks.definition import Range
+from cpg_ros.networks.network import Preset
 import numpy as np
 from scipy.optimize import brentq
 from two_sided import OTHER, TwoSided

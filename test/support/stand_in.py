@@ -14,7 +14,7 @@
 
 """A Unitree Go2 for tests: LowState out, LowCmd in, joints and body in MuJoCo.
 
-Written apart from cpg_ros.unitree: bytes by struct, the check sum by a table.
+Written apart from cpg_ros.ros: bytes by struct, the check sum by a table.
 """
 
 import json
@@ -23,7 +23,7 @@ import struct
 import threading
 import time
 
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.simulation.body import Body
 import numpy as np
 import rclpy

@@ -23,9 +23,9 @@ import threading
 import time
 from unittest import mock
 
-from cpg_ros.errors import CpgError
-from cpg_ros.nodes.generator import Generator
-from cpg_ros.nodes.log_queue import QUEUE, ROSOUT
+from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.generator import Generator
+from cpg_ros.ros.node.logging import QUEUE, ROSOUT
 from graph import free_domain, OCCUPIED, PATIENCE, until, Watcher
 from rcl_interfaces.msg import Log
 import rclpy

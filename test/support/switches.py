@@ -43,7 +43,7 @@ def by_leg(watcher, robot, table):
     return table[:, [watcher.names.index(joint.name) for joint in robot.joints]]
 
 
-def check_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
+def check_switches(watcher, robot, plans, phases, lasting, slack=1e-5):
     """Switch between ordered pairs of gaits and hold every message against their orbits.
 
     Between all of them in depth, and between a third of them before a commit.
@@ -51,14 +51,14 @@ def check_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
     Args:
         watcher: of a generator at 200 Hz.
         robot: that it moves.
-        programs: gait -> its program at the generator's settings.
+        plans: gait -> its program at the generator's settings.
         phases: gait -> those of the legs, where its symmetry says them.
         lasting: seconds that a switch takes at most, and a little more.
         slack: that joints may leave the gaits' spans by, rad.
 
     """
-    offset, way = robot.column('offset'), tour(list(programs))
-    assert len(set(pairwise(way))) == len(way) - 1 == len(programs) * (len(programs) - 1)
+    offset, way = robot.column('offset'), tour(list(plans))
+    assert len(set(pairwise(way))) == len(way) - 1 == len(plans) * (len(plans) - 1)
     way = way if in_full() else way[:len(way) // 3 + 1]
     assert watcher.set(gait=way[0])[0].successful
     watcher.record(lasting)
@@ -70,13 +70,13 @@ def check_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
                                zip(*watcher.samples[first:], strict=True))
         positions = by_leg(watcher, robot, positions)
         assert off_grid(times, 0.005) < 1e-3
-        speed = np.maximum(programs[old].speed, programs[new].speed)
+        speed = np.maximum(plans[old].speed, plans[new].speed)
         steps = np.abs(np.diff(positions, axis=0))
         # A period that a busy machine leaves out gives the step more time.
         periods = np.maximum(np.round(np.diff(times) / 0.005), 1.0)[:, None]
         assert (steps <= 0.005 * periods * speed * 1.001 + 1e-9).all(), (old, new)
-        low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
-        high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
+        low = np.minimum(plans[old].span[0], plans[new].span[0]) + offset
+        high = np.maximum(plans[old].span[1], plans[new].span[1]) + offset
         assert (positions >= low - slack).all() and (positions <= high + slack).all(), (old, new)
         if new in phases:
             assert off(watcher.next_phases(20), phases[new]) < 0.02, (old, new)

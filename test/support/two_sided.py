@@ -16,7 +16,8 @@
 
 from fractions import Fraction
 
-from cpg_ros.networks.network import known, Network, Preset, Range
+from cpg_ros.networks.definition import Range
+from cpg_ros.networks.network import known, Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry
 
 OTHER = (1, 0)

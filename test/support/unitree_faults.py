@@ -25,7 +25,7 @@ import subprocess
 import sys
 import time
 
-from cpg_ros.safety.tick_monitor import TickMonitor
+from cpg_ros.ros.bridges.watchdog_link import TickMonitor
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile

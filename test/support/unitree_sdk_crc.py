@@ -30,7 +30,7 @@ folder, count = Path(sys.argv[1]), int(sys.argv[2])
 sys.path.insert(0, str(folder / 'unitree_sdk2_python'))
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
-from cpg_ros.unitree.low_cmd import LowCmd  # noqa: E402
+from cpg_ros.ros.bridges.unitree.messages import LowCmd  # noqa: E402
 import numpy as np  # noqa: E402
 from unitree_sdk2py.idl.unitree_go.msg.dds_ import LowCmd_  # noqa: E402
 from unitree_sdk2py.utils.crc import CRC  # noqa: E402

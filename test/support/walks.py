@@ -17,7 +17,7 @@
 import csv
 
 from bags import joint_state, START, write_bag
-from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.registry import PRESETS
 import numpy as np
 

@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Periodic orbits as trigonometric polynomials: for networks with a delay."""
+"""Periodic orbits as trigonometric polynomials, for networks with a delay."""
 
-__all__ = ['adjoint', 'collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve',
-           'variational']
+__all__ = ['floquet', 'orbit', 'solve']

@@ -12,14 +12,86 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Orbits as trigonometric polynomials: the gaits of networks with a delay."""
+"""Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
 
+On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
+all cells collapse to a periodic problem for one cell of each: with theta = t / T in cycles,
+``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for what a cell hears,
+solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
-from cpg_ros.dynamics.fourier import collocation
-from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.orbit import deflation_factor, Orbit
+from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
+# Trigonometric collocation on one period: n odd, nodes theta_m = m / n, theta in cycles.
+
+def _waves(n: int) -> np.ndarray:
+    """Return the factors by which d/dtheta multiplies the harmonics, shape ((n + 1) / 2,)."""
+    return 2j * np.pi * np.arange((n + 1) // 2)
+
+
+@lru_cache(maxsize=16)
+def _circulant(n: int) -> np.ndarray:
+    """Which entry of a column each entry of its circulant matrix is, shape (n, n)."""
+    return (np.arange(n)[:, None] - np.arange(n)) % n
+
+
+@lru_cache(maxsize=16)
+def derivative_matrix(n: int) -> np.ndarray:
+    """Matrix of d/dtheta on nodal values, shape (n, n)."""
+    return np.fft.irfft(_waves(n), n)[_circulant(n)]
+
+
+@lru_cache(maxsize=16)
+def shift_matrix(n: int, shift: float) -> np.ndarray:
+    """Matrix that takes nodal values of u to those of u(theta + shift), shape (n, n)."""
+    return np.fft.irfft(np.exp(_waves(n) * shift), n)[_circulant(n)]
+
+
+def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
+             shifts: np.ndarray | None = None) -> np.ndarray:
+    """Evaluate the interpolant, or its derivative of the given order in theta.
+
+    Args:
+        values: nodal values, shape (n,).
+        theta: where, in cycles, any shape.
+        order: 0 for the value, 1 and 2 for derivatives.
+        shifts: phases to add in turn, in cycles, shape (m,), or none.
+
+    Returns:
+        An array of shape theta.shape, or theta.shape + (m,) with shifts.
+
+    """
+    coefficients = np.fft.rfft(values) / values.size
+    coefficients[1:] *= 2.0
+    factor = 2j * np.pi * np.arange(coefficients.size)
+    coefficients *= factor**order
+    if shifts is not None:
+        coefficients = coefficients[:, None] * np.exp(np.outer(factor, shifts))
+    waves = np.exp(np.multiply.outer(np.asarray(theta, dtype=float), factor))
+    return (waves @ coefficients).real
+
+
+def tail(values: np.ndarray) -> float:
+    """Largest of the last six harmonics over the largest of all: how well it is resolved."""
+    size = np.abs(np.fft.rfft(values))
+    return float(size[-6:].max() / (size.max() or 1.0))
+
+
+def resample(values: np.ndarray, n: int) -> np.ndarray:
+    """Nodal values on n nodes, more than there are, of the same interpolant."""
+    return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)
+
+
+# Orbits as trigonometric polynomials: the gaits of networks with a delay.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FourierOrbit(Orbit):
@@ -70,15 +142,191 @@ class FourierOrbit(Orbit):
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
         """Return a waveform, or its derivative in theta of the given order, at theta in cycles."""
-        return collocation.evaluate(self.values[wave, variable], theta, order)
+        return evaluate(self.values[wave, variable], theta, order)
 
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
         """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
-        return np.stack([collocation.evaluate(column, theta)
+        return np.stack([evaluate(column, theta)
                          for column in self.d_values[wave, variable].T], -1)
 
     def _states(self, times: np.ndarray, order: int) -> np.ndarray:
         theta = np.asarray(times, dtype=float) / self.period
         if self.values.shape[:2] == (1, 1):
-            return collocation.evaluate(self.values[0, 0], theta, order, self.phases)
+            return evaluate(self.values[0, 0], theta, order, self.phases)
         return super()._states(times, order)
+
+
+NODES = 63
+MOST_NODES = 1023
+#: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
+TOLERANCE, STEPS = 1e-12, 12
+RESOLVED = 1e-12
+#: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
+Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
+#: Below this range Newton has fallen to the rest state.
+SMALLEST = 1e-7
+
+
+@lru_cache(maxsize=64)
+def _heard(network: type[Network], symmetry: Symmetry
+           ) -> list[tuple[bool, list[tuple[int, float]]]]:
+    """For each argument: whether it is delayed, and which row each wave hears at what shift."""
+    found = []
+    for one in equations_of(network).arguments:
+        source = range(network.cells) if one.source is None else one.source
+        places = []
+        for cell in symmetry.first:
+            other = source[cell]
+            places.append((int(symmetry.waves[other]) * network.variables + one.variable,
+                           float(symmetry.phases[other] - symmetry.phases[cell])))
+        found.append((one.delayed, places))
+    return found
+
+
+def rows_of(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndarray:
+    """Pick the waveforms out of states, a row for each variable of each wave."""
+    columns = [variable * network.cells + cell for cell in symmetry.first
+               for variable in range(network.variables)]
+    return states[:, columns].T.copy()
+
+
+def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
+              ) -> tuple[np.ndarray, np.ndarray, Point]:
+    """Evaluate the equations on the nodes and the phase condition.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: waveforms on the nodes, a row for each variable of each wave, shape (rows, n).
+        period: in model time.
+
+    Returns:
+        Residual (rows n + 1,), its Jacobian in (u, T), and what ``by_parameter`` needs.
+
+    """
+    rows, n = u.shape
+    variables, tau, kind = network.variables, network.delay, equations_of(type(network))
+    waves, derive = rows // variables, derivative_matrix(n)
+    rise, heard = u @ derive.T, _heard(type(network), symmetry)
+    states, slopes, matrices = [], [], []
+    for delayed, places in heard:
+        late = tau / period if delayed else 0.0
+        matrices.append([None if shift == late == 0.0 else
+                         shift_matrix(n, shift - late) for _, shift in places])
+        moved = list(zip(places, matrices[-1], strict=True))
+        states.append(np.array([u[row] if matrix is None else matrix @ u[row]
+                                for (row, _), matrix in moved]))
+        slopes.append([matrix @ rise[row] if delayed and matrix is not None else None
+                       for (row, _), matrix in moved])
+    p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
+    rates, by_argument = kind.slopes(states, p)
+
+    residual = np.empty(rows * n + 1)
+    left = residual[:-1].reshape(waves, variables, n)
+    for v, rate in enumerate(rates):
+        left[:, v] = rise[v::variables] / period - rate
+    residual[-1] = rise[0, 0]
+
+    jacobian = np.zeros((rows * n + 1, rows * n + 1))
+    blocks = jacobian[:-1, :-1].reshape(rows, n, rows, n)
+    by_period = np.zeros((rows, n))
+    by_delay = np.zeros((rows, n))
+    for row in range(rows):
+        blocks[row, :, row] = derive / period
+        by_period[row] = -rise[row] / period**2
+    nodes, flat = np.arange(n), np.zeros((waves, n))
+    for (v, k), slope in by_argument.items():
+        slope = slope + flat
+        delayed, places = heard[k]
+        for wave, (source, _) in enumerate(places):
+            row, matrix = wave * variables + v, matrices[k][wave]
+            if matrix is None:
+                blocks[row, nodes, source, nodes] -= slope[wave]
+                continue
+            blocks[row, :, source] -= slope[wave][:, None] * matrix
+            if delayed:
+                by_shift = slope[wave] * slopes[k][wave]
+                by_period[row] -= by_shift * tau / period**2
+                by_delay[row] += by_shift / period
+    jacobian[:-1, -1] = by_period.ravel()
+    jacobian[-1, :n] = derive[0]
+    return residual, jacobian, (states, p, by_delay, rise)
+
+
+def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarray:
+    """Return the derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
+    states, p, by_delay, _ = point
+    names, kind = network.parameters(), equations_of(type(network))
+    rows, n = by_delay.shape
+    variables = network.variables
+    out, flat = np.zeros((rows * n + 1, len(names))), np.zeros((rows // variables, n))
+    blocks = out[:-1].reshape(rows, n, len(names))
+    for (v, r), slope in kind.by_parameter(states, p).items():
+        slope, row = slope + flat, kind.rows[r]
+        for wave, cell in enumerate(symmetry.first):
+            name = kind.by_cell[row][cell] if row in kind.by_cell else row
+            blocks[wave * variables + v, :, names.index(name)] -= slope[wave]
+    if network.delay_parameter:
+        blocks[..., names.index(network.delay_parameter)] += by_delay
+    return out
+
+
+def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+             residual: np.ndarray, jacobian: np.ndarray, point: Point) -> FourierOrbit:
+    """Complete a solution by its derivatives; the last three are those of the equations."""
+    derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
+    names = network.parameters()
+    # One cell of each wave has seen only those of its family's weights that end on it.
+    for family in network.families(symmetry):
+        if len(family) > 1:
+            members = [names.index(name) for name in family]
+            derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
+    shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
+    return FourierOrbit(network, symmetry, period, float(np.abs(residual[:-1]).max()),
+                        u.reshape(shape), derivatives)
+
+
+def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+           known: Sequence[float] = ()) -> FourierOrbit | None:
+    """Newton from a guess, doubling the nodes until the waveforms are resolved.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: guess at the waveforms on the nodes, shape (rows, n).
+        period: in model time.
+        known: periods of orbits to be kept off, model time.
+
+    Raises:
+        NoOrbit: they would need more nodes than there may be.
+
+    """
+    while True:
+        for _ in range(2 * STEPS if known else STEPS):
+            residual, jacobian, point = equations(network, symmetry, u, period)
+            size = float(np.abs(residual[:-1]).max())
+            if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
+                break
+            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
+            # while it solves.
+            try:
+                step = np.linalg.solve(jacobian, residual)
+            except np.linalg.LinAlgError:
+                return None
+            if known:
+                step = step * deflation_factor(period, -float(step[-1]), known)
+            u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
+            # A period that leaves the range of the delay has run away, and so has a waveform.
+            if not (1e-3 * network.delay < period < 1e3 * network.delay
+                    and np.abs(u).max() < 1e3):
+                return None
+        else:
+            return None
+        if np.ptp(u[0]) < SMALLEST:
+            return None
+        if max(tail(row) for row in u) <= RESOLVED:
+            break
+        if u.shape[1] >= MOST_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        u, known = np.array([resample(row, 2 * row.size + 1) for row in u]), ()
+    return complete(network, symmetry, u, period, residual, jacobian, point)

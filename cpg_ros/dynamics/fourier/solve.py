@@ -15,19 +15,141 @@
 """Finding the orbit of a gait of a network with a delay: from another, or from its onset."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from cpg_ros.dynamics.delay_crossings import critical_delay, frequencies
-from cpg_ros.dynamics.fourier.newton import newton, NODES, rows_of
-from cpg_ros.dynamics.fourier.orbit import FourierOrbit
-from cpg_ros.dynamics.hopf_point import first_hopf
-from cpg_ros.dynamics.periodic import check_values, NoOrbit
-from cpg_ros.dynamics.seek import find_orbit
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.characteristic import critical_delay, frequencies
+from cpg_ros.dynamics.fourier import orbit as collocation
+from cpg_ros.dynamics.fourier.orbit import (
+    by_parameter,
+    complete,
+    equations,
+    FourierOrbit,
+    MOST_NODES,
+    newton,
+    NODES,
+    RESOLVED,
+    rows_of,
+)
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.orbit import check_values
+from cpg_ros.dynamics.settling import find_orbit
 from cpg_ros.networks.equations import equations_of, values_of
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+
+# The orbits of a gait along a line of parameters as waveforms, a curve for continuation.
+
+#: States, shape (m, components), as a function of times in cycles, shape (m,).
+States = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FourierCurve(ShortRepr):
+    """Orbits by waveforms: unknowns u at n nodes of each row, T, and the value on the line.
+
+    Attributes:
+        network: any on the line.
+        symmetry: of the gait.
+        along: the line.
+        scales: of period and value.
+
+    """
+
+    network: Network
+    symmetry: Symmetry
+    along: ParameterLine
+    scales: tuple[float, float]
+
+    def _rows(self, z: np.ndarray) -> np.ndarray:
+        """Return the waveforms, a row for each variable of each wave, shape (rows, n)."""
+        return z[:-2].reshape((int(self.symmetry.waves.max()) + 1) * self.network.variables, -1)
+
+    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Mean over the cycle and the rows plus period plus value."""
+        return float(self._weights(one.size) * one @ other)
+
+    def _weights(self, size: int) -> np.ndarray:
+        weights = np.full(size, 1.0 / (size - 2))
+        weights[-2:] = np.array(self.scales)**-2.0
+        return weights
+
+    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's increment normal to the border, and the tangent."""
+        network = self.along.at(self.network, z[-1])
+        residual, jacobian, point = equations(network, self.symmetry, self._rows(z),
+                                              float(z[-2]))
+        matrix = np.zeros((z.size, z.size))
+        matrix[:-1, :-1] = jacobian
+        slopes = by_parameter(network, self.symmetry, point)
+        matrix[:-1, -1] = slopes @ self.along.direction(network)
+        matrix[-1] = self._weights(z.size) * border
+        right = np.zeros((z.size, 2))
+        right[:-1, 0], right[-1, 1] = -residual, 1.0
+        found = np.linalg.solve(matrix, right)
+        return found[:, 0], found[:, 1]
+
+    def amplitude(self, z: np.ndarray) -> float:
+        """Half the range of cell 1's first variable; of an odd one its peak."""
+        row = self._rows(z)[0]
+        return float(row[0] if self.symmetry.odd else 0.5 * np.ptp(row))
+
+    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
+                ) -> tuple['FourierCurve', np.ndarray, np.ndarray] | None:
+        """Twice the nodes where the waveforms ask for it, from cell 1's highest peak."""
+        rows = self._rows(z)
+        n = rows.shape[1]
+        fine = collocation.resample(rows[0], 4 * n)
+        start = (0.0 if fine.max() <= rows[0, 0] + 1e-9 * np.ptp(rows[0])
+                 else fine.argmax() / (4 * n))
+        more = max(collocation.tail(row) for row in rows) > RESOLVED
+        if not more and not start:
+            return None
+        if more and n >= MOST_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        nodes = 2 * n + 1 if more else n
+        theta = start + np.arange(nodes) / nodes
+        moved = [np.concatenate([*(collocation.evaluate(row, theta) for row in self._rows(part)),
+                                 part[-2:]]) for part in (z, border)]
+        return self, moved[0], moved[1]
+
+    def orbit(self, z: np.ndarray) -> FourierOrbit:
+        """Complete a solution by its derivatives and its residual."""
+        network, u, period = self.along.at(self.network, float(z[-1])), self._rows(z), float(z[-2])
+        return complete(network, self.symmetry, u, period,
+                        *equations(network, self.symmetry, u, period))
+
+
+def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]
+            ) -> tuple[FourierCurve, np.ndarray]:
+    """Return the curve of the orbits along a line, and the place of one of them on it."""
+    return (FourierCurve(orbit.network, orbit.symmetry, line, scales),
+            np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
+
+
+def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
+           scales: tuple[float, float], path: States, disturbance: States, period: float
+           ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
+    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
+
+    Args:
+        network: at the place.
+        symmetry: of the orbits.
+        line: of parameters.
+        scales: as of the curve.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which, the same.
+        period: of the orbits, model time.
+
+    """
+    theta = np.arange(NODES) / NODES
+    return (FourierCurve(network, symmetry, line, scales),
+            np.append(rows_of(network, symmetry, path(theta)), [period, line.value(network)]),
+            np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))
+
 
 #: Points of a cycle on which describing functions are worked out.
 POINTS = 32

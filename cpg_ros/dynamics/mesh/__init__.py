@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Periodic orbits as polynomials on a mesh: for networks without delay."""
+"""Periodic orbits as polynomials on a mesh, for networks without a delay."""
 
-__all__ = ['adaptation', 'adjoint', 'collocation', 'curve', 'elimination', 'floquet', 'kinks',
-           'newton', 'orbit', 'periodic_schur', 'solve', 'variational']
+__all__ = ['collocation', 'floquet', 'orbit', 'solve']

@@ -26,15 +26,175 @@ double.
 
 from collections.abc import Callable
 from functools import lru_cache
+from itertools import pairwise
 
-from cpg_ros.dynamics.isotypic_split import split
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.integration.compilation import COMPILED, jit_entry
+from cpg_ros.dynamics.isotypic import split
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.elimination import summed, transfer
-from cpg_ros.dynamics.mesh.newton import Reduced
-from cpg_ros.dynamics.mesh.orbit import MeshOrbit
-from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
+from cpg_ros.dynamics.mesh.collocation import chained, summed, transfer
+from cpg_ros.dynamics.mesh.orbit import evaluate, MeshOrbit, MOST_INTERVALS, path_of, Reduced
+from cpg_ros.dynamics.mesh.solve import kinks
+from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
+from cpg_ros.networks.equations import Field, States
 import numpy as np
 from numpy.polynomial import polynomial
+import scipy
+
+# The adjoint of the variational equation along a gait of a network without delay.
+
+#: An interval is fine enough when its polynomials end with terms of this share of the whole.
+RESOLVED = 1e-9
+#: Below this singular value a disturbance other than along the orbit does not decay, either.
+SINGULAR = 1e-9
+
+
+def adjoint(orbit: MeshOrbit) -> Waveforms:
+    """Return the adjoint's waveforms, in cycles per unit of each variable.
+
+    Raises:
+        NoOrbit: the orbit is not isolated, or more intervals would be needed than there may be.
+
+    """
+    mesh, symmetry = orbit.mesh, orbit.symmetry
+    while True:
+        coefficients, unresolved = _on_mesh(orbit, mesh)
+        if not unresolved.any():
+            break
+        if mesh.size + unresolved.sum() > 4 * MOST_INTERVALS:
+            raise NoOrbit('the phase response is too steep to be resolved')
+        middles = 0.5 * (mesh[:-1] + mesh[1:])[unresolved]
+        mesh = np.sort(np.concatenate([mesh, middles]))
+    fine = mesh
+
+    def waveform(theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
+        return evaluate(symmetry, fine, coefficients, theta, wave=wave, variable=variable)
+
+    return waveform
+
+
+def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the adjoint's polynomials, (S + 1, n, d), and which intervals do not resolve it."""
+    reduced, length = Reduced(orbit.network, orbit.symmetry), orbit.solution.length
+    lengths = length * np.diff(mesh)
+    places = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
+    states = path_of(reduced, orbit.solution)(places.ravel()).reshape(*places.shape, -1)
+    jacobians = reduced.linearised(states)[1]
+    # Backwards: the last interval first, and in each the last node.
+    back = np.ascontiguousarray(jacobians[::-1, ::-1].swapaxes(2, 3))
+    try:
+        answers = transfer(back, lengths[::-1], np.zeros((*back.shape[:3], 0)))
+        d = back.shape[-1]
+        steps = np.eye(d) + summed(back, lengths[::-1], answers)
+        whole = chained(steps)
+        # z(L) = z(0)[turn], and z along the flow 1/T.
+        start = orbit.solution.points[-1]
+        matrix = np.vstack([whole[-1, reduced.turn] - np.eye(d),
+                            orbit.period * reduced.rates(start)])
+        end, _, _, sizes = np.linalg.lstsq(matrix, np.append(np.zeros(d), 1.0), rcond=None)
+    except np.linalg.LinAlgError as error:
+        raise NoOrbit(NOT_ISOLATED) from error
+    if not sizes[-1] > SINGULAR:
+        raise NoOrbit(NOT_ISOLATED)
+    points = whole @ end
+    slopes = -np.einsum('nsij,nsjk,nk->nsi', back, answers, points[:-1])[::-1, ::-1]
+    coefficients = collocation.power_coefficients(points[::-1][:-1], slopes, lengths)
+    ends = collocation.last_share(slopes) * lengths / np.abs(points).max()
+    # One class stands for all of its cells, which share what it does.
+    alike = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
+    return coefficients / alike, ends > RESOLVED
+
+
+# Eigenvalues of a product of many matrices, each to its own size.
+
+#: Two spaces this close are one.
+SAME = 1e-13
+#: Eigenvalues of a block may differ by this factor in size: what is left to rounding then.
+ALIKE = 1e4
+#: Times that the columns go round at most.
+ROUNDS = 40
+
+
+@jit_entry
+def _round(factors, columns, whole):
+    """Take the columns through all factors; whole becomes the product of what is triangular.
+
+    Gram and Schmidt's method twice over, which loses no orthogonality.
+    """
+    d = columns.shape[0]
+    moved = np.empty((d, d))
+    upper = np.empty((d, d))
+    before = np.empty((d, d))
+    for k in range(factors.shape[0]):
+        for j in range(d):
+            for i in range(d):
+                total = 0.0
+                for middle in range(d):
+                    total += factors[k, i, middle] * columns[middle, j]
+                moved[i, j] = total
+        upper[:] = 0.0
+        for j in range(d):
+            for _ in range(2):
+                for one in range(j):
+                    along = 0.0
+                    for i in range(d):
+                        along += moved[i, one] * moved[i, j]
+                    upper[one, j] += along
+                    for i in range(d):
+                        moved[i, j] -= along * moved[i, one]
+            size = 0.0
+            for i in range(d):
+                size += moved[i, j]**2
+            size = np.sqrt(size)
+            upper[j, j] = size
+            for i in range(d):
+                moved[i, j] /= size
+        columns[:] = moved
+        before[:] = whole
+        for i in range(d):
+            for j in range(i, d):
+                total = 0.0
+                for middle in range(i, j + 1):
+                    total += upper[i, middle] * before[middle, j]
+                whole[i, j] = total
+
+
+def _round_by_lapack(factors: np.ndarray, columns: np.ndarray, whole: np.ndarray) -> None:
+    """Do what _round does, where numba is missing."""
+    for factor in factors:
+        columns[:], upper = np.linalg.qr(factor @ columns)
+        signs = np.sign(np.diag(upper))
+        columns *= signs
+        whole[:] = signs[:, np.newaxis] * upper @ whole
+
+
+def eigenvalues(factors: np.ndarray) -> np.ndarray:
+    """Return the eigenvalues of ``F_n ... F_2 F_1``.
+
+    Args:
+        factors: F_1, F_2 ..., shape (n, d, d).
+
+    Returns:
+        Complex numbers, shape (d,); not a number where they leave the range of numbers.
+
+    """
+    factors, d = np.ascontiguousarray(factors), factors.shape[-1]
+    # Any columns do that lie in no space of their own.
+    columns = np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0]
+    for _ in range(ROUNDS):
+        start, whole = columns.copy(), np.eye(d)
+        (_round if COMPILED else _round_by_lapack)(factors, columns, whole)
+        back = start.T @ columns
+        if not np.isfinite(back).all():
+            return np.full(d, np.nan, dtype=complex)
+        cuts = [0, *(k for k in range(1, d) if np.abs(back[k:, :k]).max() <= SAME), d]
+        parts = [slice(*ends) for ends in pairwise(cuts)]
+        sizes = [np.abs(np.diag(whole)[part]) for part in parts]
+        if all(size.max() <= ALIKE * size.min() for size in sizes):
+            break
+    return np.concatenate([
+        np.linalg.eigvals(back[part, part] @ whole[part, part]).astype(complex)
+        for part in parts])
 
 
 def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
@@ -189,8 +349,8 @@ def returning(orbit: MeshOrbit, part: int, multiplier: complex
         whole = step @ whole
     roots, vectors = np.linalg.eig((change.T @ whole).astype(complex))
     again = np.linalg.matrix_power(change, m)
-    shares = np.einsum('ik,ij,jk->k', vectors.conj(), again, vectors)
-    gaps = np.abs(shares * roots**m - multiplier)
+    fractions = np.einsum('ik,ij,jk->k', vectors.conj(), again, vectors)
+    gaps = np.abs(fractions * roots**m - multiplier)
     if part == 0:
         # The disturbance along the orbit.
         gaps[np.abs(roots - 1.0).argmin()] = np.inf
@@ -198,3 +358,128 @@ def returning(orbit: MeshOrbit, part: int, multiplier: complex
     for step in steps:
         w.append(step @ w[-1])
     return columns, complex(nu), np.array(w)
+
+
+# The variational equation along a gait of a network without delay, with sources, as a matrix.
+
+class Variational:
+    """The variational equation of an orbit in all components, on its mesh or a finer one.
+
+    Attributes:
+        at: states at the nodes, shape (n, S, components), and None.
+        slope: their derivatives by time.
+        delay: 0.
+
+    """
+
+    delay = 0.0
+
+    def __init__(self, orbit: MeshOrbit, halvings: int = 0) -> None:
+        """Linearise about an orbit.
+
+        Args:
+            orbit: of a network without delay.
+            halvings: of the intervals.
+
+        """
+        reduced, mesh = Reduced(orbit.network, orbit.symmetry), orbit.mesh
+        for _ in range(halvings):
+            mesh = np.sort(np.concatenate([mesh, 0.5 * (mesh[:-1] + mesh[1:])]))
+        self._orbit, self._mesh, self._reduced = orbit, mesh, reduced
+        self._lengths = np.diff(mesh) * orbit.solution.length
+        places = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
+        states = path_of(reduced, orbit.solution)(places.ravel()).reshape(*places.shape, -1)
+        self.at: States = states[..., reduced.place], None
+        field: Field = Field(orbit.network)
+        rates, self._jacobians, _ = field.linearised(self.at[0])
+        self.slope: States = rates, None
+        n, s, d = rates.shape
+        self._shape = n, s, d
+        self._turn = (orbit.symmetry.turn
+                      + np.arange(orbit.network.variables)[:, None] * orbit.network.cells).ravel()
+        matrices = np.eye(s * d) - np.einsum('i,pq,iqrc->iprqc', self._lengths, collocation.A,
+                                             self._jacobians).reshape(n, s * d, s * d)
+        self._inverse = np.linalg.inv(matrices)
+        self._answers = (self._inverse @ np.tile(np.eye(d), (s, 1))).reshape(n, s, d, d)
+        self._steps = np.eye(d) + self._summed(self._jacobians @ self._answers)
+
+    def _summed(self, values: np.ndarray) -> np.ndarray:
+        """Integrate values at the nodes over every interval."""
+        return np.einsum('i,s,is...->i...', self._lengths, collocation.WEIGHTS, values)
+
+    @property
+    def flaw(self) -> str:
+        """Why derivatives of the rates do not tell how disturbances interact, or ''."""
+        met = bool(self._orbit.network.kinks) and kinks(self._reduced, self._orbit.solution).size
+        return 'the rates have kinks' if met else ''
+
+    def critical(self, part: int, multiplier: complex) -> tuple[complex, np.ndarray]:
+        """Return the factor over T/m of the disturbance with a multiplier, and about that.
+
+        Args:
+            part: number of its subspace, as in floquet.mode.
+            multiplier: about that over a period.
+
+        Returns:
+            The factor, and the disturbance at the unknowns, shape (n components,).
+
+        """
+        columns, nu, left = returning(self._orbit, part, multiplier)
+        values = left @ columns.T
+        # On a finer mesh a guess is enough.
+        rough = [np.interp(self._mesh[:-1], self._orbit.mesh, row) for row in values.T]
+        return nu, np.array(rough).T.ravel()
+
+    def along(self) -> np.ndarray:
+        """Return the derivative of the orbit by time at the unknowns, shape (n components,)."""
+        points = path_of(self._reduced, self._orbit.solution)(self._mesh[:-1])
+        return self._reduced.rates(points)[:, self._reduced.place].ravel()
+
+    def matrix(self, turn: complex) -> 'scipy.sparse.csc_array':
+        """Return the matrix of the unknowns.
+
+        Args:
+            turn: factor over T/m.
+
+        """
+        n, _, d = self._shape
+        ones = scipy.sparse.eye_array(d, format='csr', dtype=complex)
+        rows: list[list] = [[None] * n for _ in range(n)]
+        for k in range(n):
+            rows[k][k] = scipy.sparse.csr_array(-self._steps[k])
+            # With a single interval both fall together.
+            ahead = ones if k < n - 1 else turn * ones[self._turn]
+            before = rows[k][(k + 1) % n]
+            rows[k][(k + 1) % n] = ahead if before is None else before + ahead
+        return scipy.sparse.block_array(rows, format='csc', dtype=complex)
+
+    def right(self, rates: np.ndarray, turn: complex) -> np.ndarray:
+        """Return the right-hand side for sources at the nodes, shape (n components,)."""
+        inner = self._inner(rates)
+        summed = np.einsum('isjk,isk->isj', self._jacobians, inner) + rates
+        return self._summed(summed).ravel()
+
+    def _inner(self, rates: np.ndarray) -> np.ndarray:
+        n, s, d = self._shape
+        given = self._lengths[:, None, None] * np.einsum('pq,iqd->ipd', collocation.A, rates)
+        return (self._inverse @ given.reshape(n, s * d, 1)).reshape(n, s, d)
+
+    def values(self, unknowns: np.ndarray, rates: np.ndarray, turn: complex) -> States:
+        """Return a solution at the nodes, now and a delay ago.
+
+        Args:
+            unknowns: shape (n components,).
+            rates: the sources.
+            turn: factor over T/m.
+
+        """
+        left = unknowns.reshape(self._shape[0], -1)
+        return np.einsum('isjk,ik->isj', self._answers, left) + self._inner(rates), None
+
+    def derivative(self, values: States, turn: complex) -> States:
+        """Return the derivative by time of a disturbance, by the variational equation."""
+        return np.einsum('isjk,isk->isj', self._jacobians, values[0]), None
+
+    def delayed(self, values: States) -> np.ndarray:
+        """Return what the part a delay ago adds to the rates: nothing."""
+        return np.zeros_like(values[0])

@@ -12,19 +12,244 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Orbits as polynomials on a mesh: the gaits of the networks without delay.
+"""Gaits of the networks without delay as exact periodic orbits, by Gauss collocation on a mesh.
 
-A gait with m = order of H/K is known from the cells of one class each, over one m-th of the cycle:
-``x_i(t + T/m) = x_turn(i)(t)``.
+On a gait the cells of one class under K are equal, and after T/m, m the order of H/K, the classes
+have changed places. So the network collapses to one cell a class and 1/m of the period, with the
+boundary condition ``y(T/m) = Pi y(0)`` and the period as unknown. Newton's method eliminates each
+interval's inner values, which leaves a linear system in y(0) and T. Secondary gaits, with two
+waveforms, are no different.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from cpg_ros.dynamics.mesh.newton import derivatives, Reduced, Solution
-from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.mesh import collocation
+from cpg_ros.dynamics.mesh.collocation import chained, summed, transfer
+from cpg_ros.dynamics.orbit import deflation_factor, Orbit
+from cpg_ros.networks.equations import Field
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+from numpy.polynomial import polynomial
+
+#: A mesh is fine enough when its polynomials end with terms of this share of the whole.
+RESOLVED = 1e-11
+FEWEST, MOST_INTERVALS = 12, 800
+#: Intervals of a first mesh, and places for each of them at which it is seen how the guess bends.
+FEW, LOOKED = 30, 17
+#: Newton stops at steps this small, against the size of the states and the period: what is left
+#: is of the order of their square.
+TOLERANCE = 1e-8
+STEPS = 15
+
+
+class Reduced(Field):
+    """A network on the gait's Fix(K): one cell of each class.
+
+    Attributes:
+        symmetry: of the gait.
+        turn: ``y(T/m) = y(0)[turn]``.
+
+    """
+
+    def __init__(self, network: Network, symmetry: Symmetry) -> None:
+        """Look at a network in a gait."""
+        super().__init__(network, symmetry.classes)
+        first = self.kept[:self.size]
+        blocks = np.arange(network.variables)[:, None]
+        self.symmetry = symmetry.led(network.leads)
+        self.turn = (symmetry.classes[symmetry.turn[first]] + blocks * self.size).ravel()
+
+
+@dataclass(eq=False, repr=False)
+class Solution(ShortRepr):
+    """What Newton's method works on: values at mesh points, at nodes, and L = T/m."""
+
+    mesh: np.ndarray
+    points: np.ndarray
+    stages: np.ndarray
+    length: float
+
+
+def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Linearise: return increments at mesh points as functions of (dy0, dL, extras).
+
+    The answer is (P, R, stage answer to dy, stage answer to the sources): dy_k = P_k dy_0 +
+    R_k (dL, 1, extras...).
+    """
+    h = np.diff(now.mesh)
+    slopes, jacobians, _ = reduced.linearised(now.stages)
+    step, d = now.length * h, slopes.shape[-1]
+    by_length = h[:, None, None] * (collocation.A @ slopes)
+    rise = h[:, None] * (collocation.WEIGHTS @ slopes)
+    sources = [by_length[..., None],
+               (now.points[:-1, None] + now.length * by_length - now.stages)[..., None]]
+    ends = [rise[..., None],
+            (now.points[:-1] + now.length * rise - now.points[1:])[..., None]]
+    if extra is not None:
+        n, s = extra.shape[:2]
+        flat = extra.reshape(n, s, -1)
+        sources.append(step[:, None, None, None] * (collocation.A @ flat).reshape(extra.shape))
+        ends.append(step[:, None, None] * (collocation.WEIGHTS @ flat).reshape(n, d, -1))
+    answers = transfer(jacobians, step, np.concatenate(sources, axis=-1))
+    steps = summed(jacobians, step, answers)
+    steps[..., :d] += np.eye(d)
+    steps[..., d:] += np.concatenate(ends, axis=-1)
+    reached = chained(steps)
+    return reached[..., :d], reached[..., d:], answers[..., :d], answers[..., d:]
+
+
+def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """Return the matrix of boundary and phase conditions in (dy_0, dL)."""
+    d = p.shape[-1]
+    matrix = np.zeros((d + 1, d + 1))
+    matrix[:d, :d] = p[-1] - np.eye(d)[reduced.turn]
+    matrix[:d, d] = r[-1, :, 0]
+    matrix[d, :d] = reduced.linearised(now.points[0])[1][0]
+    return matrix
+
+
+def newton(reduced: Reduced, now: Solution, known: Sequence[float] = ()) -> bool:
+    """Solve on a fixed mesh, in place; tell whether it converged.
+
+    Args:
+        reduced: the network in a gait.
+        now: the guess, and then the solution.
+        known: lengths T/m, model time, of orbits to be kept off.
+
+    """
+    scale = np.abs(now.points).max()
+    d, longest = now.points.shape[1], 20.0 * now.length
+    for _ in range(2 * STEPS if known else STEPS):
+        try:
+            p, r, by_start, by_source = linearised(reduced, now)
+            right = np.empty(d + 1)
+            right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+            right[d] = -reduced.rates(now.points[0])[0]
+            found = np.linalg.solve(bordered(reduced, now, p, r), right)
+        except np.linalg.LinAlgError:
+            return False
+        start, length = found[:d], found[d]
+        moved = p @ start + r[..., 0] * length + r[..., 1]
+        inner = (np.einsum('nsij,nj->nsi', by_start, moved[:-1]) + by_source[..., 0] * length
+                 + by_source[..., 1])
+        size = float(max(np.abs(moved).max() / scale, np.abs(inner).max() / scale,
+                         abs(length) / now.length))
+        if not np.isfinite(size):
+            return False
+        # A long first step would leave the range where cosh is tame.
+        fraction = min(1.0, 0.5 / max(size, 1e-300))
+        if known and size > TOLERANCE:
+            fraction *= deflation_factor(now.length, float(length), known)
+        now.points += fraction * moved
+        now.stages += fraction * inner
+        now.length += fraction * float(length)
+        if not 0.0 < now.length < longest:
+            return False
+        if size <= TOLERANCE:
+            return True
+    return False
+
+
+def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
+            ) -> Solution:
+    """Take a guess at the points of a mesh from a path over the places 0 to 1."""
+    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
+    return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
+
+
+def coefficients_of(reduced: Reduced, now: Solution) -> np.ndarray:
+    """Return the coefficients of the polynomials on each interval, shape (S + 1, n, d)."""
+    return collocation.power_coefficients(now.points[:-1], reduced.rates(now.stages),
+                                          now.length * np.diff(now.mesh))
+
+
+def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the solution as a function of places from 0 to 1."""
+    coefficients = coefficients_of(reduced, now)
+
+    def path(places: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(now.mesh, places, side='right') - 1, 0, now.mesh.size - 2)
+        xi = (places - now.mesh[k]) / np.diff(now.mesh)[k]
+        return polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
+    return path
+
+
+def finer(mesh: np.ndarray) -> int:
+    """Return the fewest intervals that the next mesh shall have where this one fell short."""
+    n = mesh.size - 1
+    return n + 1 + n // 16
+
+
+def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarray | None:
+    """Return a better mesh for a solution, or None if it is resolved.
+
+    Raises:
+        NoOrbit: it would need more intervals than there may be.
+
+    """
+    h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
+    ends = collocation.last_share(slopes) * now.length * h / np.abs(now.points).max()
+    if ends.max() <= RESOLVED:
+        return None
+    wanted = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
+    # Not a number where the solution is not finite.
+    if not max(fewest, wanted) <= MOST_INTERVALS:
+        raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
+    return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(wanted)))
+
+
+def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
+               intervals: int = FEW) -> np.ndarray:
+    """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
+    places = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
+    bend = np.abs(np.diff(reduced.rates(path(places)), axis=0)).max(axis=1)
+    return collocation.spread(places, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), intervals)
+
+
+def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Differentiate a solution by the network's parameters.
+
+    Returns:
+        Those of the polynomials, shape (S + 1, n, d, parameters), and those of the period.
+
+    Raises:
+        NoOrbit: its equations are singular.
+
+    """
+    extra = reduced.by_parameter(now.stages)
+    try:
+        p, r, by_start, by_source = linearised(reduced, now, extra)
+        right = np.vstack([-r[-1, :, 2:], -reduced.by_parameter(now.points[0])[0]])
+        found = np.linalg.solve(bordered(reduced, now, p, r), right)
+    except np.linalg.LinAlgError as error:
+        raise NoOrbit('the orbit is not isolated: it has no derivatives') from error
+    start, d_length = found[:-1], found[-1]
+    moved = p @ start + r[..., :1] * d_length + r[..., 2:]
+    inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])
+    h = np.diff(now.mesh)
+    # Slopes in place: d(L F)/dp at the nodes.
+    slopes, jacobians, _ = reduced.linearised(now.stages)
+    d_slopes = now.length * (jacobians @ inner + extra) + slopes[..., None] * d_length
+    d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', collocation.INTEGRALS, d_slopes)
+    d_coefficients[0] += moved[:-1]
+
+    d_period = reduced.symmetry.order * d_length
+    # One cell of each class has seen only those of its family's weights that end on it.
+    names = reduced.network.parameters()
+    for family in reduced.network.families(reduced.symmetry):
+        members = [names.index(name) for name in family]
+        d_period[members] = d_period[members].mean()
+        d_coefficients[..., members] = d_coefficients[..., members].mean(axis=-1, keepdims=True)
+    return d_coefficients, d_period
+
+
+# Orbits as polynomials on a mesh: the gaits of the networks without delay.
 
 #: Even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192

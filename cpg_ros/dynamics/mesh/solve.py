@@ -20,27 +20,333 @@ orbit is followed from the known parameters to the wanted ones, which also tells
 Where no orbit is known, those that are unstable within their class are followed from Hopf points.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.mesh.adaptation import collocate as from_path
-from cpg_ros.dynamics.mesh.adaptation import predicted
-from cpg_ros.dynamics.mesh.orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import check_values, NoOrbit, Orbit, richer
-from cpg_ros.dynamics.seek import find_orbit, settle
-from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.mesh import collocation
+from cpg_ros.dynamics.mesh.collocation import aligned, places_of
+from cpg_ros.dynamics.mesh.orbit import (
+    bordered,
+    coefficients_of,
+    FEW,
+    FEWEST,
+    finer,
+    first_mesh,
+    linearised,
+    MeshOrbit,
+    newton,
+    path_of,
+    Reduced,
+    remeshed,
+    sampled,
+    Solution,
+)
+from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit
+from cpg_ros.dynamics.settling import find_orbit, settle
+from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+from numpy.polynomial import polynomial
+
+# Solving for orbits on meshes that are made finer until they resolve them.
+
+#: How many times as many intervals a first mesh has where fewer lead nowhere: as several spikes.
+MORE = 4
+#: Times that ends of intervals are put on kinks anew.
+ALIGNED = 8
+#: Below this range the orbit has fallen to an equilibrium.
+SMALLEST = 1e-5
+#: Places of an interval, 0 to 1, at which it is looked how well the equations hold.
+BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
+
+
+def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
+              period: float, known: Sequence[float] = ()) -> MeshOrbit | None:
+    """Solve for an orbit from a guess; None where Newton's method leads to none.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        path: states, shape (m, components), as a function of times in cycles, shape (m,).
+        period: in model time.
+        known: periods of orbits that Newton's method is to be kept off, model time.
+
+    """
+    reduced = Reduced(network, symmetry)
+
+    def guess(places: np.ndarray) -> np.ndarray:
+        return path(places / symmetry.order)[:, reduced.kept]
+
+    for intervals in (FEW,) if known else (FEW, MORE * FEW):
+        start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
+        found = _refined(reduced, start, [one / symmetry.order for one in known])
+        if found is not None:
+            return found
+    return None
+
+
+def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
+    """Solve for an orbit from what the derivatives of a known one predict; None as in collocate.
+
+    The mesh of the known one is taken over, so that little is left to do.
+
+    Args:
+        network: parameters.
+        near: an orbit of the same gait at near parameters.
+
+    Raises:
+        NoOrbit: the known orbit is not isolated.
+
+    """
+    change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
+    coefficients = near.coefficients + near.d_coefficients @ change
+    points = np.vstack([coefficients[0], coefficients[:, -1].sum(axis=0)])
+    stages = polynomial.polyval(collocation.NODES, coefficients).transpose(0, 2, 1)
+    length = (near.period + float(near.d_period @ change)) / near.symmetry.order
+    if not length > 0.0:
+        return None
+    return _refined(Reduced(network, near.symmetry), Solution(near.mesh, points, stages, length))
+
+
+def _refined(reduced: Reduced, now: Solution, known: Sequence[float] = ()
+             ) -> MeshOrbit | None:
+    """Solve, remesh and solve again until the mesh is fine enough; None as in collocate."""
+    fewest = FEWEST
+    while True:
+        with np.errstate(all='ignore'):
+            converged = newton(reduced, now, known)
+        if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
+            return None
+        if not _on_kinks(reduced, now):
+            return None
+        try:
+            mesh = remeshed(reduced, now, fewest)
+            if mesh is None:
+                return completed(reduced, now)
+        except NoOrbit:
+            return None
+        now, known = sampled(path_of(reduced, now), mesh, now.length), ()
+        # Finer every time: equal shares of the error alone may stay short of the goal for ever.
+        fewest = finer(mesh)
+
+
+def kinks(reduced: Reduced, now: Solution) -> np.ndarray:
+    """Places, 0 to 1, at which the rates of a solution have a kink."""
+    network = reduced.network
+    columns = [variable * reduced.size + k for variable, name in enumerate(network.states)
+               if name in network.kinks for k in range(reduced.size)]
+    return places_of(now.mesh, coefficients_of(reduced, now)[..., columns])
+
+
+def _on_kinks(reduced: Reduced, now: Solution) -> bool:
+    """Put ends of intervals on all kinks, in place; tell whether Newton's method converged."""
+    if not reduced.network.kinks:
+        return True
+    for _ in range(ALIGNED):
+        mesh = aligned(now.mesh, kinks(reduced, now))
+        if mesh is None:
+            break
+        moved = sampled(path_of(reduced, now), mesh, now.length)
+        now.mesh, now.points, now.stages = moved.mesh, moved.points, moved.stages
+        if not newton(reduced, now):
+            return False
+    return True
+
+
+def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
+    """Make an orbit of a solution."""
+    coefficients = coefficients_of(reduced, now)
+    values, rise = (polynomial.polyval(BETWEEN, c).transpose(0, 2, 1)
+                    for c in (coefficients, polynomial.polyder(coefficients)))
+    steps = now.length * np.diff(now.mesh)
+    residual = np.abs(rise / steps[:, None, None] - reduced.rates(values))
+    return MeshOrbit(reduced.network, reduced.symmetry, reduced.symmetry.order * now.length,
+                     float(residual.max()), now.mesh, now.stages, coefficients)
+
+
+# The orbits of a gait along a line of parameters on a mesh, as a curve for continuation.
+
+#: States, shape (m, components), as a function of times in cycles, shape (m,).
+States = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshCurve(ShortRepr):
+    """Orbits of a network without delay on a mesh: points, nodes, L = T/m, and the value.
+
+    Attributes:
+        network: any on the line.
+        symmetry: of the gait.
+        along: the line.
+        scales: of period and value.
+        mesh: ends of the intervals, shape (n + 1,).
+
+    """
+
+    network: Network
+    symmetry: Symmetry
+    along: ParameterLine
+    scales: tuple[float, float]
+    mesh: np.ndarray
+
+    def _solution(self, z: np.ndarray) -> tuple[Reduced, Solution]:
+        reduced = Reduced(self.along.at(self.network, float(z[-1])), self.symmetry)
+        n, d = self.mesh.size - 1, len(reduced.kept)
+        points, stages = np.split(z[:-2], [(n + 1) * d])
+        return reduced, Solution(self.mesh, points.reshape(n + 1, d),
+                                 stages.reshape(n, -1, d), float(z[-2]))
+
+    def _weights(self, size: int) -> np.ndarray:
+        """Of points, by the trapezoidal rule, L and value; nodes between points do not count."""
+        d = len(self.symmetry.basis)
+        ends = np.zeros(self.mesh.size)
+        ends[:-1] += 0.5 * np.diff(self.mesh)
+        ends[1:] += 0.5 * np.diff(self.mesh)
+        weights = np.zeros(size)
+        weights[:d * ends.size] = np.repeat(ends / d, d)
+        weights[-2] = (self.scales[0] / self.symmetry.order)**-2.0
+        weights[-1] = self.scales[1]**-2.0
+        return weights
+
+    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Mean over the cycle and the components plus period plus value."""
+        return float(self._weights(one.size) * one @ other)
+
+    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's increment normal to the border, and the tangent."""
+        reduced, now = self._solution(z)
+        way = self.along.direction(self.network)
+        extra = reduced.by_parameter(now.stages) @ way
+        p, r, by_start, by_source = linearised(reduced, now, extra[..., None])
+        d = p.shape[-1]
+        matrix, right = np.zeros((d + 2, d + 2)), np.zeros((d + 2, 2))
+        matrix[:d + 1, :d + 1] = bordered(reduced, now, p, r)
+        matrix[:d, d + 1] = r[-1, :, 2]
+        matrix[d, d + 1] = reduced.by_parameter(now.points[0])[0] @ way
+        weighted = self._weights(z.size) * border
+        row = weighted[:now.points.size].reshape(now.points.shape)
+        matrix[d + 1, :d] = np.einsum('ki,kij->j', row, p)
+        matrix[d + 1, d:] = np.einsum('ki,kij->j', row, r)[[0, 2]] + weighted[-2:]
+        right[:d, 0] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+        right[d, 0] = -reduced.rates(now.points[0])[0]
+        right[d + 1] = -(row * r[..., 1]).sum(), 1.0
+        answers = []
+        for found, residual in zip(np.linalg.solve(matrix, right).T, (1.0, 0.0), strict=True):
+            source = np.array([found[d], residual, found[d + 1]])
+            moved = p @ found[:d] + r @ source
+            inner = np.einsum('nsij,nj->nsi', by_start, moved[:-1]) + by_source @ source
+            answers.append(np.concatenate([moved.ravel(), inner.ravel(), found[d:]]))
+        return answers[0], answers[1]
+
+    def _columns(self, reduced: Reduced) -> list[int]:
+        """Where the reduced state has cell 1's first variable in each m-th of the cycle."""
+        columns = [0]
+        for _ in range(self.symmetry.order - 1):
+            columns.append(int(reduced.turn[columns[-1]]))
+        return columns
+
+    def amplitude(self, z: np.ndarray) -> float:
+        """Half the range of cell 1's first variable at the mesh points."""
+        reduced, now = self._solution(z)
+        return float(0.5 * np.ptp(now.points[:, self._columns(reduced)]))
+
+    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
+                ) -> tuple['MeshCurve', np.ndarray, np.ndarray] | None:
+        """Another mesh where the solution asks for it, from the highest peak of cell 1."""
+        reduced, now = self._solution(z)
+        mesh = remeshed(reduced, now, finer(now.mesh) if again else FEWEST)
+        path = path_of(reduced, now)
+        start = self._highest(reduced, now, path)
+        if mesh is None and not start:
+            return None
+        mesh = now.mesh if mesh is None else mesh
+        points = border[:now.points.size].reshape(now.points.shape)
+
+        def slanted(places: np.ndarray) -> np.ndarray:
+            return np.stack([np.interp(places, now.mesh, column) for column in points.T], -1)
+
+        curve = replace(self, mesh=mesh)
+        moved = [curve.pack(sampled(self._turned(reduced, one, start), mesh, 1.0), *ends)
+                 for one, ends in ((path, z[-2:]), (slanted, border[-2:]))]
+        return curve, moved[0], moved[1]
+
+    def _highest(self, reduced: Reduced, now: Solution, path: Callable) -> float:
+        """Where cell 1 is higher than at the start, in m-ths of the cycle, or 0."""
+        columns = self._columns(reduced)
+        peaks = now.points[:, columns]
+        node, part = divmod(int(peaks.argmax()), len(columns))
+        if peaks.max() <= now.points[0, 0] + 1e-9 * np.ptp(peaks):
+            return 0.0
+        near = np.linspace(now.mesh[max(node - 1, 0)], now.mesh[min(node + 1, now.mesh.size - 1)],
+                           201)
+        return float(part + near[path(near)[:, columns[part]].argmax()])
+
+    def _turned(self, reduced: Reduced, path: Callable, start: float) -> Callable:
+        """Return the path from another start on: y(s + 1) = y(s)[turn]."""
+        def later(places: np.ndarray) -> np.ndarray:
+            places = places + start
+            parts = np.floor(places).astype(int)
+            out = path(places - parts)
+            for k in range(1, parts.max(initial=0) + 1):
+                out[parts >= k] = out[parts >= k][:, reduced.turn]
+            return out
+        return later
+
+    def pack(self, now: Solution, length: float, value: float) -> np.ndarray:
+        """Return the vector of unknowns."""
+        return np.concatenate([now.points.ravel(), now.stages.ravel(), [length, value]])
+
+    def orbit(self, z: np.ndarray) -> MeshOrbit:
+        """Make an orbit of a solution."""
+        return completed(*self._solution(z))
+
+
+def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
+            ) -> tuple[MeshCurve, np.ndarray]:
+    """Return the curve of the orbits along a line, and the place of one of them on it."""
+    curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
+    now = orbit.solution
+    return curve, curve.pack(now, now.length, line.value(orbit.network))
+
+
+def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
+           scales: tuple[float, float], path: States, disturbance: States, period: float
+           ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
+    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
+
+    Args:
+        network: at the place.
+        symmetry: of the orbits.
+        line: of parameters.
+        scales: as of the curve.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which, the same.
+        period: of the orbits, model time.
+
+    """
+    reduced = Reduced(network, symmetry)
+
+    def on_quotient(states: States) -> States:
+        return lambda places: states(places / symmetry.order)[:, reduced.kept]
+
+    mesh = first_mesh(reduced, on_quotient(path))
+    curve = MeshCurve(network, symmetry, line, scales, mesh)
+    return (curve, curve.pack(sampled(on_quotient(path), mesh, 1.0), period / symmetry.order,
+                              line.value(network)),
+            curve.pack(sampled(on_quotient(disturbance), mesh, 1.0), 0.0, 0.0))
+
 
 #: A peak this much lower than the highest, over that, is another one.
 SAME = 1e-6
 
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
-    return orbit if orbit is not None and not richer(orbit) else None
+    return orbit if orbit is not None and not extra_symmetry(orbit) else None
 
 
 @lru_cache(maxsize=64)
@@ -69,7 +375,7 @@ def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period:
                 ) -> MeshOrbit | None:
     """Collocate from what a simulation does in a period from a state near the orbit."""
     run = simulate(network, start, 1.05 * period, network.step, progress=False)
-    return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
+    return _accepted(collocate(network, symmetry, lambda theta: run(theta * period), period))
 
 
 def _stated(network: Network, gait: str) -> MeshOrbit | None:
@@ -98,7 +404,7 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
     """Return what the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
-        found = (_accepted(from_path(network, symmetry, *one)) for one in find_orbit(network,
+        found = (_accepted(collocate(network, symmetry, *one)) for one in find_orbit(network,
                                                                                      gait))
         return next((orbit for orbit in found if orbit is not None), None)
     except NoEquilibrium:
@@ -108,28 +414,28 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                ) -> MeshOrbit | None:
     found = settle(network, symmetry, start, period)
-    return None if found is None else _accepted(from_path(network, symmetry, *found))
+    return None if found is None else _accepted(collocate(network, symmetry, *found))
 
 
 def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:
     return lambda theta: orbit(theta * orbit.period)
 
 
-def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
+def _continue_orbit(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
     """Follow an orbit along the line to other parameters; also return the share reached."""
     start, end = known.network.as_dict(), network.as_dict()
     orbit, reached, step = known, 0.0, 0.25
     # A failure costs more than a success, so steps shrink fast.
     while reached < 1.0 and step > 0.003:
-        share = min(1.0, reached + step)
-        here = replace(network, **{key: start[key] + share * (end[key] - start[key])
+        fraction = min(1.0, reached + step)
+        here = replace(network, **{key: start[key] + fraction * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
-        found = _accepted(from_path(here, known.symmetry, _on_cycles(orbit), orbit.period))
+        found = _accepted(collocate(here, known.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
         if found is None or not 0.5 < found.period / orbit.period < 2.0:
             step *= 0.25
             continue
-        orbit, reached, step = found, share, 1.5 * step
+        orbit, reached, step = found, fraction, 1.5 * step
     return (orbit if reached >= 1.0 else None), reached
 
 
@@ -142,7 +448,7 @@ def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
     """
     found = _accepted(predicted(network, near))
     if found is None:
-        found = _accepted(from_path(network, near.symmetry, _on_cycles(near), near.period))
+        found = _accepted(collocate(network, near.symmetry, _on_cycles(near), near.period))
     if found is None or not 0.5 < found.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
     return found
@@ -184,7 +490,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     if orbit is not None:
         return orbit
     if near.symmetry == symmetry:
-        orbit, reached = _followed(near, network)
+        orbit, reached = _continue_orbit(near, network)
         if orbit is not None:
             return orbit
         changed = ', '.join(

@@ -12,11 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Feedback for legs with soles: a biped balances on a network's clock, by equations.
+"""Balance for legs with soles: stepping, support and arms on the clock of a network."""
 
-Imports ``motion``, ``robots`` and what is below, and from ``feedback`` how laws are declared;
-knows nothing of ROS, and of no physics engine.
-"""
-
-__all__ = ['arms', 'balance', 'clock', 'feedback', 'flight', 'gains', 'links', 'memory',
-           'placement', 'stance', 'swing', 'tick', 'velocity']
+__all__ = ['crouch', 'feedback', 'gains', 'links', 'stepping', 'substitutes', 'support', 'tick']

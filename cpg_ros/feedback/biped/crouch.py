@@ -20,7 +20,7 @@ centre of mass is low and above the middle of the soles.
 """
 
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
-from cpg_ros.robots.robot import Robot
+from cpg_ros.motion.robot import Robot
 import numpy as np
 
 #: Joints whose axis is this close to the lateral one, as a cosine, pitch a leg.
@@ -60,8 +60,8 @@ def crouch_pose(robot: Robot, links: Links) -> tuple[np.ndarray, float] | None:
                               for name in names]) for key in ('lower', 'upper'))
     bent, high = angles[knees] > 0.0, angles[hips].min()
     angles[ankles] = np.where(bent, lower[ankles], upper[ankles])
-    for share in BENT:
-        angles[knees] = share * np.where(bent, upper[knees], lower[knees])
+    for fraction in BENT:
+        angles[knees] = fraction * np.where(bent, upper[knees], lower[knees])
         if _centre(ahead_of_soles, angles, hips, lower[hips].max(), high):
             order = [names.index(joint.name) for joint in robot.joints]
             return angles[order], stand - ahead_of_soles.height(angles)

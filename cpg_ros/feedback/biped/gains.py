@@ -15,24 +15,95 @@
 """Gains of a biped's feedback, those of its laws together."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-from cpg_ros.errors import InputError
-from cpg_ros.feedback.biped import (
-    clock,
-    flight,
-    placement,
-    stance,
-    swing,
-    velocity,
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.biped.links import blank_pose, Links, Pose
+from cpg_ros.feedback.biped.stepping import (
+    CLOCK_GAINS,
+    FLIGHT_GAINS,
+    PLACEMENT_GAINS,
+    SWING_GAINS,
 )
-from cpg_ros.feedback.froude_scaling import scale_of
-from cpg_ros.feedback.law import Gain, named_tuple
-from cpg_ros.robots.biped_keys import BipedBody
+from cpg_ros.feedback.biped.support import STANCE_GAINS, VELOCITY_GAINS
+from cpg_ros.feedback.gains import scale_of
+from cpg_ros.feedback.laws.law import Gain, named_tuple
+from cpg_ros.motion.body_file import BipedBody
+import numpy as np
 
-GAINS: Mapping[str, Gain] = {name: gain for law in (
-                                 clock, flight, placement, stance, swing, velocity)
-                             for name, gain in law.GAINS.items()}
+# What a biped's feedback keeps from tick to tick, and what it puts out.
+
+#: Modes: standing on both legs, shifting the weight to the second foot, following the clock.
+STAND, SHIFT, WALK = 0, 1, 2
+
+
+class BipedMemory(NamedTuple):
+    """Arrays that a tick changes; the world's axes, places from the base unless said otherwise.
+
+    Attributes:
+        pose: of the links.
+        base: velocity of the base, m/s, shape (3,).
+        center: of mass, m, then its velocity, m/s, shape (2, 3).
+        turning: angular velocity of the base, rad/s, shape (3,).
+        soles: velocities of the soles from the base's, m/s and rad/s, shape (2, 6).
+        loads: share of the weight on each foot, shape (2,).
+        wanted: velocity forward and left as it is approached, m/s, shape (2,).
+        heading: wanted, rad, shape (1,).
+        integral: of the missing speed, m, shape (1,).
+        phases: of the legs from their lift-off on, cycles, shape (2,).
+        swinging: whether each leg swings, shape (2,).
+        landed: whether it has landed early, shape (2,).
+        lift_off: where each swing began, from the other sole, or, in gaits with flight, from the
+            base, m, shape (2, 3).
+        target: where it is to end, likewise.
+        ground: height of the ground, m, shape (1,).
+        fractions: of the weight that each leg is to bear, shape (2,).
+        error: of the capture point, forward and left, m, shape (2,).
+        reaction: moment that the swing leg takes, N m, shape (3,).
+        path: of a swinging foot, scratch, shape (3, 3).
+        clock: factor of the clock, and by how much it is to leap, cycles, shape (2,).
+        crouch: how much lower than usual the centre of mass is to be, m, shape (1,).
+        torque: of the legs' joints, N m, shape (2, joints of a leg).
+
+    """
+
+    pose: Pose
+    base: np.ndarray
+    center: np.ndarray
+    turning: np.ndarray
+    soles: np.ndarray
+    loads: np.ndarray
+    wanted: np.ndarray
+    heading: np.ndarray
+    integral: np.ndarray
+    phases: np.ndarray
+    swinging: np.ndarray
+    landed: np.ndarray
+    lift_off: np.ndarray
+    target: np.ndarray
+    ground: np.ndarray
+    fractions: np.ndarray
+    error: np.ndarray
+    reaction: np.ndarray
+    path: np.ndarray
+    clock: np.ndarray
+    crouch: np.ndarray
+    torque: np.ndarray
+
+    @classmethod
+    def empty(cls, links: Links) -> 'BipedMemory':
+        """Return the memory of a biped that has not moved yet."""
+        return cls(blank_pose(links), np.zeros(3), np.zeros((2, 3)), np.zeros(3),
+                   np.zeros((2, 6)), np.zeros(2), np.zeros(2), np.zeros(1), np.zeros(1),
+                   np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2, dtype=bool),
+                   np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1), np.full(2, 0.5), np.zeros(2),
+                   np.zeros(3), np.zeros((3, 3)), np.array([1.0, 0.0]),
+                   np.zeros(1),
+                   np.zeros((2, links.chains.shape[1])))
+
+
+GAINS: Mapping[str, Gain] = {**CLOCK_GAINS, **FLIGHT_GAINS, **PLACEMENT_GAINS, **STANCE_GAINS,
+                             **SWING_GAINS, **VELOCITY_GAINS}
 #: Gains that differ from the walk's, by gait; found on a simulated Unitree G1.
 _HOP = {
     'frequency': 2.626, 'duty': 0.597, 'lift': 0.0535, 'swing_end': 0.8685,

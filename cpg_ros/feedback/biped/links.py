@@ -21,11 +21,11 @@ lumped at the links' centres, which is exact for all that is computed here.
 
 from typing import NamedTuple
 
-from cpg_ros.errors import InputError
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.kinematics import cross, GRAVITY
-from cpg_ros.integration.jit import entry, jit
-from cpg_ros.robots.biped_keys import BASE
-from cpg_ros.robots.robot import Robot
+from cpg_ros.motion.body_file import BASE
+from cpg_ros.motion.robot import Robot
 import numpy as np
 
 
@@ -253,7 +253,7 @@ def add_torques(links, pose, leg, point, force, moment, torques):
                        + axis[0] * moment[0] + axis[1] * moment[1] + axis[2] * moment[2])
 
 
-@entry
+@jit_entry
 def kinematics(links, rpy, joints, motion, pose, center, soles, weights):
     """Fill everything about a pose; for checks and pictures, the laws take what they need.
 

@@ -20,11 +20,11 @@ the feet are those that the clock gives them. Joints move as they must for soles
 still and those that swing to be on their paths, while the base moves as the inertial unit says.
 """
 
+from cpg_ros.dynamics.integration.compilation import specialised
+from cpg_ros.feedback.biped.gains import BipedMemory
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
-from cpg_ros.feedback.biped.memory import BipedMemory
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.integration.jit import bound
 import numpy as np
 
 #: Inputs in the order of their ages.
@@ -54,7 +54,8 @@ class Substitutes:
         self.sensors = SensorData.zeros(1, len(links.chains), joints)
         self._still, self._angles = np.zeros(3), np.zeros(joints)
         self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
-        self._kinematics = bound(kinematics, links, self._still, self.sensors.joint_positions[0],
+        self._kinematics = specialised(kinematics, links, self._still,
+                                       self.sensors.joint_positions[0],
                                  (self._still, self.sensors.joint_velocities[0]), self._pose,
                                  self._center, self._soles, self._weights)
 
@@ -86,7 +87,7 @@ class Substitutes:
             sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
         if ages[FEET] > EXTRAPOLATED:
             weight = GRAVITY * memory.pose.carried[0]
-            sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.shares)
+            sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.fractions)
         return sensors
 
     def _move(self, memory: BipedMemory, dt: float) -> None:
@@ -114,21 +115,21 @@ class Substitutes:
         about = (s * y + c * z) / cosine
         self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
 
-    def _lean_on_sole(self, memory: BipedMemory, share: float) -> None:
+    def _lean_on_sole(self, memory: BipedMemory, fraction: float) -> None:
         """Take the base to lean and turn as the joints of the leg that bears more say."""
         sensors, pose = self.sensors, self._pose
         self._kinematics(self._links, self._still, sensors.joint_positions[0],
                          (self._still, sensors.joint_velocities[0]), pose, self._center,
                          self._soles, self._weights)
-        leg = int(memory.shares[1] > memory.shares[0])
+        leg = int(memory.fractions[1] > memory.fractions[0])
         # The base seen from the sole: the sole's rotation from the base, transposed.
         up = pose.turns[self._links.chains[leg, -1]][:, 2]
         lean = np.array([np.arctan2(up[1], up[2]), np.arcsin(-np.clip(up[0], -1.0, 1.0))])
         rpy = sensors.rpy[0]
-        rpy[:2] += share * (lean - rpy[:2])
+        rpy[:2] += fraction * (lean - rpy[:2])
         rpy[2] = memory.heading[0]
         turning = -self._soles[leg, 3:]
-        sensors.angular_velocity[0] += share * (turning - sensors.angular_velocity[0])
+        sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
         # Of a body that topples about the middle of the sole.
         center, sole = memory.center[0], memory.pose.soles[leg]
         topples = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)

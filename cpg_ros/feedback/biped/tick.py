@@ -16,7 +16,9 @@
 
 import math
 
-from cpg_ros.feedback.biped import clock, flight, placement, stance, swing, velocity
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.biped import stepping, support
+from cpg_ros.feedback.biped.gains import SHIFT, WALK
 from cpg_ros.feedback.biped.links import (
     add_torques,
     carry,
@@ -25,9 +27,7 @@ from cpg_ros.feedback.biped.links import (
     place,
     sole_velocity,
 )
-from cpg_ros.feedback.biped.memory import SHIFT, WALK
 from cpg_ros.feedback.kinematics import cross, GRAVITY, wrapped
-from cpg_ros.integration.jit import entry, jit
 
 #: Share of the load that each foot keeps while standing.
 KEPT = 0.02
@@ -45,7 +45,7 @@ def _sense(links, gains, memory, sensors, dt):
     for leg in range(2):
         memory.loads[leg] = max(sensors.foot_forces[0, leg], 0.0) / weight
         sole_velocity(links, pose, leg, memory.turning, rates, memory.soles[leg])
-    velocity.update(pose.turns[0], sensors.acceleration[0], memory.soles, memory.loads, dt,
+    support.update(pose.turns[0], sensors.acceleration[0], memory.soles, memory.loads, dt,
                     gains, memory.base)
     center_velocity(pose, memory.turning, rates, memory.center[1])
     for k in range(3):
@@ -64,7 +64,7 @@ def _approach(gains, memory, command, dt):
 @jit
 def _follow_clock(gains, memory, kind):
     """Let legs lift off and land by their phases, and early by the load on them."""
-    soles, swing_share = memory.pose.soles, clock.swing_share(gains)
+    soles, swing_share = memory.pose.soles, stepping.swing_share(gains)
     memory.clock[1] = 0.0
     for leg in range(2):
         phase = memory.phases[leg]
@@ -72,35 +72,35 @@ def _follow_clock(gains, memory, kind):
             memory.swinging[leg], memory.landed[leg] = True, False
             for k in range(3):
                 memory.lift_off[leg, k] = soles[leg, k] - (
-                    soles[1 - leg, k] if kind == flight.WALKS else 0.0)
+                    soles[1 - leg, k] if kind == stepping.WALKS else 0.0)
         if phase >= swing_share and memory.swinging[leg]:
             memory.swinging[leg] = memory.landed[leg] = False
-        if (memory.swinging[leg] and not memory.landed[leg] and phase > clock.LATE * swing_share
+        if (memory.swinging[leg] and not memory.landed[leg] and phase > stepping.LATE * swing_share
                 and memory.loads[leg] > gains.touchdown):
             memory.landed[leg] = True
             memory.clock[1] = max(memory.clock[1], swing_share - phase)
-    clock.load_shares(memory.phases, memory.landed, gains, memory.shares)
+    stepping.load_shares(memory.phases, memory.landed, gains, memory.fractions)
 
 
 @jit
 def _step(links, gains, memory, xi, axes, rate):
     """Fill the capture point's error, the clock's factor and the target of a swinging foot."""
     soles, phases, (c, s) = memory.pose.soles, memory.phases, axes
-    stands = 0 if memory.shares[0] > memory.shares[1] else 1
+    stands = 0 if memory.fractions[0] > memory.fractions[1] else 1
     swings = 1 - stands
     x, y = xi[0] - soles[stands, 0], xi[1] - soles[stands, 1]
     wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
-    error = placement.capture_error(
+    error = stepping.capture_error(
         (c * x + s * y, c * y - s * x), links.sides[swings],
-        clock.time_in_step(phases[swings], gains), rate, wanted, gains)
+        stepping.time_in_step(phases[swings], gains), rate, wanted, gains)
     memory.error[0], memory.error[1] = error
     for leg in range(2):
         if memory.swinging[leg]:
             if leg == stands:
                 continue
-            memory.clock[0] = placement.speed_up(error, gains)
-            forward, left = placement.step(
-                error, links.sides[leg], placement.time_to_touchdown(phases[leg], gains), rate,
+            memory.clock[0] = stepping.speed_up(error, gains)
+            forward, left = stepping.step(
+                error, links.sides[leg], stepping.time_to_touchdown(phases[leg], gains), rate,
                 wanted, gains)
             memory.target[leg, 0] = c * forward - s * left
             memory.target[leg, 1] = s * forward + c * left
@@ -113,12 +113,12 @@ def _stand(links, gains, memory, xi, axes, rate, shifted):
     soles, (c, s) = memory.pose.soles, axes
     first = c * soles[0, 1] - s * soles[0, 0]
     second = c * soles[1, 1] - s * soles[1, 0]
-    _, inward, _ = placement.offsets(0.0, 0.0, rate, gains)
+    _, inward, _ = stepping.offsets(0.0, 0.0, rate, gains)
     middle, now = 0.5 * (first + second), -s * xi[0] + c * xi[1]
     goal = middle + shifted * (second - links.sides[1] * inward - middle)
     pressure = now + (gains.stand - 1.0) * (now - goal)
-    memory.shares[0] = min(max((pressure - second) / (first - second), KEPT), 1.0 - KEPT)
-    memory.shares[1] = 1.0 - memory.shares[0]
+    memory.fractions[0] = min(max((pressure - second) / (first - second), KEPT), 1.0 - KEPT)
+    memory.fractions[1] = 1.0 - memory.fractions[0]
     ahead = 0.5 * (c * (soles[0, 0] + soles[1, 0]) + s * (soles[0, 1] + soles[1, 1]))
     memory.error[0], memory.error[1] = c * xi[0] + s * xi[1] - ahead, 0.0
 
@@ -127,14 +127,14 @@ def _stand(links, gains, memory, xi, axes, rate, shifted):
 def _fly(links, gains, memory, axes, kind, dt):
     """Fill shares, ground and targets of feet that swing, in a gait with flight."""
     soles, base, phases, (c, s) = memory.pose.soles, memory.base, memory.phases, axes
-    center, velocity, shares = memory.center[0], memory.center[1], memory.shares
+    center, velocity, fractions = memory.center[0], memory.center[1], memory.fractions
     for leg in range(2):
-        shares[leg] = 1.0 if phases[leg] >= clock.swing_share(gains) else 0.0
-    total = shares[0] + shares[1]
+        fractions[leg] = 1.0 if phases[leg] >= stepping.swing_share(gains) else 0.0
+    total = fractions[0] + fractions[1]
     if total > 1.5:
-        shares[0] = shares[1] = 0.5
+        fractions[0] = fractions[1] = 0.5
     if total > 0.5:
-        memory.ground[0] = shares[0] * soles[0, 2] + shares[1] * soles[1, 2]
+        memory.ground[0] = fractions[0] * soles[0, 2] + fractions[1] * soles[1, 2]
     else:
         memory.ground[0] -= dt * base[2]
     memory.error[:] = 0.0
@@ -145,8 +145,8 @@ def _fly(links, gains, memory, axes, kind, dt):
         if memory.swinging[leg]:
             for k in range(3):
                 memory.lift_off[leg, k] -= dt * base[k]
-            remaining = (clock.swing_share(gains) - phases[leg]) / gains.frequency
-            ahead, left = flight.foothold(speed, wanted, links.sides[leg], remaining,
+            remaining = (stepping.swing_share(gains) - phases[leg]) / gains.frequency
+            ahead, left = stepping.foothold(speed, wanted, links.sides[leg], remaining,
                                             gains)
             memory.target[leg, 0] = center[0] + c * ahead - s * left
             memory.target[leg, 1] = center[1] + s * ahead + c * left
@@ -156,71 +156,71 @@ def _fly(links, gains, memory, axes, kind, dt):
 @jit
 def _upward(gains, memory, mass, mode, kind, level):
     """Return the upward force on all legs, N; level of the soles that bear."""
-    center, rise, shares = memory.center[0, 2], memory.center[1, 2], memory.shares
-    if kind == flight.WALKS or mode != WALK:
+    center, rise, fractions = memory.center[0, 2], memory.center[1, 2], memory.fractions
+    if kind == stepping.WALKS or mode != WALK:
         wanted = gains.height - memory.crouch[0]
-        if mode == SHIFT and kind != flight.WALKS:
+        if mode == SHIFT and kind != stepping.WALKS:
             # The body begins in the middle of a stance.
-            wanted = flight.course(0.5, kind, gains)[0]
-        return stance.upward_force(wanted, center - level, rise, mass, gains)
-    if shares[0] + shares[1] < 0.5:
+            wanted = stepping.course(0.5, kind, gains)[0]
+        return support.upward_force(wanted, center - level, rise, mass, gains)
+    if fractions[0] + fractions[1] < 0.5:
         return 0.0
-    leads = 0 if shares[0] >= shares[1] else 1
-    return flight.upward_force(flight.stance_share(memory.phases[leads], gains), kind,
+    leads = 0 if fractions[0] >= fractions[1] else 1
+    return stepping.upward_force(stepping.stance_share(memory.phases[leads], gains), kind,
                                center - memory.ground[0], rise, mass, gains)
 
 
 @jit
 def _bear(links, gains, memory, sensors, shift, mode, kind):
     """Fill the torques of the legs that stand; shift of the centre of pressure in soles, m."""
-    pose, shares = memory.pose, memory.shares
+    pose, fractions = memory.pose, memory.fractions
     turns = (pose.turns[links.chains[0, -1]], pose.turns[links.chains[1, -1]])
     first, second = pose.soles[0], pose.soles[1]
     points = ((first[0] + carry(turns[0], shift, 0), first[1] + carry(turns[0], shift, 1),
                first[2] + carry(turns[0], shift, 2)),
               (second[0] + carry(turns[1], shift, 0), second[1] + carry(turns[1], shift, 1),
                second[2] + carry(turns[1], shift, 2)))
-    a, b = shares[0], shares[1]
+    a, b = fractions[0], fractions[1]
     pressure = (a * points[0][0] + b * points[1][0], a * points[0][1] + b * points[1][1],
                 a * points[0][2] + b * points[1][2])
     up = _upward(gains, memory, pose.carried[0], mode, kind, a * first[2] + b * second[2])
-    x, y, z = stance.attitude_moment(sensors.rpy[0], memory.turning,
+    x, y, z = support.attitude_moment(sensors.rpy[0], memory.turning,
                                      wrapped(memory.heading[0] - sensors.rpy[0, 2]),
                                      memory.reaction, gains)
     # Where feet are pressed little, they cannot turn the body.
-    firm = 1.0 if kind == flight.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
+    firm = 1.0 if kind == stepping.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
     moment = (firm * x, firm * y, firm * z)
-    force = stance.ground_force(memory.center[0], pressure, up, moment, gains)
+    force = support.ground_force(memory.center[0], pressure, up, moment, gains)
     for leg in range(2):
-        torque, bears = memory.torque[leg], shares[leg] > 0.0
-        damping = gains.stance_damping * (1.0 if bears else swing.SWUNG)
+        torque, bears = memory.torque[leg], fractions[leg] > 0.0
+        damping = gains.stance_damping * (1.0 if bears else stepping.SWUNG)
         for k in range(torque.size):
             row = links.chains[leg, k]
             torque[k] = (gravity_torque(pose, row)
                          - damping * sensors.joint_velocities[0, row - 1])
         if bears:
-            share = -shares[leg]
+            fraction = -fractions[leg]
             add_torques(links, pose, leg, points[leg],
-                        (share * force[0], share * force[1], share * force[2]),
-                        (0.0, 0.0, share * moment[2]), torque)
+                        (fraction * force[0], fraction * force[1], fraction * force[2]),
+                        (0.0, 0.0, fraction * moment[2]), torque)
 
 
 @jit
 def _swing(links, gains, memory, leg, kind):
     """Add the torques of a leg that swings, and fill the moment that it takes."""
     pose, other, way = memory.pose, 1 - leg, memory.path
-    duration = clock.swing_share(gains) / gains.frequency
-    share = min(max(memory.phases[leg] / clock.swing_share(gains), 0.0), 1.0)
-    swing.path(share, duration, memory.lift_off[leg], memory.target[leg], gains, way)
+    duration = stepping.swing_share(gains) / gains.frequency
+    fraction = min(max(memory.phases[leg] / stepping.swing_share(gains), 0.0), 1.0)
+    stepping.path(fraction, duration, memory.lift_off[leg], memory.target[leg], gains, way)
     foot, still, moving = pose.soles[leg], pose.soles[other], memory.soles[leg]
-    if kind == flight.WALKS:
+    if kind == stepping.WALKS:
         for k in range(3):
             way[0, k] += still[k]
     now = (moving[0] + memory.base[0], moving[1] + memory.base[1], moving[2] + memory.base[2])
-    strength = swing.LANDED if memory.landed[leg] else 1.0
-    x, y, z = swing.foot_force(way, foot, now, gains)
+    strength = stepping.LANDED if memory.landed[leg] else 1.0
+    x, y, z = stepping.foot_force(way, foot, now, gains)
     force = (strength * x, strength * y, strength * z)
-    x, y, z = swing.level_moment(pose.turns[links.chains[leg, -1]], memory.heading[0],
+    x, y, z = stepping.level_moment(pose.turns[links.chains[leg, -1]], memory.heading[0],
                                  moving[3:], gains)
     moment = (strength * x, strength * y, strength * z)
     add_torques(links, pose, leg, foot, force, moment, memory.torque[leg])
@@ -230,7 +230,7 @@ def _swing(links, gains, memory, leg, kind):
         memory.reaction[k] += taken[k] + moment[k]
 
 
-@entry
+@jit_entry
 def tick(links, gains, memory, sensors, command, mode, step):
     """Fill the memory's torques, and what the clock is to do.
 
@@ -248,23 +248,23 @@ def tick(links, gains, memory, sensors, command, mode, step):
     dt, shifted, kind = step
     _sense(links, gains, memory, sensors, dt)
     soles, center = memory.pose.soles, memory.center
-    rate = placement.growth_rate(center[0, 2] - min(soles[0, 2], soles[1, 2]))
+    rate = stepping.growth_rate(center[0, 2] - min(soles[0, 2], soles[1, 2]))
     xi = (center[0, 0] + center[1, 0] / rate, center[0, 1] + center[1, 1] / rate)
     axes = (math.cos(memory.heading[0]), math.sin(memory.heading[0]))
     if mode == WALK:
         _approach(gains, memory, command, dt)
         _follow_clock(gains, memory, kind)
-        if kind == flight.WALKS:
+        if kind == stepping.WALKS:
             _step(links, gains, memory, xi, axes, rate)
         else:
             _fly(links, gains, memory, axes, kind, dt)
         ahead = axes[0] * center[1, 0] + axes[1] * center[1, 1]
-        memory.integral[0] = placement.integrate(memory.integral[0], memory.wanted[0] - ahead, dt)
-        shift = (stance.pressure_shift(memory.error, links.half, gains) if kind == flight.WALKS
+        memory.integral[0] = stepping.integrate(memory.integral[0], memory.wanted[0] - ahead, dt)
+        shift = (support.pressure_shift(memory.error, links.half, gains) if kind == stepping.WALKS
                  else (0.0, 0.0))
     else:
         _stand(links, gains, memory, xi, axes, rate,
-               shifted if mode == SHIFT and kind != flight.HOPS else 0.0)
+               shifted if mode == SHIFT and kind != stepping.HOPS else 0.0)
         reach = links.half[0]
         shift = (min(max(gains.stand * memory.error[0], -reach), reach), 0.0)
         memory.swinging[:] = False

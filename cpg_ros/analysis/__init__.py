@@ -1,0 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Analysis of a network: reports, optimisation, atlases and the papers' published values.
+
+Imports ``fitting`` and the rooms below it; knows nothing of ROS.
+"""
+
+__all__ = ['analysis_plot', 'analysis_report', 'analyze', 'atlas', 'basin', 'branch_report',
+           'gait_diagram', 'nsga2', 'objectives', 'optimize', 'papers', 'phase_report',
+           'verification']

@@ -1,0 +1,311 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The report of ``analyze`` on a parameter set: as text, and as JSON."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+import math
+from typing import Any
+
+from cpg_ros.analysis.papers.commentary import COMMENTARIES, Commentary
+from cpg_ros.common.command_line import table
+from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
+from cpg_ros.dynamics.hopf import hopf_points, HopfPoint
+from cpg_ros.dynamics.isotypic import Block, blocks
+from cpg_ros.dynamics.stability import GaitAssessment, nearest_threshold
+from cpg_ros.networks.network import Network, ParameterLine
+import numpy as np
+
+#: Error of the multiplier along the orbit from which the report mentions it.
+UNSURE = 1e-6
+#: A variable so close to 0 at the stand is on the kink there.
+ON_KINK = 1e-12
+
+
+def _root(value: complex) -> str:
+    """Return a root or a pair of them, without a minus at zero."""
+    if abs(value.imag) < 1e-12:
+        return f'{value.real:.4f}'
+    return f'{value.real:.4f} +- {abs(value.imag):.4f}i'
+
+
+def _state(network: Network, rest: np.ndarray) -> str:
+    return ', '.join(f'{name} {value:.4f}' for name, value in named(network, rest).items())
+
+
+def _yes(value: bool) -> str:
+    return 'yes' if value else 'no'
+
+
+def _which(verdict: GaitAssessment, args: GaitAssessment) -> str:
+    """Return which of a gait's orbits is meant where it is not the first."""
+    if args is verdict:
+        return ''
+    assert args.orbit is not None
+    return f' (the orbit of period {args.orbit.period:.6f})'
+
+
+def _kind(point: HopfPoint) -> tuple[str, str]:
+    """Return the type of a Hopf point, and on which side of it its orbits lie."""
+    if point.normal_form.degenerate:
+        return 'degenerate', '-'
+    return ('supercritical' if point.supercritical else 'subcritical',
+            'above' if point.normal_form.side > 0 else 'below')
+
+
+def _degenerate(network: Network) -> list[str]:
+    """Return why there is no normal form, in lines."""
+    if not network.kinks:
+        return ['degenerate: the term of third order vanishes, so the normal form does not tell '
+                'on which side', 'orbits lie, nor whether they attract.']
+    return ['degenerate: the rates are linear about the stand, up to their kinks where '
+            f'{" or ".join(network.kinks)} passes 0.', 'So there is no normal form: at the point '
+            'itself waves of any size up to the kinks neither grow nor', 'decay, and orbits start '
+            'with the size at which they reach a kink, not with size 0.']
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Analysis(ShortRepr):
+    """A parameter set with its gaits.
+
+    Where the network has a delay, its Hopf points are those at which the delay is critical.
+
+    Attributes:
+        network: the parameters.
+        gaits: gait -> verdict.
+        along: parameters that vary along branches, and for Hopf points without a delay.
+        span: their first and last value.
+        longest: largest delay at which Hopf points are found, model time.
+
+    """
+
+    network: Network
+    gaits: Mapping[str, GaitAssessment]
+    along: ParameterLine
+    span: tuple[float, float]
+    longest: float
+
+    @cached_property
+    def _found(self) -> tuple[list[HopfPoint], tuple[Block, ...], np.ndarray, str]:
+        """Return Hopf points, blocks and equilibrium, or why there are none."""
+        try:
+            rest = equilibrium(self.network)
+            on = [name for name in self.network.kinks
+                  if abs(named(self.network, rest)[name]) < ON_KINK]
+            if on:
+                return [], (), np.array([]), (f'it lies on a kink of the rates, where '
+                                              f'{" and ".join(on)} is 0: they have no '
+                                              'linearisation, and there are no Hopf points')
+            parts = blocks(self.network, rest)
+            span = (0.0, self.longest) if self.delay else self.span
+            points = hopf_points(self.network, self.line, *span) if span[0] < span[1] else []
+        except CpgError as error:
+            return [], (), np.array([]), str(error)
+        return points, parts, rest, ''
+
+    @property
+    def delay(self) -> str:
+        """Name of the delay, or ''."""
+        return self.network.delay_parameter
+
+    @property
+    def line(self) -> ParameterLine:
+        """Parameters that vary for Hopf points."""
+        return ParameterLine((self.delay,), (1.0,)) if self.delay else self.along
+
+    @property
+    def hopf(self) -> list[HopfPoint]:
+        """Hopf points of the equilibrium, by rising parameter."""
+        return self._found[0]
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The linearisation at the equilibrium, by symmetry class."""
+        return self._found[1]
+
+    @property
+    def _commentary(self) -> Commentary:
+        return COMMENTARIES.get(self.network.name, Commentary())
+
+    @property
+    def existing(self) -> list[GaitAssessment]:
+        """Gaits that exist at these parameters."""
+        return [verdict for verdict in self.gaits.values() if verdict.orbit is not None]
+
+    @property
+    def parameters(self) -> str:
+        """The network's parameters in a line."""
+        values = self.network.as_dict()
+        for name, members in self.network.groups.items():
+            if len({values[member] for member in members}) == 1:
+                values = {name if key == members[0] else key: value for key, value
+                          in values.items() if key == members[0] or key not in members}
+        return ', '.join(f'{name} {value:g}' for name, value in values.items())
+
+    def _gaits(self) -> list[str]:
+        names = next((list(verdict.phases) for verdict in self.existing), [])
+        rows: list[tuple[str, ...]] = [(
+            'gait', 'period', 'amplitude', *names, 'in class', 'transverse', 'stable',
+            'gain needed', 'default', 'stable then')]
+        for verdict in (one for whole in self.existing for one in whole.orbits):
+            assert verdict.orbit is not None
+            rows.append((
+                verdict.gait, f'{verdict.orbit.period:.6f}', f'{verdict.amplitude:.6f}',
+                *(f'{phase:g}' for phase in verdict.phases.values()),
+                f'{verdict.multipliers.leading_within:.4f}',
+                f'{verdict.multipliers.leading_transverse:.4f}', _yes(verdict.stable),
+                f'{verdict.smallest_gain:.4f}', f'{verdict.default_gain:.4f}',
+                _yes(verdict.stable_with_default_gain)))
+        lines = [
+            'Gaits at these parameters (period in model time; phases in cycles; largest Floquet',
+            'multipliers per cycle in the symmetry class and transverse to it; gains of the',
+            'symmetry lock per model time):'] + [
+                f'  {line}' for line in table(rows, '<>>' + '>' * len(names) + '>>>>>>')]
+        if not self.existing:
+            lines = ['No gait at these parameters.']
+        lines += [f'  {one.gait}: the multiplier along the orbit comes out as '
+                  f'{abs(one.multipliers.trivial):.6g} instead of 1; the others are no better'
+                  for whole in self.existing for one in whole.orbits
+                  if one.multipliers.error > UNSURE]
+        missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
+        return lines + [f'  no {verdict.gait}: {self._reason(verdict)}' for verdict in missing]
+
+    @staticmethod
+    def _reason(verdict: GaitAssessment) -> str:
+        """Return why a gait does not exist, without the list of all parameters."""
+        text = verdict.why.removeprefix(f'no {verdict.gait} ')
+        head, way, rest = text.partition(' of the way, to ')
+        return f'{head} of the way, no further{rest.partition("no further")[2]}' if way else text
+
+    def _conclusion(self) -> str:
+        """Return a summary in a sentence or two."""
+        if not self.existing:
+            nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
+            return f'This set gives no gait{nearest}.'
+        by_itself, locked, never, text = [], [], [], []
+        for verdict in self.existing:
+            if stable := [one for one in verdict.orbits if one.stable]:
+                by_itself.append(verdict.gait + _which(verdict, stable[0]))
+            elif held := [one for one in verdict.orbits if one.stable_with_default_gain]:
+                locked.append(verdict.gait + _which(verdict, held[0]))
+            else:
+                count = len(verdict.orbits)
+                orbits = 'one orbit' if count == 1 else f'{count} orbits'
+                never.append(f'{verdict.gait} ({orbits}, {verdict.searched})')
+        if by_itself:
+            text.append(f'{", ".join(by_itself)}: stable.')
+        if locked:
+            text.append(f'{", ".join(locked)}: stable with the symmetry lock only; without it a '
+                        'small disturbance takes over.')
+        if never:
+            text.append(f'{", ".join(never)}: does not attract, with or without the lock.')
+        return ' '.join(text)
+
+    def text(self) -> str:
+        """Return the report as text."""
+        return '\n'.join([f'{self.network.name}: {self.parameters}', '', *self._rest(), '',
+                          *self._gaits(), '', self._conclusion()])
+
+    def _rest(self) -> list[str]:
+        """Return lines on the equilibrium and its Hopf points."""
+        _, parts, rest, why = self._found
+        if why:
+            return [f'Stand: {why}.']
+        lines = [*(self._roots(parts, rest) if self.delay else self._eigenvalues(parts, rest)), '']
+        where = (f'up to a delay of {self.longest:g}' if self.delay else
+                 f'with {self.along} from {self.span[0]:g} to {self.span[1]:g}')
+        return [*lines, *(self._points(where) if self.hopf else [f'No Hopf point {where}.'])]
+
+    def _roots(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+        """Return, with a delay, how many roots lie to the right, and the rightmost."""
+        unstable = sum(len(block.right_of(0.0)) for block in parts)
+        block = max(parts, key=lambda one: one.leading.real)
+        count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
+        place = '' if odd(self.network) else f' at {_state(self.network, rest)}'
+        return [f'Rest{place}: {count} with positive real part; the rightmost is '
+                f'{_root(block.leading)} per model time, of mode '
+                f'({", ".join(map(str, block.mode))}).']
+
+    def _eigenvalues(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+        rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
+        rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
+        return [f'Stand: {_state(self.network, rest)}; eigenvalues per model time by symmetry '
+                'class:', *(f'  {line}' for line in table(rows))]
+
+    def _points(self, where: str) -> list[str]:
+        """Return a table of the Hopf points."""
+        text, heads = self._commentary, () if self.delay else ('l1',)
+        rows: list[tuple[str, ...]] = [(
+            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *text.heads,
+            'type', 'orbits', 'others', 'transverse')]
+        for point in self.hopf:
+            numbers = {'omega': point.omega, 'period': math.tau / point.omega,
+                       **self._form(point), **text.numbers(point)}
+            rows.append((
+                point.gait, point.wave, f'{point.value:.4f}',
+                *('-' if number is None else f'{number:.4f}' for number in numbers.values()),
+                *_kind(point), str(point.unstable_roots), str(point.unstable_transverse_roots)))
+        explained = (
+            f'{self.delay} and period in model time; omega in rad per model time; '
+            f'{text.explained}others: further roots with positive real part, transverse: of them '
+            'outside the class' if self.delay else
+            f'omega in rad per model time; {text.explained}others: further eigenvalues with '
+            'positive\nreal part, transverse: of them outside the class')
+        middle = len(rows[0]) - 6
+        lines = [*f'Hopf points {where} ({explained}):'.split('\n'),
+                 *(f'  {line}' for line in table(rows, '<<' + '>' * middle + '<<>>'))]
+        remarks = [f'  {self.line} {point.value:.4f}: {remark}' for point in self.hopf
+                   if (remark := text.remark(point)[0])]
+        if any(point.normal_form.degenerate for point in self.hopf):
+            lines += [f'  {line}' for line in _degenerate(self.network)]
+        return [*lines, '', text.title, *remarks] if remarks else lines
+
+    def _form(self, point: HopfPoint) -> dict[str, float | None]:
+        """Return the coefficients of the normal form; with a delay, in units of the delay."""
+        form, none = point.normal_form, point.normal_form.degenerate
+        if self.delay:
+            form = point.in_delays
+            return {'k1': form.k1.real, 'k2': None if none else form.k2.real}
+        return {'k1': form.k1.real, 'k2': None if none else form.k2.real,
+                'lyapunov': None if none else point.lyapunov}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything in plain types."""
+        _, parts, rest, why = self._found
+        text: dict[str, Any] = {
+            'network': self.network.name, 'params': self.network.as_dict(),
+            'gaits': {gait: verdict.as_dict() for gait, verdict in self.gaits.items()}}
+        text['hopf'] = [{
+            'gait': point.gait, 'mode': list(point.mode), 'wave': point.wave,
+            **({'n': point.n, 'omega': point.omega, self.delay: point.value} if self.delay else
+               {'along': str(self.along), 'value': point.value, 'omega': point.omega}),
+            **self._form(point), **self._commentary.numbers(point),
+            'direction': point.direction,
+            **dict.fromkeys(('supercritical', 'stable_on_centre_manifold'),
+                            None if point.normal_form.degenerate else point.supercritical),
+            'degenerate': point.normal_form.degenerate,
+            'unstable_roots': point.unstable_roots,
+            'unstable_transverse_roots': point.unstable_transverse_roots,
+            **self._commentary.remark(point)[1]} for point in self.hopf]
+        text['rest'] = {'why': why} if why else {
+            **({} if odd(self.network) else {'stand': named(self.network, rest)}),
+            'leading_roots': [{
+                'mode': list(block.mode), **({} if self.delay else {'gait': block.gait}),
+                'real': block.leading.real, 'imag': block.leading.imag} for block in parts]}
+        if self.delay and not self.existing:
+            text['nearest_threshold'] = nearest_threshold(self.network)
+        return text

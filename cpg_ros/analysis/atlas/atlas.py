@@ -1,0 +1,186 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``atlas``: a map of where gaits live, over two parameters.
+
+``atlas --network delayed --over c=2:10 tau=0.2:2 --out atlas/`` computes what a coarse grid and
+its refinement need, follows the exact boundaries, and draws the map.
+"""
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
+from itertools import chain
+from pathlib import Path
+import sys
+from typing import Any
+
+from cpg_ros.analysis.atlas.chart import chart_of, ParameterPlane
+from cpg_ros.analysis.atlas.fold_curves import (
+    bautin_folds,
+    distinct,
+    edges_without_orbit,
+    fold_curves,
+)
+from cpg_ros.analysis.atlas.grid import GaitMap, refine, uncrossed_edges
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, curves_from, hopf_curves, hopf_starts
+from cpg_ros.analysis.atlas.hopf_degeneracies import with_degeneracies
+from cpg_ros.analysis.atlas.map import AtlasFolder, draw_map
+from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
+from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow
+from cpg_ros.common.command_line import named_interval, note, Parser, refuse_repeated, run, say
+from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
+from cpg_ros.common.workers import add_options, KEPT, working
+from cpg_ros.fitting.inversion.results import library
+from cpg_ros.networks.network import known
+from cpg_ros.networks.network_options import add_network_options, chosen_network
+from cpg_ros.networks.registry import reference
+
+DESCRIPTION = """\
+Map where a network's gaits live over two parameters: whether each exists and is stable, with what
+symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
+neighbours differ; Hopf points, folds, torus points, period doublings, branch points and the
+places at which a period grows without bound are followed as exact curves and drawn on top, with
+the points at which a second condition holds: Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens
+points, resonances of torus points, cusps."""
+EPILOG = """\
+files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
+with --interactive. Run the same command again to continue where it stopped.
+
+exit codes: 0 drawn, 2 invalid arguments, 130 stopped (finished parts are kept)."""
+
+
+def _points(text: str) -> tuple[int, int]:
+    one, sign, other = text.partition('x')
+    if not (one.isdecimal() and (other.isdecimal() or not sign)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form 200x200")
+    return int(one), int(other or one)
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG)
+    add_network_options(parser)
+    parser.add_argument('--over', nargs=2, required=True, metavar='PARAMETER=LOW:HIGH',
+                        type=partial(named_interval, name='parameter'),
+                        help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
+    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
+                        help='gaits to map (default: all)')
+    parser.add_argument('--points', type=_points, default=(200, 200), metavar='NxM',
+                        help='points of the grid (default: 200x200)')
+    parser.add_argument('--interactive', action='store_true', help='also write index.html, '
+                        'where a click on the map shows waveforms, footfalls and a preset to copy')
+    add_options(parser)
+    parser.add_argument('--out', type=Path, default=Path('atlas'), metavar='DIR',
+                        help='folder for the files (default: %(default)s)')
+    return parser
+
+
+def _planned(args: argparse.Namespace) -> tuple[ParameterPlane, tuple[str, ...]]:
+    base = chosen_network(args)
+    for gait in args.gaits:
+        known(gait, base.gaits())
+    return (chart_of(reference(base.name), base, args.over, args.points),
+            tuple(args.gaits or base.gaits()))
+
+
+def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecutor, folder: Path
+          ) -> tuple[dict[str, GaitMap], list[Boundary], list[Path]]:
+    """Compute an atlas on a fleet, and write its table and its map.
+
+    Raises:
+        InputError: the folder holds something else.
+        OSError: a file cannot be written.
+
+    """
+    stored = AtlasFolder(folder, chart, gaits)
+
+    def run(jobs: Iterable[AtlasRow],
+            count: int) -> Iterator[tuple[AtlasRow, list[dict[str, Any]]]]:
+        with JobProgress('rows', count) as tally:
+            left = []
+            for row in jobs:
+                done = stored.get(row)
+                if done is None:
+                    left.append(row)
+                else:
+                    tally.add(kept=True)
+                    yield row, done
+            for outcome in outcomes(fleet, assess_row, left, tally.tick):
+                if outcome.error is not None:
+                    raise outcome.error
+                tally.add()
+                yield outcome.job, stored.put(outcome.job, outcome.value)
+
+    curves = stored.curves()
+    if curves is None:
+        fleet.what = 'lines'
+        hopf = hopf_curves(chart, gaits, fleet.map)
+    else:
+        hopf = [curve for curve in curves if curve.kind == 'Hopf']
+    sheets = refine(chart, gaits, hopf, run)
+    if curves is None:
+        fleet.what = 'edges'
+        missed = curves_from(chart, chain(*fleet.map(hopf_starts, [
+            edge for gait, sheet in sheets.items()
+            for edge in uncrossed_edges(chart, gait, sheet, hopf)])))
+        if missed:
+            hopf += missed
+            sheets = refine(chart, gaits, hopf, run)
+        fleet.what = 'boundaries'
+        hopf = [*fleet.map(with_degeneracies, [(chart, curve) for curve in hopf])]
+        jobs: list[tuple[Any, ...]] = [
+            *((bautin_folds, (chart, curve)) for curve in hopf),
+            *((orbit_curves, (chart, gait, edges(chart, sheet)))
+              for gait, sheet in sheets.items()),
+            *((fold_curves, (chart, gait, edges_without_orbit(chart, sheet)))
+              for gait, sheet in sheets.items())]
+        curves = [*hopf, *distinct(chart, chain(*fleet.map(_called, jobs)))]
+        stored.put_curves(curves)
+    table, picture = stored.write(sheets), folder / 'map.png'
+    draw_map(picture, chart, sheets, curves)
+    return sheets, curves, [table, folder / 'boundaries.json', picture]
+
+
+def _called(job: tuple[Any, ...]) -> Any:
+    function, outcome = job
+    return function(outcome)
+
+
+def _map(args: argparse.Namespace) -> int:
+    refuse_repeated('argument --gaits', args.gaits)
+    library()
+    chart, gaits = _planned(args)
+    with working(args, '', partial(note, 'atlas')) as fleet:
+        sheets, curves, written = drawn(chart, gaits, fleet, args.out)
+    if args.interactive:
+        # Only pages need it.
+        from cpg_ros.analysis.atlas.map import write_page
+        written.append(write_page(args.out / 'index.html', chart, sheets, curves))
+    counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
+                        for gait, sheet in sheets.items())
+    special = dict.fromkeys(str(point) for curve in curves for point in curve.codimension_two)
+    say(f'share of the plane in which each gait exists: {counted}\n'
+        f'boundaries: {", ".join(map(str, curves)) or "none"}\n'
+        f'of codimension two: {"; ".join(special) or "none found"}\n'
+        f'written: {", ".join(map(str, written))}')
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw an atlas; return the exit code."""
+    return run(_parser(), _map, arguments, KEPT)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

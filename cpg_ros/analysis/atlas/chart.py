@@ -1,0 +1,187 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The plane of an atlas: two lines of parameters, their ranges, and the grid on them."""
+
+from dataclasses import dataclass
+import math
+from typing import Any
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.networks.network import Network, ParameterLine
+from cpg_ros.networks.registry import find_network, reference
+import numpy as np
+
+# Points on the boundaries of an atlas at which a second condition holds.
+
+#: Kind -> its usual abbreviation, as MatCont has it.
+LABELS = {'Bautin': 'GH', 'Hopf-Hopf': 'HH', 'zero-Hopf': 'ZH', 'Bogdanov-Takens': 'BT',
+          '1:1 resonance': 'R1', '1:2 resonance': 'R2', '1:3 resonance': 'R3',
+          '1:4 resonance': 'R4', 'cusp': 'CP'}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CodimensionTwo(ShortRepr):
+    """A point of a boundary at which a second condition holds.
+
+    Attributes:
+        kind: one of LABELS.
+        gait: whose: of several that share a curve each has its own coefficients.
+        values: on both axes.
+        test: what the function that is zero there is at these values: the first Lyapunov
+            coefficient at a Bautin point, the real part of the other root at a Hopf-Hopf or
+            zero-Hopf point, the largest residual of the defining equations at others.
+        omega: of the curve's own critical root, rad per model time; nan on curves of orbits.
+        other: gaits of the classes of the other roots, '' for a class that no gait has.
+        other_omega: of the other root; nan where there is none.
+
+    """
+
+    kind: str
+    gait: str
+    values: tuple[float, float]
+    test: float
+    omega: float = math.nan
+    other: tuple[str, ...] = ()
+    other_omega: float = math.nan
+
+    def __str__(self) -> str:
+        of = ' and '.join([self.gait, *filter(None, self.other)])
+        return f'{self.kind} of {of} at {self.values[0]:.7g}, {self.values[1]:.7g}'
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything in plain types; what does not apply is None."""
+        return {'type': self.kind, 'gait': self.gait, 'values': list(self.values),
+                'test': self.test, 'omega': _plain(self.omega), 'other': list(self.other),
+                'other_omega': _plain(self.other_omega)}
+
+    @classmethod
+    def of(cls, stored: dict[str, Any]) -> 'CodimensionTwo':
+        """Make one from what as_dict returned."""
+        one, other = stored['values']
+        omegas = [math.nan if stored[name] is None else stored[name]
+                  for name in ('omega', 'other_omega')]
+        return cls(stored['type'], stored['gait'], (one, other), stored['test'], omegas[0],
+                   tuple(stored['other']), omegas[1])
+
+
+def _plain(number: float) -> float | None:
+    return None if math.isnan(number) else number
+
+
+#: Points of the coarse grid are this many apart, a power of 2.
+COARSE = 8
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A line of parameters and the values on it: ``tau=0.2:2``."""
+
+    line: ParameterLine
+    low: float
+    high: float
+    count: int
+
+    @property
+    def values(self) -> np.ndarray:
+        """Evenly from low to high, shape (count,)."""
+        return np.linspace(self.low, self.high, self.count)
+
+
+@dataclass(frozen=True)
+class ParameterPlane:
+    """A plane of networks.
+
+    Attributes:
+        network: name or file, as find_network takes it.
+        base: all parameters, of which those on the axes do not matter.
+        first: the axis whose values make rows.
+        second: the axis along which orbits are continued in a row.
+
+    """
+
+    network: str
+    base: dict[str, float]
+    first: Axis
+    second: Axis
+
+    @property
+    def low(self) -> np.ndarray:
+        """Lower ends of both axes, shape (2,)."""
+        return np.array([self.first.low, self.second.low])
+
+    @property
+    def size(self) -> np.ndarray:
+        """Lengths of both axes, shape (2,)."""
+        return np.array([self.first.high, self.second.high]) - self.low
+
+    def at(self, one: float, other: float) -> Network:
+        """Return the network with a value on each axis."""
+        whole = find_network(self.network)(**self.base)
+        return self.second.line.at(self.first.line.at(whole, one), other)
+
+    def at_share(self, fraction: np.ndarray) -> Network:
+        """Return the network at a point given in shares of the ranges, shape (2,)."""
+        return self.at(*self.values_at(fraction))
+
+    def values_at(self, fraction: np.ndarray) -> tuple[float, float]:
+        """Return the values on both axes at a point given in shares of the ranges, shape (2,)."""
+        one, other = (self.low + fraction * self.size).tolist()
+        return one, other
+
+    def fraction(self, point: tuple[int, int]) -> np.ndarray:
+        """Return a point of the grid, given by row and column, in shares of the ranges."""
+        return np.array(point) / (self.first.count - 1, self.second.count - 1)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything in plain types."""
+        return {'network': self.network, 'base': self.base,
+                'axes': [{'line': str(axis.line), 'low': axis.low, 'high': axis.high,
+                          'count': axis.count} for axis in (self.first, self.second)]}
+
+
+def chart_of(network: str, base: Network, over: list[tuple[str, tuple[float, float]]],
+             counts: tuple[int, int]) -> ParameterPlane:
+    """Lay out the plane.
+
+    Args:
+        network: name or file.
+        base: the other parameters.
+        over: two lines with their ranges, as ``alpha=beta`` and (low, high).
+        counts: points on each.
+
+    Raises:
+        InputError: a line, a range or a count that cannot be used.
+
+    """
+    axes = []
+    for (text, (low, high)), count in zip(over, counts, strict=True):
+        line = ParameterLine.parse(text, type(base))
+        if not (np.isfinite(low) and np.isfinite(high) and low < high):
+            raise InputError(f'{text}: {low:g} is not below {high:g}')
+        for name, sign in zip(line.names, line.signs, strict=True):
+            known = type(base).ranges[name]
+            for value in (sign * low, sign * high):
+                if not known.low <= value <= known.high:
+                    raise InputError(f'{name}: {value:g} is not within {known.low:g} to '
+                                     f'{known.high:g}')
+        if not 2 <= count <= 2001:
+            raise InputError(f'{text}: {count} points are not between 2 and 2001')
+        axes.append(Axis(line, low, high, count))
+    if set(axes[0].line.names) & set(axes[1].line.names):
+        raise InputError(f'{axes[0].line} and {axes[1].line} move the same parameter')
+    # Orbits are continued along the delay, where onsets are known in closed form.
+    if base.delay_parameter in axes[0].line.names:
+        axes.reverse()
+    return ParameterPlane(reference(type(base).name), base.as_dict(), *axes)

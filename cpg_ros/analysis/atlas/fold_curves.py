@@ -1,0 +1,495 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Curves of folds of a gait's orbits in two parameters.
+
+At a fold the second parameter turns round along the branch: its component of the tangent is zero.
+From a fold the next one is found by holding the unknowns in the plane normal to the last tangent
+while the first parameter moves a step, and then going along the branch to where it turns.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
+from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, crossed, HopfCondition
+from cpg_ros.analysis.atlas.orbit_curves import Edge
+from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.arclength import (
+    CurvePoint,
+    fixed_unknown,
+    NoOrbit,
+    predict_and_correct,
+    resolve_point,
+)
+from cpg_ros.dynamics.continuation import (
+    Branch,
+    BranchPoint,
+    continue_from_hopf,
+    continue_orbit,
+    law_of_growth,
+)
+from cpg_ros.dynamics.hopf import hopf_at
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+# Cusps of fold curves: where two folds of a branch meet and none is left.
+
+#: How far along a branch the second fold is looked for, and how far beyond the last fold of a
+#: curve its cusp is, in shares of the first parameter's range.
+CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
+BEYOND = (0.00125, 0.005, 0.02)
+#: To what the extremum is located along a branch, and the cusp, in shares.
+ALONG, EXACT = 1e-7, 1e-13
+#: Smaller orbits end in rest, not in a cusp.
+SMALLEST = 0.02
+
+
+def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, way: float
+                ) -> CodimensionTwo | None:
+    """Locate the cusp in which a fold curve ends; None if it ends otherwise.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        fold: the curve's last fold, along the second axis.
+        one: value on the first axis there.
+        way: 1 or -1, the direction in which the curve was followed.
+
+    """
+    if fold.amplitude < SMALLEST:
+        return None
+    try:
+        reach, sign = _pair(fold)
+        middle, _ = _extremum(_rates(fold), reach, sign)
+        base = predict_and_correct(fold, middle)
+        if base is None or base.amplitude < SMALLEST:
+            return None
+
+        def place(value: float) -> CurvePoint:
+            curve: Any = base.curve
+            moved = replace(curve, network=chart.at(value, base.value))
+            found = resolve_point(moved, base.z, base.tangent)
+            if found is None:
+                raise NoOrbit('the branch is lost')
+            return found
+
+        def dip(value: float) -> float:
+            return _extremum(_rates(place(value)), reach, sign)[1]
+
+        for fraction in BEYOND:
+            far = one + way * fraction * chart.size[0]
+            if not chart.first.low <= far <= chart.first.high:
+                return None
+            if dip(far) > 0.0 > dip(one):
+                cusp = brentq(dip, *sorted((one, far)), xtol=EXACT * chart.size[0], rtol=1e-15)
+                there = place(cusp)
+                middle, left = _extremum(_rates(there), reach, sign)
+                found = predict_and_correct(there, middle)
+                if found is None or abs(left) > 1e-6 or abs(middle) > 0.9 * reach:
+                    return None
+                return CodimensionTwo('cusp', gait, (float(cusp), found.value), abs(left))
+    except (NoOrbit, np.linalg.LinAlgError, ValueError):
+        return None
+    return None
+
+
+def _rates(at: CurvePoint) -> Callable[[float], float]:
+    def rate(step: float) -> float:
+        found = predict_and_correct(at, step)
+        if found is None:
+            raise NoOrbit('no point')
+        return found.rate
+    return rate
+
+
+def _pair(fold: CurvePoint) -> tuple[float, float]:
+    """Return how far along the branch another fold is passed, and the sign of the rates beyond.
+
+    Raises:
+        NoOrbit: there is none so close.
+
+    """
+    rate = _rates(fold)
+    for reach in CUSP_REACHES:
+        left, right = rate(-reach), rate(reach)
+        if left * right > 0.0:
+            return 1.5 * reach, float(np.sign(left))
+    raise NoOrbit('no other fold')
+
+
+def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tuple[float, float]:
+    """Return where the rate, with a sign, is least, and what it is there."""
+    found = minimize_scalar(lambda step: sign * rate(step), method='bounded',
+                            bounds=(-reach, reach), options={'xatol': ALONG})
+    return float(found.x), float(found.fun)
+
+
+# Curves in two parameters on which the period of a gait's orbits grows without bound.
+
+#: Steps of the first parameter in shares of its range.
+LONG_PERIOD_STEP, LONG_PERIOD_SHORTEST = 1.0 / 24.0, 1.0 / 800.0
+#: Shares of the largest period at which the second parameter is solved for, by law.
+SHARES = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
+#: Powers of 1/T in the series of a saddle node.
+POWERS = 0, 2, 3, 4
+#: Differences this small, in shares of the range, are rounding: the limit has been reached.
+ROUNDING = 1e-11
+
+
+def infinite_periods(chart: ParameterPlane, gait: str, branch: Branch,
+                     one: float) -> list[Boundary]:
+    """Follow the ends of a branch at which its period grows without bound.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        branch: along the second axis.
+        one: value on the first axis there.
+
+    Returns:
+        Boundaries 'homoclinic' and 'SNIC' (a saddle node on the invariant circle).
+
+    """
+    found = []
+    for end, points in ((branch.ends[0], branch.points[::-1]), (branch.ends[1], branch.points)):
+        if end.why == 'period' and (law := _law(points)):
+            start = points[-1].place
+            ways = [_continue_long_period(chart, start, one, way,
+                                          SHARES[law]) for way in (-1.0, 1.0)]
+            here = _limit(chart, start, one, SHARES[law])
+            found.append(Boundary(law, (gait,), np.array([
+                *ways[0][::-1], *([] if here is None else [(one, here[0])]), *ways[1]])))
+    return [curve for curve in found if len(curve.points) > 1]
+
+
+def _law(points: tuple[BranchPoint, ...]) -> str | None:
+    return law_of_growth(np.array([point.value for point in points]),
+                         np.array([point.orbit.period for point in points]))
+
+
+def _continue_long_period(chart: ParameterPlane, place: CurvePoint, one: float, way: float,
+                          fractions: tuple[float, ...]
+              ) -> list[tuple[float, float]]:
+    """Follow orbits of one large period from a place on, in a direction of the first parameter."""
+    found: list[tuple[float, float]] = []
+    step = LONG_PERIOD_STEP
+    while step >= LONG_PERIOD_SHORTEST:
+        new = one + way * step * chart.size[0]
+        limit = (_limit(chart, place, new, fractions)
+                 if chart.first.low <= new <= chart.first.high else None)
+        if limit is None:
+            # Beyond the edge, too: up to it.
+            step *= 0.5
+            continue
+        if not chart.second.low <= limit[0] <= chart.second.high:
+            break
+        found.append((new, limit[0]))
+        place, one, step = limit[1], new, min(LONG_PERIOD_STEP, 1.5 * step)
+    return found
+
+
+def _limit(chart: ParameterPlane, place: CurvePoint, one: float, fractions: tuple[float, ...]
+           ) -> tuple[float, CurvePoint] | None:
+    """Return the second parameter's limit at a value of the first, and the orbit nearest to it.
+
+    Args:
+        chart: the plane.
+        place: an orbit of the large period, at a value of the first parameter nearby.
+        one: the first parameter.
+        fractions: of that period, falling.
+
+    """
+    length = float(place.z[-2])
+    places: list[CurvePoint] = []
+    for fraction in fractions:
+        last = places[-1] if places else place
+        curve: Any = last.curve
+        z = last.z.copy()
+        z[-2] = fraction * length
+        try:
+            found = resolve_point(replace(curve, network=chart.at(one, last.value)), z,
+                                  fixed_unknown(z.size, -2))
+        except (NoOrbit, np.linalg.LinAlgError):
+            return None
+        if found is None:
+            return None
+        places.append(found)
+    return _extrapolated(np.array([point.value for point in places]), np.array(fractions),
+                         ROUNDING * chart.size[1]), places[0]
+
+
+def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) -> float:
+    """Return the limit of values at shares of a period, by the law that has as many."""
+    if len(values) == len(POWERS):
+        return float(np.linalg.solve(fractions[:, None] ** -np.array(POWERS, dtype=float),
+                                     values)[0])
+    first, second, third = values
+    bend = first - 2.0 * second + third
+    if abs(first - second) <= rounding or not bend:
+        return float(first)
+    return float(first - (first - second)**2 / bend)
+
+
+#: Steps of the first parameter in shares of its range, and how far along a branch its turn is
+#: looked for.
+STEP, SHORTEST, REACHES = 1.0 / 24.0, 1.0 / 800.0, (0.01, 0.03, 0.1, 0.3)
+#: Smaller orbits are rest.
+REST = 5e-3
+#: Edges that are tried for a gait, points of a branch, and curves this close, in shares, are one.
+TRIED, MOST, SAME = 8, 80, 0.02
+
+
+def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
+    """Return neighbours on the coarse grid, along the second axis, one of which has no orbit."""
+    columns = grid_indices(chart.second.count, COARSE)
+    found = []
+    for row in grid_indices(chart.first.count, COARSE):
+        for one, other in pairwise(columns):
+            for at, there in (((row, one), (row, other)), ((row, other), (row, one))):
+                if at in sheet.waves and sheet.label[there] == NONE:
+                    found.append(Edge(chart.fraction(at), chart.fraction(there), *sheet.waves[at]))
+    return found
+
+
+def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
+    """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points.
+
+    Where the branch ends in orbits without a period these are followed, too.
+    """
+    chart, gait, edges = job
+    found: list[Boundary] = []
+    for edge in edges[::max(1, len(edges) // TRIED)]:
+        try:
+            branch = _branch(chart, gait, edge)
+        except (CpgError, np.linalg.LinAlgError):
+            continue
+        one = chart.first.low + edge.here[0] * chart.size[0]
+        for fold in branch.folds:
+            if not _known(chart, found, one, fold.value):
+                found.append(fold_curve(chart, gait, fold.place, one))
+        if any(end.why == 'period' and not _known(chart, found, one, end.value)
+               for end in branch.ends):
+            found += infinite_periods(chart, gait, branch, one)
+    return found
+
+
+def _known(chart: ParameterPlane, found: list[Boundary], one: float, other: float) -> bool:
+    return any((np.abs(curve.points - (one, other)) / chart.size).max(axis=1).min() < SAME
+               for curve in found)
+
+
+def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float) -> Boundary:
+    """Follow the folds on both sides of one, with the cusps in which they end.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        fold: a fold along the second axis.
+        one: value on the first axis there.
+
+    """
+    back, ahead = (continue_fold(chart, fold, one, way) for way in (-1.0, 1.0))
+    points = [(value, place.value) for value, place in
+              [*back[::-1], (one, fold), *ahead]]
+    ends = [(back or [(one, fold)])[-1], (ahead or [(one, fold)])[-1]]
+    cusps = [cusp_beyond(chart, gait, place, value, way)
+             for (value, place), way in zip(ends, (-1.0, 1.0), strict=True)]
+    # A cusp is the last point of its curve.
+    return Boundary('fold', (gait,), np.array([
+        *(cusp.values for cusp in cusps[:1] if cusp), *points,
+        *(cusp.values for cusp in cusps[1:] if cusp)]), tuple(filter(None, cusps)))
+
+
+def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
+    """Return the branch in the row of an edge."""
+    orbit = solve_from_wave(chart.at_share(edge.here), gait, edge.wave, edge.period)
+    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
+                          most=MOST)
+
+
+def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: float
+             ) -> list[tuple[float, CurvePoint]]:
+    """Follow folds from one on in a direction of the first parameter.
+
+    Args:
+        chart: the plane.
+        fold: a fold along the second axis.
+        one: value on the first axis there.
+        way: 1 or -1, the direction.
+
+    Returns:
+        The value on the first axis and the fold, of each.
+
+    """
+    found: list[tuple[float, CurvePoint]] = []
+    size, step = chart.size[0], STEP
+    before: tuple[Any, float] | None = None
+    while step >= SHORTEST:
+        new = one + way * step * size
+        guess = fold.z
+        if before is not None and before[0].size == fold.z.size:
+            guess = fold.z + (fold.z - before[0]) * (new - one) / (one - before[1])
+        ahead = None
+        if chart.first.low <= new <= chart.first.high:
+            ahead = _next(chart, fold, new, guess)
+        if ahead is None or ahead.amplitude < REST or not _on_course(chart, [
+                *found[-2:], (new, ahead)], step):
+            # Another fold of the branch is none of this curve.
+            # Beyond a Bautin point what is left is the Hopf point, where branches turn, too.
+            # Beyond the edge, too: up to it.
+            step *= 0.5
+            continue
+        if not chart.second.low <= ahead.value <= chart.second.high:
+            break
+        before = fold.z, one
+        fold, one = ahead, new
+        found.append((one, ahead))
+        step = min(STEP, 1.5 * step)
+    return found
+
+
+def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step: float) -> bool:
+    """Whether a fold lies about where the two before it lead, a step in shares later."""
+    if len(last) < 3:
+        return True
+    (a, one), (b, two), (c, three) = last
+    ahead = two.value + (two.value - one.value) * (c - b) / (b - a)
+    return bool(abs(three.value - ahead) < 0.5 * step * chart.size[1])
+
+
+def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
+          guess: np.ndarray) -> CurvePoint | None:
+    """Return the fold at a value of the first parameter, from one nearby, or None."""
+    curve: Any = fold.curve
+    moved = replace(curve, network=chart.at(new, fold.value))
+    try:
+        near = resolve_point(moved, guess, fold.tangent)
+        if near is None:
+            return None
+
+        def rate(step: float) -> float:
+            place = predict_and_correct(near, step)
+            if place is None:
+                raise np.linalg.LinAlgError('no point')
+            return place.rate
+
+        for reach in REACHES:
+            if rate(-reach) * rate(reach) < 0.0:
+                return predict_and_correct(near, brentq(rate, -reach, reach, xtol=1e-11))
+    except (NoOrbit, np.linalg.LinAlgError):
+        return None
+    return None
+
+
+# The curve of folds of orbits that is born at a Bautin point.
+
+#: How far beside the Bautin point a branch is started, in shares of the ranges, the amplitude of
+#: its first orbit, its longest step, and points at most.
+BESIDE, AMPLITUDE, LONGEST, BAUTIN_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
+#: A fold this far, in shares, from its Hopf point is another one; the curve's end that is this
+#: close to the Bautin point ends there.
+NEAR, END = 0.2, 0.02
+#: A curve that stays this close to another one, in shares, is that.
+BAUTIN_SAME = 3e-3
+
+
+def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
+    """Follow the fold curves that are born at the Bautin points of a curve of Hopf points.
+
+    Each begins with the Bautin point. Of one that cannot be started there is none, as where the
+    branch does not turn within the plane.
+    """
+    chart, curve = job
+    found = []
+    for point in curve.codimension_two:
+        if point.kind == 'Bautin':
+            born = _born(chart, point)
+            if born is not None:
+                found.append(born)
+    return found
+
+
+def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary]:
+    """Leave out fold curves that run along one before them, which may have been met elsewhere."""
+    kept: list[Boundary] = []
+    for curve in curves:
+        fractions = (curve.points[:, :2] - chart.low) / chart.size
+        some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
+        if curve.kind != 'fold' or not any(
+                one.kind == 'fold' and one.gaits == curve.gaits
+                and all(crossed(one, chart, fraction - 0.5 * BAUTIN_SAME,
+                                fraction + 0.5 * BAUTIN_SAME)
+                        for fraction in some) for one in kept):
+            kept.append(curve)
+    return kept
+
+
+def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:
+    fraction = np.append((np.array(point.values) - chart.low) / chart.size, point.omega)
+    condition = condition_of(chart, point.gait, fraction)
+    tangent = condition.tangent(fraction)
+    if abs(tangent[0]) < abs(tangent[1]):
+        # Branches have to cross the Hopf curve, not to run along it.
+        born = _born(replace(chart, first=chart.second, second=chart.first), _turned(point))
+        return born and Boundary('fold', born.gaits, born.points[:, ::-1],
+                                 tuple(map(_turned, born.codimension_two)))
+    for fold, one in _folds(condition, fraction, tangent):
+        whole = fold_curve(chart, point.gait, fold, one)
+        points = whole.points
+        gaps = [(np.abs(end - point.values) / chart.size).max()
+                for end in (points[0], points[-1])]
+        if min(gaps) > END:
+            continue
+        if gaps[1] < gaps[0]:
+            points = points[::-1]
+        return Boundary('fold', whole.gaits, np.array([point.values, *points]),
+                        (point, *whole.codimension_two))
+    return None
+
+
+def _turned(point: CodimensionTwo) -> CodimensionTwo:
+    """Return a point of the plane with its axes exchanged."""
+    return replace(point, values=point.values[::-1])
+
+
+def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
+           ) -> Iterator[tuple[CurvePoint, float]]:
+    """Yield the first folds of branches from Hopf points on both sides, and the first value."""
+    chart, mode = condition.chart, condition.mode
+    line = chart.second.line
+    for beside in BESIDE:
+        for way in (-1.0, 1.0):
+            place = condition.corrected(fraction + way * beside * tangent, tangent)
+            if place is None:
+                continue
+            one, other = chart.values_at(place[0][:2])
+            if not (chart.first.low <= one <= chart.first.high
+                    and chart.second.low <= other <= chart.second.high):
+                continue
+            try:
+                hopf = hopf_at(chart.at(one, other), line, mode, float(place[0][2]))
+                branch = continue_from_hopf(
+                    hopf.network, hopf.block.symmetry, hopf.omega, line, chart.second.low,
+                    chart.second.high, rest=hopf.state, vector=hopf.eigenvector,
+                    amplitude=AMPLITUDE, longest_step=LONGEST, most=BAUTIN_POINTS)
+            except (CpgError, np.linalg.LinAlgError):
+                continue
+            for fold in branch.folds[:1]:
+                if abs(fold.value - other) < NEAR * chart.size[1]:
+                    yield fold.place, one

@@ -1,0 +1,412 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An atlas as one page that needs no other file: a click shows what runs there."""
+
+import base64
+from collections.abc import Iterator
+import hashlib
+import io
+from itertools import chain
+import json
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.analysis.atlas.chart import CodimensionTwo, LABELS, ParameterPlane
+from cpg_ros.analysis.atlas.grid import GaitMap, NUMBERS
+from cpg_ros.analysis.atlas.hopf_curves import Boundary
+from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
+from cpg_ros.analysis.atlas.row_job import AtlasRow
+from cpg_ros.common.errors import InputError
+from cpg_ros.common.files import replacing, stored_json, write_atomically
+from cpg_ros.common.report_page import STYLE
+from cpg_ros.fitting.inversion.results import library
+from cpg_ros.networks.registry import find_network
+import numpy as np
+
+# An atlas as a picture: a panel for each gait, and the exact boundaries on top.
+
+#: Colours of the labels, and of the kinds of curves.
+STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
+          'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
+LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
+         'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
+         'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
+#: Points this close, in shares of the ranges, have one marker.
+TOGETHER = 2e-3
+
+
+def markers(chart: ParameterPlane, curves: list[Boundary], gait: str
+            ) -> list[tuple[tuple[float, float], list[str]]]:
+    """Return where a gait's points of codimension two are, each once, with their labels."""
+    found: list[tuple[tuple[float, float], list[str]]] = []
+    for point in (point for curve in curves for point in curve.codimension_two):
+        if point.gait != gait:
+            continue
+        label = LABELS[point.kind]
+        near = next((labels for place, labels in found
+                     if (np.abs(np.subtract(place, point.values)) / chart.size).max() < TOGETHER),
+                    None)
+        if near is None:
+            found.append((point.values, [label]))
+        elif label not in near:
+            near.append(label)
+    return found
+
+
+def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
+             curves: list[Boundary]) -> None:
+    """Write the picture, PNG.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+    wide = min(3, len(sheets))
+    high = int(np.ceil(len(sheets) / wide))
+    figure = Figure(figsize=(4.2 * wide, 3.4 * high + 0.8), layout='constrained')
+    panels = np.atleast_1d(figure.subplots(high, wide, sharex=True, sharey=True)).ravel()
+    half = [0.5 * (axis.high - axis.low) / (axis.count - 1)
+            for axis in (chart.first, chart.second)]
+    # A point is the middle of its pixel.
+    extent = (chart.first.low - half[0], chart.first.high + half[0],
+              chart.second.low - half[1], chart.second.high + half[1])
+    for panel, (gait, sheet) in zip(panels, sheets.items(), strict=False):
+        panel.imshow(sheet.label.T, origin='lower', extent=extent, aspect='auto', vmin=-0.5,
+                     vmax=3.5, cmap=ListedColormap(list(STATES.values())), interpolation='nearest')
+        for curve in curves:
+            if gait in curve.gaits:
+                colour, style = LINES[curve.kind]
+                panel.plot(curve.points[:, 0], curve.points[:, 1], style, color=colour, lw=1.1)
+        for place, labels in markers(chart, curves, gait):
+            panel.plot(*place, 'o', ms=4.5, mfc='#ffffff', mec='#1a202c', mew=1.0, zorder=4)
+            # At the right and the upper edge the text is on the inside.
+            fraction = (np.array(place) - chart.low) / chart.size
+            panel.annotate(' '.join(labels), place, (-5 if fraction[0] > 0.85 else 5,
+                                                     -10 if fraction[1] > 0.9 else 4),
+                           textcoords='offset points', fontsize=7, zorder=5,
+                           ha='right' if fraction[0] > 0.85 else 'left',
+                           bbox={'fc': '#ffffff', 'ec': 'none', 'alpha': 0.75, 'pad': 0.6})
+        panel.set_title(gait)
+        panel.set_xlim(chart.first.low, chart.first.high)
+        panel.set_ylim(chart.second.low, chart.second.high)
+    for panel in panels[len(sheets):]:
+        panel.set_visible(False)
+    for panel in panels[len(sheets) - wide:len(sheets)]:
+        # The panel below it may be an empty one.
+        panel.xaxis.set_tick_params(labelbottom=True)
+        panel.set_xlabel(str(chart.first.line))
+    figure.supylabel(str(chart.second.line))
+    kinds = [kind for kind in LINES if any(curve.kind == kind for curve in curves)]
+    met = {point.kind for curve in curves for point in curve.codimension_two
+           if point.gait in sheets}
+    special = [kind for kind in LABELS if kind in met]
+    figure.legend(handles=[
+        *(Patch(color=colour, label=text) for text, colour in STATES.items()),
+        *(Line2D([], [], color=LINES[kind][0], ls=LINES[kind][1], label=kind)
+          for kind in kinds),
+        *(Line2D([], [], ls='', marker='o', ms=4.5, mfc='#ffffff', mec='#1a202c',
+                 label=f'{LABELS[kind]} {kind}') for kind in special)],
+        loc='outside lower center', ncols=min(4 + len(kinds), 3 * wide), frameon=False, fontsize=9)
+    out = io.BytesIO()
+    figure.savefig(out, format='png', dpi=110)
+    write_atomically(path, out.getvalue())
+
+
+# An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json.
+
+#: The file that a folder with an atlas has, the folder of its parts, and names of the labels.
+MARK, PARTS = 'atlas.json', 'parts'
+LABEL_NAMES = ('none', 'unstable', 'with lock', 'stable')
+
+
+class AtlasFolder:
+    """The folder of an atlas."""
+
+    def __init__(self, folder: Path, chart: ParameterPlane, gaits: tuple[str, ...]) -> None:
+        """Start an atlas, or resume one of the same plane.
+
+        Raises:
+            InputError: the folder holds something else.
+            OSError: it cannot be made.
+
+        """
+        self.folder, self.chart = folder, chart
+        text = json.dumps({**chart.as_dict(), 'gaits': gaits}, indent=1)
+        mark = folder / MARK
+        if mark.exists():
+            if mark.read_text() != text:
+                raise InputError(f'{folder} holds an atlas of other parameters or gaits')
+        elif folder.exists() and any(folder.iterdir()):
+            raise InputError(f'{folder} is not the folder of an atlas: it contains other files')
+        (folder / PARTS).mkdir(parents=True, exist_ok=True)
+        write_atomically(mark, text)
+
+    def _place(self, row: AtlasRow) -> Path:
+        text = json.dumps([row.gait, row.row, row.columns, row.near, row.basin])
+        return self.folder / PARTS / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json'
+
+    def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:
+        """Return the points of a job, if it is done."""
+        found: list[dict[str, Any]] | None = stored_json(self._place(row))
+        return found
+
+    def put(self, row: AtlasRow, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Store the points of a job, and return them as get will."""
+        text = json.dumps(points)
+        write_atomically(self._place(row), text)
+        kept: list[dict[str, Any]] = json.loads(text)
+        return kept
+
+    def curves(self) -> list[Boundary] | None:
+        """Return the boundaries, if they are done."""
+        found = stored_json(self.folder / 'boundaries.json')
+        if found is None or any('losses' not in one for one in found):
+            return None  # Those of an earlier version are followed anew.
+        return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']),
+                         tuple(map(CodimensionTwo.of, one['codimension_two'])),
+                         tuple(map(LossOnCurve.of, one['losses'])))
+                for one in found]
+
+    def put_curves(self, curves: list[Boundary]) -> None:
+        """Store the boundaries."""
+        write_atomically(self.folder / 'boundaries.json', json.dumps([
+            {'kind': curve.kind, 'gaits': curve.gaits, 'points': curve.points.tolist(),
+             'codimension_two': [point.as_dict() for point in curve.codimension_two],
+             'losses': [loss.as_dict() for loss in curve.losses]}
+            for curve in curves]))
+
+    def write(self, sheets: dict[str, GaitMap]) -> Path:
+        """Write atlas.parquet: a row for each point and gait.
+
+        Raises:
+            OSError: it cannot be written.
+
+        """
+        arrow = library()
+        path = self.folder / 'atlas.parquet'
+        tables = map(arrow.table, _columns(self.chart, sheets))
+        first = next(tables)
+        with (replacing(path) as beside,
+              arrow.parquet.ParquetWriter(beside, first.schema) as writer):
+            for one in chain([first], tables):
+                writer.write_table(one)
+        return path
+
+
+def _columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict[str, Any]]:
+    one, other = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
+    for gait, sheet in sheets.items():
+        label = sheet.label.ravel()
+        yield {'gait': [gait] * label.size, str(chart.first.line): one.ravel(),
+               str(chart.second.line): other.ravel(), 'exists': label > 0,
+               'state': [LABEL_NAMES[k] for k in label], 'computed': sheet.computed.ravel(),
+               **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
+
+
+#: Points of a waveform on the page, and distance on the grid between two that are there.
+POINTS, APART = 32, 4
+#: Numbers of a point that the page has.
+SHOWN = ('period', 'amplitude', 'leading', 'lock', 'basin')
+
+MORE = """
+body { max-width: 90em; } main { display: flex; flex-wrap: wrap; gap: 2em; }
+canvas { border: 1px solid #cbd5e0; display: block; max-width: 100%; }
+#map { cursor: crosshair; } select { font: inherit; } pre { background: #f7fafc; padding: 0.8em; }
+button { font: inherit; } aside { flex: 1; min-width: 22em; } .key span { display: inline-block;
+width: 1em; height: 1em; vertical-align: -0.15em; margin: 0 0.3em 0 1em; }
+"""
+SCRIPT = """
+const A = JSON.parse(document.getElementById('atlas').textContent);
+const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
+const floats = text => new Float32Array(bytes(text).buffer);
+for (const g of Object.values(A.gaits)) {
+  g.label = bytes(g.label);
+  for (const n of A.shown) g[n] = floats(g[n]);
+}
+const [N, M] = A.counts, map = document.getElementById('map'), pen = map.getContext('2d');
+const L = 52, B = 36, W = map.width - L - 8, H = map.height - B - 8;
+const pick = document.getElementById('gait');
+for (const g of Object.keys(A.gaits)) pick.add(new Option(g, g));
+const X = v => L + W * (v - A.low[0]) / (A.high[0] - A.low[0]);
+const Y = v => 8 + H * (1 - (v - A.low[1]) / (A.high[1] - A.low[1]));
+let at = null;
+function draw() {
+  const g = A.gaits[pick.value];
+  pen.clearRect(0, 0, map.width, map.height);
+  for (let i = 0; i < N; i++) for (let j = 0; j < M; j++) {
+    pen.fillStyle = A.colours[g.label[i * M + j]];
+    pen.fillRect(L + W * (i - 0.5) / (N - 1), 8 + H * (1 - (j + 0.5) / (M - 1)),
+                 W / (N - 1) + 1, H / (M - 1) + 1);
+  }
+  pen.clearRect(0, 0, L, map.height); pen.clearRect(0, 8 + H, map.width, B);
+  pen.clearRect(0, 0, map.width, 8); pen.clearRect(L + W, 0, 8, map.height);
+  for (const c of A.curves) if (c.gaits.includes(pick.value)) {
+    pen.strokeStyle = A.lines[c.kind]; pen.lineWidth = 1.5; pen.beginPath();
+    c.points.forEach((p, k) => pen[k ? 'lineTo' : 'moveTo'](X(p[0]), Y(p[1])));
+    pen.stroke();
+  }
+  pen.font = '11px system-ui'; pen.lineWidth = 1.2; pen.strokeStyle = '#1a202c';
+  for (const [x, y, text] of A.gaits[pick.value].special) {
+    const wide = pen.measureText(text).width, left = X(x) + 8 + wide > L + W;
+    pen.fillStyle = '#ffffffc0';
+    pen.fillRect(X(x) + (left ? -8 - wide : 5), Y(y) - 14, wide + 3, 12);
+    pen.fillStyle = '#fff'; pen.beginPath(); pen.arc(X(x), Y(y), 4, 0, 7); pen.fill();
+    pen.stroke(); pen.fillStyle = '#1a202c';
+    pen.fillText(text, X(x) + (left ? -7 - wide : 6), Y(y) - 4);
+  }
+  pen.fillStyle = '#1a202c'; pen.font = '12px system-ui';
+  for (let k = 0; k <= 4; k++) {
+    const [u, v] = [0, 1].map(a => A.low[a] + (A.high[a] - A.low[a]) * k / 4);
+    pen.fillText(+u.toPrecision(3), X(u) - 10, map.height - 18);
+    pen.fillText(+v.toPrecision(3), 18, Y(v) + 4);
+  }
+  pen.fillText(A.names[0], L + W / 2, map.height - 4);
+  pen.save(); pen.translate(11, 8 + H / 2); pen.rotate(-Math.PI / 2);
+  pen.fillText(A.names[1], 0, 0); pen.restore();
+  if (at) { pen.strokeStyle = '#000'; pen.strokeRect(X(at[0]) - 4, Y(at[1]) - 4, 8, 8); }
+}
+function wave(g, i, j) {
+  let best = null, gap = 1e9;
+  for (const w of g.waves) {
+    const d = Math.abs(w[0] - i) + Math.abs(w[1] - j);
+    if (d < gap) { gap = d; best = w; }
+  }
+  return best;
+}
+function show(i, j) {
+  const g = A.gaits[pick.value], k = i * M + j;
+  const value = a => A.low[a] + (A.high[a] - A.low[a]) * [i / (N - 1), j / (M - 1)][a];
+  at = [value(0), value(1)];
+  const rows = [[A.names[0], at[0]], [A.names[1], at[1]], ['state', A.states[g.label[k]]]];
+  if (g.label[k]) for (const n of A.shown) rows.push([n, g[n][k]]);
+  document.getElementById('values').innerHTML = rows.map(
+    ([n, v]) => `<tr><td>${n}</td><td class="value">${
+    typeof v !== 'number' ? v : isNaN(v) ? 'not computed' : +v.toPrecision(5)}</td></tr>`
+  ).join('');
+  const c = document.getElementById('waves'), p = c.getContext('2d');
+  p.clearRect(0, 0, c.width, c.height);
+  const set = {...A.base};
+  A.lines_of.forEach((line, a) => line.forEach(([n, s]) => {
+    set[n] = +(s * at[a]).toPrecision(8);
+  }));
+  document.getElementById('preset').textContent = `network: ${A.network}\\npresets:\\n  my_${
+    pick.value}:\\n    gait: ${pick.value}\\n    parameters: {${
+    Object.entries(set).map(([n, v]) => `${n}: ${v}`).join(', ')}}\\n`;
+  const w = g.label[k] ? wave(g, i, j) : null;
+  if (w) A.legs.forEach(([leg, cell], r) => {
+    const y = w[2][cell], top = Math.max(...w[2].flat().map(Math.abs)) || 1, n = y.length;
+    const h = c.height / A.legs.length, u = (c.width - 40) / (2 * n);
+    p.fillStyle = '#2b6cb0'; p.strokeStyle = '#1a202c'; p.font = '12px system-ui';
+    for (let m = 0; m < 2 * n; m++) if (y[m % n] < 0)
+      p.fillRect(40 + u * m, h * (r + 0.86), u + 1, h * 0.1);
+    p.beginPath();
+    for (let m = 0; m <= 2 * n; m++)
+      p[m ? 'lineTo' : 'moveTo'](40 + u * m, h * (r + 0.42 - 0.36 * y[m % n] / top));
+    p.stroke(); p.fillText(leg, 4, h * (r + 0.5));
+  });
+  draw();
+}
+map.addEventListener('click', e => {
+  const box = map.getBoundingClientRect(), s = map.width / box.width;
+  const clamp = (v, n) => Math.max(0, Math.min(n - 1, Math.round(v)));
+  show(clamp(((e.clientX - box.left) * s - L) / W * (N - 1), N),
+       clamp((1 - ((e.clientY - box.top) * s - 8) / H) * (M - 1), M));
+});
+pick.addEventListener('change', () => {
+  const i = at && Math.round((at[0] - A.low[0]) / (A.high[0] - A.low[0]) * (N - 1));
+  const j = at && Math.round((at[1] - A.low[1]) / (A.high[1] - A.low[1]) * (M - 1));
+  at ? show(i, j) : draw();
+});
+document.getElementById('copy').addEventListener('click', () =>
+  navigator.clipboard.writeText(document.getElementById('preset').textContent));
+draw();
+"""
+
+
+def _packed(values: np.ndarray) -> str:
+    return base64.b64encode(values.tobytes()).decode('ascii')
+
+
+def _waves(sheet: GaitMap, cells: int) -> list[Any]:
+    """Row, column and cells over a cycle, of some points of the grid."""
+    found, seen = [], set()
+    for (row, column), (wave, _) in sorted(sheet.waves.items()):
+        place = row // APART, column // APART
+        if place in seen:
+            continue
+        seen.add(place)
+        x = np.array(wave)[:, :cells]
+        some = x[::max(1, len(x) // POINTS)]
+        found.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
+    return found
+
+
+def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
+               curves: list[Boundary]) -> Path:
+    """Write the page and return its path.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    kind = find_network(chart.network)
+    legs = next(iter(kind.legs.values()))
+    axes = (chart.first, chart.second)
+    atlas = {
+        'network': chart.network,
+        'names': [str(axis.line) for axis in axes], 'low': [axis.low for axis in axes],
+        'high': [axis.high for axis in axes], 'counts': [axis.count for axis in axes],
+        'lines_of': [list(zip(axis.line.names, axis.line.signs, strict=True)) for axis in axes],
+        'base': chart.base, 'shown': SHOWN,
+        'states': list(STATES), 'colours': list(STATES.values()),
+        'lines': {name: line[0] for name, line in LINES.items()},
+        'legs': [[leg, cells[0] - 1] for leg, cells in legs.items()],
+        'curves': [{'kind': one.kind, 'gaits': one.gaits,
+                    'points': np.round(one.points[:, :2], 5).tolist()} for one in curves],
+        'gaits': {gait: {
+            'label': _packed(sheet.label.astype(np.uint8)),
+            **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in SHOWN},
+            'special': [[*place, ' '.join(labels)]
+                        for place, labels in markers(chart, curves, gait)],
+            'waves': _waves(sheet, max(max(cells) for cells in legs.values()))}
+            for gait, sheet in sheets.items()}}
+    data = json.dumps(atlas).replace('<', '\\u003c')
+    kinds = {curve.kind for curve in curves}
+    met = {kind: colour for kind, (colour, _) in LINES.items() if kind in kinds}
+    key = ''.join(f'<span style="background:{colour}"></span>{text}'
+                  for text, colour in (STATES | met).items())
+    listed = ''.join(
+        f'<tr><td>{LABELS[point.kind]}</td><td>{point}</td></tr>'
+        for point in {str(point): point for curve in curves
+                      for point in curve.codimension_two if point.gait in sheets}.values())
+    special = (f'<h2>Points of codimension two</h2><table>{listed}</table>' if listed else '')
+    title = f'Gaits of the {kind.name} network over {axes[0].line} and {axes[1].line}'
+    write_atomically(path, f"""<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>{STYLE}{MORE}</style></head><body><h1>{title}</h1>
+<p>Gait <select id="gait" aria-label="gait"></select>. Click the map to see what the network
+does there: the waveform of each leg's first cell over two cycles, with bars where it is below its
+mean, and the parameters.</p><p class="key">{key}</p>
+<main><canvas id="map" width="760" height="600"></canvas>
+<aside><table id="values"></table><canvas id="waves" width="480" height="280"></canvas>
+<p><button id="copy">Copy the preset</button></p><pre id="preset"></pre></aside></main>
+{special}
+<script type="application/json" id="atlas">{data}</script><script>{SCRIPT}</script></body></html>
+""")
+    return path

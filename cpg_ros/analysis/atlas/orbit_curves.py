@@ -1,0 +1,262 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Curves of torus points, period doublings and branch points of a gait in two parameters.
+
+On a curve the modulus of one multiplier is 1. Away from folds orbits are a function of both
+parameters, and so is its logarithm g: the curve g = 0 is followed by steps along its tangent and
+Newton's method normal to it.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain, pairwise
+
+from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
+from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, slopes
+from cpg_ros.analysis.atlas.orbit_plane import OrbitPlane, spectrum, stability_losses
+from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
+from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.bifurcation import REAL
+from cpg_ros.dynamics.floquet import ATTRACTS
+import numpy as np
+from scipy.optimize import brentq
+
+# Strong resonances on a curve of torus points: 1:1 to 1:4.
+
+#: n of 1:n -> 2 cos(2 pi / n).
+SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
+#: Newton's method: steps, where it ends, differences for its matrix, all in shares.
+RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
+#: How far from a point of the curve a resonance may lie, in shares, and from how close to its sum
+#: an end is tried.
+REACH, CLOSE = 0.08, 0.5
+#: What product and sum may miss by, and resonances this close are one.
+LEFT, SAME = 1e-8, 1e-5
+
+
+def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.ndarray]
+               ) -> Iterator[CodimensionTwo]:
+    """Yield the resonances on a curve of torus points, in the order of its points.
+
+    Args:
+        plane: its last orbit is that at the first point.
+        part: number of the subspace of the pair.
+        rank: how many larger multipliers that has.
+        fractions: points of the curve in shares of the ranges.
+
+    """
+    found: list[np.ndarray] = []
+    for place, n, at in [*_candidates(plane, part, rank, fractions)]:
+        plane.last = at
+        solved = _solved(plane, part, n, place)
+        if solved is None:
+            continue
+        fraction, left = solved
+        if (np.abs(fraction - place).max() < REACH and (fraction >= 0.0).all()
+            and (fraction <= 1.0).all()
+                and not any(np.abs(fraction - one).max() < SAME for one in found)):
+            found.append(fraction)
+            yield CodimensionTwo(f'1:{n} resonance', plane.gait, plane.chart.values_at(fraction),
+                                 left)
+
+
+def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.ndarray]
+                ) -> Iterator[tuple]:
+    """Yield places beside resonances: (share, n, the orbit closest to it)."""
+    along = []
+    for fraction in fractions:
+        try:
+            plane.last = plane.orbit(fraction)
+            along.append((fraction, complex(spectrum(plane.last)[part][rank]), plane.last))
+        except (CpgError, IndexError):
+            break
+    for (one, left, orbit), (other, right, _) in pairwise(along):
+        complexes = [abs(mu.imag) > REAL for mu in (left, right)]
+        for n in (3, 4):
+            gaps = [2.0 * mu.real - SUMS[n] for mu in (left, right)]
+            if all(complexes) and gaps[0] * gaps[1] <= 0.0 and gaps[0] != gaps[1]:
+                yield one + gaps[0] / (gaps[0] - gaps[1]) * (other - one), n, orbit
+        if complexes == [True, False]:
+            # Where it has met on the real axis the curve is no torus's any more.
+            yield one, 1 if right.real > 0.0 else 2, orbit
+            return
+    if along and abs(along[-1][1].imag) > REAL:
+        last, mu, orbit = along[-1]
+        for n in (1, 2):
+            if abs(2.0 * mu.real - SUMS[n]) < CLOSE:
+                yield last, n, orbit
+
+
+def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
+            ) -> tuple[np.ndarray, float] | None:
+    """Solve for product 1 and the sum of n; also the larger residual. None where that fails."""
+    target = np.exp(2j * np.pi / n)
+
+    def gaps(fraction: np.ndarray) -> np.ndarray:
+        some = spectrum(plane.orbit(fraction))[part]
+        one = complex(some[np.abs(some - target).argmin()])
+        if abs(one.imag) > REAL * REAL:
+            product, total = abs(one)**2, 2.0 * one.real
+        else:
+            real = some[np.abs(some.imag) <= REAL * REAL].real
+            pair = real[np.abs(real - target.real).argsort()[:2]]
+            product, total = float(pair.prod()), float(pair.sum())
+        return np.array([product - 1.0, total - SUMS[n]])
+
+    try:
+        for _ in range(RESONANCE_STEPS):
+            plane.last = plane.orbit(fraction)
+            move = np.linalg.solve(slopes(gaps, fraction, RESONANCE_DIFFERENCE), gaps(fraction))
+            fraction = fraction - move
+            if not np.abs(move).max() < REACH:
+                return None
+            if np.abs(move).max() < RESONANCE_TOLERANCE:
+                left = float(np.abs(gaps(fraction)).max())
+                return (fraction, left) if left < LEFT else None
+    except (CpgError, np.linalg.LinAlgError, IndexError):
+        return None
+    return None
+
+
+#: Curves of a gait at most, points of each, steps in shares of the ranges.
+CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
+#: How well g is zero, differences for its slope, and Newton's steps.
+EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
+
+Distance = Callable[[np.ndarray], float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Edge(ShortRepr):
+    """Two neighbours on the grid between which multipliers cross, in shares of the ranges."""
+
+    here: np.ndarray
+    there: np.ndarray
+    wave: list[list[float]]
+    period: float
+
+
+def edges(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
+    """Return neighbours on the coarse grid that differ in the number of unstable multipliers."""
+    rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
+                                                                          COARSE)
+    found = []
+    for k, row in enumerate(rows):
+        for m, column in enumerate(columns):
+            for other in ((row, columns[m + 1]) if m + 1 < len(columns) else None,
+                          (rows[k + 1], column) if k + 1 < len(rows) else None):
+                at = (row, column)
+                if other is None or at not in sheet.waves or sheet.label[other] == NONE:
+                    continue
+                if sheet.numbers['unstable'][at] != sheet.numbers['unstable'][other]:
+                    found.append(Edge(chart.fraction(at), chart.fraction(other), *sheet.waves[at]))
+    return found
+
+
+def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
+    """Follow the curves that some edges cross; those that cannot be followed are left out."""
+    chart, gait, crossed = job
+    found: list[Boundary] = []
+    for edge in crossed:
+        middle = 0.5 * (edge.here + edge.there)
+        reach = np.abs(edge.here - edge.there).max()
+        known = [(one.points[:, :2] - chart.low) / chart.size for one in found]
+        if any(np.abs(points - middle).max(axis=1).min() < 1.5 * reach for points in known):
+            continue
+        try:
+            found += _through(chart, gait, edge)
+        except (NoOrbit, np.linalg.LinAlgError):
+            continue
+        if len(found) >= CURVES:
+            break
+    return found
+
+
+def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]:
+    plane = OrbitPlane(chart, gait)
+    one, other = edge.here, edge.there
+    plane.last = solve_from_wave(chart.at_share(one), gait, edge.wave, edge.period)
+    before, after = spectrum(plane.last), spectrum(plane.orbit(other))
+    for part, (left, right) in enumerate(zip(before, after, strict=True)):
+        counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
+        if counts[0] == counts[1]:
+            continue
+        rank = min(counts)
+
+        def g(fraction: np.ndarray, part: int = part, rank: int = rank) -> float:
+            orbit = plane.orbit(fraction)
+            some = spectrum(orbit)[part]
+            plane.last = orbit
+            return float(np.log(np.abs(some[rank]))) if len(some) > rank else -10.0
+
+        start = plane.last
+        place = brentq(lambda s: g(one + s * (other - one)), 0.0, 1.0, xtol=1e-9)
+        fraction = one + place * (other - one)
+        crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
+        kind = ('torus' if abs(crossing.imag) > REAL else
+                'branch point' if crossing.real > 0.0 else 'period doubling')
+        at_share = plane.last
+        ways, special = [], []
+        for way in (-1.0, 1.0):
+            plane.last = at_share
+            ways.append([(new, plane.last) for new in _continue_edge(g, fraction, way)])
+            if kind == 'torus':
+                plane.last = at_share
+                along = [fraction, *(new for new, _ in ways[-1])]
+                special.append([*resonances(plane, part, rank, along)][::int(way)])
+        curve = [*ways[0][::-1], (fraction, at_share), *ways[1]]
+        yield Boundary(kind, (gait,), chart.low + np.array([new for new, _ in curve]) * chart.size,
+                       tuple(chain(*special)),
+                       tuple(stability_losses(plane, part, rank, curve)))
+        plane.last = start
+
+
+def _continue_edge(g: Distance, start: np.ndarray, way: float) -> Iterator[np.ndarray]:
+    """Yield points of g = 0 from one on, until the plane ends or the orbit is lost."""
+    here, step, count = start, STEP, 0
+    normal = slopes(g, here, DIFFERENCE)
+    tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
+    while count < MOST and step > SHORTEST:
+        try:
+            new, across = _onto(g, here + step * tangent, normal)
+        except (NoOrbit, np.linalg.LinAlgError):
+            step *= 0.5
+            continue
+        ahead = np.array([-across[1], across[0]]) / np.linalg.norm(across)
+        ahead *= np.sign(ahead @ tangent) or 1.0
+        if (ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step
+                or (new < 0.0).any() or (new > 1.0).any()):
+            # Beyond the edge, too: up to it by shorter steps.
+            step *= 0.5
+            continue
+        here, tangent, normal = new, ahead, across
+        yield here
+        count, step = count + 1, min(1.5 * step, STEP)
+        if count > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
+            break
+
+
+def _onto(g: Distance, fraction: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Apply Newton's method normal to the curve; return the point on it and the slope of g."""
+    for _ in range(NEWTON):
+        value = g(fraction)
+        if abs(value) < EXACT:
+            return fraction, slopes(g, fraction, DIFFERENCE)
+        unit = normal / np.linalg.norm(normal)
+        along = (g(fraction + DIFFERENCE * unit) - value) / DIFFERENCE
+        fraction = fraction - value / along * unit
+    raise NoOrbit('the curve is lost')

@@ -1,0 +1,312 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A row of an atlas for one gait, as a job: orbits continued from neighbour to neighbour."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from cpg_ros.analysis.atlas.chart import ParameterPlane
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.continuation import continue_from_hopf
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.fourier import orbit as collocation
+from cpg_ros.dynamics.fourier.floquet import SPAN, Variation
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
+from cpg_ros.dynamics.solve_orbit import solve_beside, solve_from_path, solve_orbit
+from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import other_gait
+import numpy as np
+from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
+
+#: What is known of a gait at a point: no orbit, one that its own class leaves, one that attracts
+#: with a symmetry lock, one that attracts by itself.
+NONE, UNSTABLE, LOCKED, STABLE = range(4)
+#: Nodes of a waveform that are kept.
+KEPT = 65
+#: Multipliers of a subspace that Arnoldi's method computes.
+LEADING = 4
+#: Random starts about rest: how many, how far, for how many periods, and how near to the orbit,
+#: over its range, a run has come that ends in it.
+STARTS, SCATTER, PERIODS, NEAR = 8, 1.0, 25, 0.15
+#: Steps that a branch from a Hopf point may have; known orbits that are led to a point, and in
+#: how many steps.
+MOST, TRIED, STEPS = 60, 3, (1, 4)
+
+
+@dataclass(frozen=True)
+class AtlasRow:
+    """Points of one gait in a row of the grid.
+
+    Attributes:
+        chart: the plane.
+        gait: of the network.
+        row: which, on the first axis.
+        columns: which points on the second, rising.
+        near: row, column, waveforms (nodes, components) and period of orbits known close by.
+        basin: whether runs from random starts are made.
+        again: whether all else has been tried: orbits are only continued from those close by.
+
+    """
+
+    chart: ParameterPlane
+    gait: str
+    row: int
+    columns: tuple[int, ...]
+    near: tuple[tuple[int, int, list[list[float]], float], ...] = ()
+    basin: bool = False
+    again: bool = False
+
+
+def assess_row(row: AtlasRow) -> list[dict[str, Any]]:
+    """Assess the gait at the points of a row; return a dictionary of plain types for each.
+
+    Of several orbits the first counts that attracts, if only with a lock.
+    """
+    finder = _Finder(row)
+    return [finder.point(column) for column in row.columns]
+
+
+class _Finder:
+    def __init__(self, row: AtlasRow) -> None:
+        self.row = row
+        self.one = float(row.chart.first.values[row.row])
+        self.last: Orbit | None = None
+        self._branches: list[Any] | None = None
+
+    def point(self, column: int) -> dict[str, Any]:
+        value = float(self.row.chart.second.values[column])
+        network = self.row.chart.at(self.one, value)
+        best: tuple[Orbit, dict[str, Any]] | None = None
+        periods: list[float] = []
+        for orbit in self._orbits(network, column, value):
+            if np.isclose(orbit.period, periods, rtol=1e-6).any():
+                continue
+            periods.append(orbit.period)
+            judged = _judged(orbit)
+            if best is None or judged['label'] > best[1]['label']:
+                best = orbit, judged
+            if best[1]['label'] >= LOCKED:
+                break
+        point_data: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
+                                      'label': NONE}
+        self.last = best[0] if best else None
+        if best:
+            orbit, judged = best
+            point_data |= judged | {'wave': _wave(orbit)}
+            if self.row.basin:
+                point_data['basin'] = basin(orbit, point_data['lock'])
+        return point_data
+
+    def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
+        gait = self.row.gait
+        if network.broken(network.symmetry(gait)) or other_gait(network, gait):
+            return
+        if self.last is not None:
+            with suppress(NoOrbit):
+                yield from _proper(solve_beside(network, self.last))
+        for near in sorted(self.row.near, key=lambda one: (
+                abs(one[0] - self.row.row) + abs(one[1] - column), one[:2]))[:TRIED]:
+            try:
+                yield from _proper(self._led(near, value))
+            except NoOrbit:
+                continue
+        if self.row.again:
+            return
+        with suppress(NoOrbit, NoEquilibrium):
+            yield from _proper(solve_orbit(network, gait))
+        # Between points that are known no branch of its own is looked for.
+        for branch in self._from_rest(network) if self.row.basin else ():
+            try:
+                yield from branch.at(value)[::-1]
+            except CpgError:
+                continue
+
+    def _led(self, near: tuple[int, int, list[list[float]], float], value: float) -> Orbit:
+        """Continue an orbit close by straight to here, in one step or several.
+
+        Raises:
+            NoOrbit: it ends on the way.
+
+        """
+        chart, (row, column, wave, period) = self.row.chart, near
+        begin = np.array([chart.first.values[row], chart.second.values[column]])
+        end = np.array([self.one, value])
+        orbit = solve_from_wave(chart.at(*map(float, begin)), self.row.gait, wave, period)
+        for steps in STEPS:
+            found = orbit
+            try:
+                for k in range(1, steps + 1):
+                    found = solve_beside(chart.at(*map(float, begin + k / steps * (end - begin))),
+                                         found)
+                return found
+            except NoOrbit:
+                if steps == STEPS[-1]:
+                    raise
+        return orbit
+
+    def _from_rest(self, network: Network) -> list[Any]:
+        """Return the branches of the gait's Hopf points in this row, where there is a delay."""
+        line, axis = self.row.chart.second.line, self.row.chart.second
+        if line.names != (network.delay_parameter,):
+            return []
+        if self._branches is None:
+            self._branches = []
+            shifts = set(network.symmetry(self.row.gait).shifts)
+            try:
+                points = hopf_points(network, line, 0.0, axis.high)
+            except CpgError:
+                return []
+            for point in points:
+                if set(point.block.symmetry.shifts) != shifts or point.n:
+                    continue
+                low, high = ((0.9 * point.value, axis.high) if point.normal_form.side >= 0
+                             else (axis.low, 1.1 * point.value))
+                try:
+                    self._branches.append(continue_from_hopf(
+                        point.network, point.block.symmetry, point.omega, line, low, high,
+                        rest=point.state, vector=point.eigenvector, most=MOST))
+                except CpgError:
+                    continue
+        return self._branches
+
+
+def _judged(orbit: Orbit) -> dict[str, Any]:
+    """Return the stability of an orbit, and its numbers."""
+    within, leading, unstable = leading_multipliers(orbit)
+    attracts = leading < ATTRACTS
+    return {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
+            'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
+            'leading': leading, 'leading_within': within, 'unstable': unstable,
+            'lock': 0.0 if attracts else lock_of(orbit)}
+
+
+def _proper(orbit: Orbit) -> Iterator[Orbit]:
+    """Yield the orbit, unless it is another gait's or has almost no amplitude."""
+    if orbit.levels[0, 0, 1] > 1e-3 and not extra_symmetry(orbit):
+        yield orbit
+
+
+def _wave(orbit: Orbit) -> list[list[float]]:
+    """Return the states at an odd number of even times of a cycle."""
+    theta = np.arange(KEPT) / KEPT
+    return np.round(orbit(theta * orbit.period), 5).tolist()
+
+
+def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period: float) -> Orbit:
+    """Solve for a gait's orbit from stored waveforms of it.
+
+    Raises:
+        NoOrbit: there is none near them.
+
+    """
+    columns = np.array(wave).T
+    orbit = solve_from_path(network, network.symmetry(gait), lambda theta: np.array(
+        [collocation.evaluate(one, theta) for one in columns]).T, period)
+    if orbit is None:
+        raise NoOrbit('no orbit near the stored one')
+    return orbit
+
+
+def lock_of(orbit: Orbit) -> float:
+    """Return the gain of the symmetry lock that the generator would choose, 1/model time."""
+    bound = orbit.network.sufficient_gain(RATE)
+    return float(stability(orbit).args if bound is None else bound)
+
+
+def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
+    """Return the largest multiplier in the class, the largest of all, and how many lie outside.
+
+    Moduli, without the trivial one, as exact as a map needs them.
+    """
+    parts = subspace_multipliers(orbit)
+    sizes = np.abs(np.concatenate(parts))
+    return (float(np.abs(parts[0]).max(initial=0.0)), float(sizes.max(initial=0.0)),
+            int((sizes >= ATTRACTS).sum()))
+
+
+def subspace_multipliers(orbit: Orbit, exact: float = 1e-6, trivial: float = 1e-4,
+                         halvings: int = 4) -> list[np.ndarray]:
+    """Return the multipliers of each subspace; those of the class first, without the trivial one.
+
+    Args:
+        orbit: with a delay, the largest ones of each subspace are computed by Arnoldi's method.
+        exact: tolerance of Arnoldi's method.
+        trivial: error of the trivial multiplier above which the elements are halved.
+        halvings: of the elements, at most.
+
+    """
+    if not isinstance(orbit, FourierOrbit):
+        spectrum = multipliers(orbit)
+        return [spectrum.within, *spectrum.parts]
+    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+    for halving in range(halvings):
+        equation = Variation(orbit, n * 2**halving)
+        inside = _largest(equation, equation.inside, exact)
+        if np.abs(inside - 1.0).min() <= trivial:
+            break
+    return [np.delete(inside, np.abs(inside - 1.0).argmin()),
+            *(_largest(equation, part, exact) for part in equation.outside)]
+
+
+def _largest(equation: Variation, columns: np.ndarray, exact: float) -> np.ndarray:
+    """Return the largest multipliers in a subspace of the variational equation."""
+    size, later = equation.period_map(columns, 0.0)
+    if size > 3 * LEADING + 24:
+        operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
+        start = np.random.default_rng(0).standard_normal(size)
+        try:
+            return eigs(operator, k=LEADING, ncv=20, tol=exact, v0=start, maxiter=15,
+                        return_eigenvectors=False)
+        except ArpackError:
+            pass  # all of them, then
+    return np.linalg.eigvals(later(np.eye(size)))
+
+
+def basin(orbit: Orbit, lock: float) -> float:
+    """Return the share of random starts that end in an orbit, with the lock that it needs."""
+    network = orbit.network
+    rng = np.random.default_rng(0)
+    rest = orbit(np.arange(16) / 16 * orbit.period).mean(axis=0)
+    starts = rest + SCATTER * rng.standard_normal((STARTS, network.components)) * max(
+        float(orbit.levels[0, 0, 1]), 0.1)
+    step = network.step
+    run = simulate(network, starts, PERIODS * orbit.period, step,
+                   lock=(lock, orbit.symmetry) if lock else None, progress=False)
+    last = max(2, int(1.2 * orbit.period / step))
+    theta = np.arange(64) / 64
+    wanted = orbit(theta * orbit.period)
+    size = np.ptp(wanted[:, 0])
+    ended = 0
+    for x in run.x:
+        tail = x[-last:]
+        if not np.isfinite(tail).all():
+            continue
+        # Where the last cycle peaks as the orbit does.
+        peak = int(tail[:len(tail) - int(orbit.period / step), 0].argmax()) if len(
+            tail) > orbit.period / step else 0
+        places = peak + np.round(theta * orbit.period / step).astype(int)
+        inside = places < len(tail)
+        seen = tail[places[inside]]
+        gaps = [np.abs(np.roll(wanted, -k, axis=0)[inside] - seen).max() for k in range(64)]
+        ended += bool(min(gaps) < NEAR * size)
+    return float(ended) / STARTS

@@ -1,0 +1,225 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Basins: on what share of random states a network returns to a gait, and what else it does.
+
+Each state is drawn at random: every variable of every cell evenly over twice its range on the
+orbit, about the middle of that; with a delay the history is constant. The whole network runs from
+it, and what it does in the end is compared with the orbit and with the gaits' symmetries.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from cpg_ros.analysis.analysis_report import Analysis
+from cpg_ros.common.command_line import progress_bar, table
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
+from cpg_ros.dynamics.orbit import Orbit, signal_symmetry
+from cpg_ros.dynamics.settling import last_cycle, SettledCycle
+from cpg_ros.networks.network import Network
+import numpy as np
+from scipy.stats import binomtest
+
+#: Cycles of a run, its points that are kept of each, and states that run at a time.
+CYCLES, KEPT, TOGETHER = 100, 64, 64
+#: Range of the states over that of the orbit.
+WIDTH = 2.0
+#: Share of the range by which signals may differ that are one; of periods that are one.
+SAME, SAME_PERIOD = 0.05, 0.01
+#: A symmetry holds where signals differ by less than this share of their range.
+HOLDS = 0.01
+#: A network rests that moves by less than this share of the orbit's range in its last cycles.
+RESTS, LAST = 1e-3, 3
+#: Ends of runs that are no gait.
+REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Basin(ShortRepr):
+    """What a network does from random states.
+
+    Attributes:
+        orbit: of the gait.
+        gain: of the symmetry lock, 1/model time.
+        states: number of states.
+        seed: with which they were drawn.
+        returned: number of them that return to the orbit, or to an image of it under a symmetry.
+        others: what the others do -> how many: another gait by name, 'another NAME' for another
+            orbit of the same, 'rest', 'runs away', or 'unknown', as what has not settled.
+
+    """
+
+    orbit: Orbit
+    gain: float
+    states: int
+    seed: int
+    returned: int
+    others: Mapping[str, int]
+
+    def _summary(self) -> str:
+        low, high = self.interval
+        return (f'{self.returned} of {self.states} states return to the {self.orbit.gait}, '
+                f'{low:.1%} to {high:.1%}')
+
+    @property
+    def fraction(self) -> float:
+        """Share of the states that return."""
+        return self.returned / self.states
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Ends of Wilson's 95 % interval of the share."""
+        found = binomtest(self.returned, self.states).proportion_ci(0.95, 'wilson')
+        return float(found.low), float(found.high)
+
+
+def random_states(orbit: Orbit, count: int, seed: int) -> np.ndarray:
+    """Draw states about an orbit, shape (count, components)."""
+    levels = orbit.levels[orbit.waves].transpose(1, 0, 2).reshape(-1, 2)
+    draws = np.random.default_rng(seed).uniform(-WIDTH, WIDTH, (count, orbit.network.components))
+    return levels[:, 0] + draws * levels[:, 1]
+
+
+def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
+          done: Callable[[int], None] = lambda count: None) -> Basin:
+    """Run a network from random states and count what returns to a gait.
+
+    Args:
+        orbit: of the gait.
+        count: number of states.
+        seed: with which they are drawn.
+        gain: of a symmetry lock to that gait, 1/model time.
+        done: called with the number of states that are done.
+
+    Raises:
+        InputError: count is not positive.
+
+    """
+    if count < 1:
+        raise InputError(f'{count} random states: there must be at least 1')
+    starts, ends = random_states(orbit, count, seed), Counter[str]()
+    network, period = orbit.network, orbit.period
+    every = max(1, int(np.ceil(period / network.step / KEPT)))
+    for first in range(0, count, TOGETHER):
+        done(first)
+        batch = simulate(network, starts[first:first + TOGETHER], CYCLES * period,
+                         period / (KEPT * every), every=every, progress=False,
+                         lock=(gain, orbit.symmetry) if gain else None)
+        ends.update(end_of(Trajectory(batch.t, x, slopes), orbit)
+                    for x, slopes in zip(batch.x, batch.slopes, strict=True))
+    done(count)
+    returned = ends.pop(orbit.gait, 0)
+    return Basin(orbit, gain, count, seed, returned, dict(ends.most_common()))
+
+
+def end_of(run: Trajectory, orbit: Orbit) -> str:
+    """Name what a simulation of an orbit's network does in the end, as Basin has it.
+
+    Args:
+        run: of many cycles.
+        orbit: its gait is the one returned where it is this orbit.
+
+    """
+    network = orbit.network
+    if not np.isfinite(run.x[-1]).all():
+        return AWAY
+    last = run.x[-int(np.ceil(LAST * orbit.period / run.t[1])):]
+    if np.ptp(last, axis=0).max() < RESTS * 2.0 * orbit.levels[..., 1].max():
+        return REST
+    cycle = last_cycle(run, network.cells)
+    if cycle is None:
+        return UNKNOWN
+    if abs(cycle.period / orbit.period - 1.0) < SAME_PERIOD and _is(cycle, orbit):
+        return orbit.gait
+    gait = _named(cycle, network)
+    return f'another {gait}' if gait == orbit.gait else gait
+
+
+def _is(cycle: SettledCycle, orbit: Orbit) -> bool:
+    """Whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
+    points = len(cycle.signals)
+    exact = orbit(np.arange(points) / points * orbit.period)
+    seen = np.fft.rfft(cycle.signals - cycle.signals.mean(axis=0), axis=0)
+    cells, blocks = orbit.network.cells, np.arange(orbit.network.variables)[:, None]
+    for element in orbit.symmetry.group.elements.values():
+        image = exact[:, (np.array(element) + blocks * cells).ravel()]
+        waves = np.fft.rfft(image - image.mean(axis=0), axis=0).conj()
+        late = int(np.fft.irfft((seen * waves).sum(axis=1), points).argmax())
+        gap = np.abs(cycle.signals - np.roll(image, late, axis=0)).max(axis=0)
+        if (gap < SAME * np.ptp(exact, axis=0).max()).all():
+            return True
+    return False
+
+
+def _named(cycle: SettledCycle, network: Network) -> str:
+    """Name the gait whose symmetry a cycle has, and no more; or unknown."""
+    signals = cycle.signals[:, :network.cells]
+    for gait in network.gaits():
+        symmetry = network.symmetry(gait)
+        if len(symmetry.group.elements) > 1 and all(
+                np.abs(signals[:, list(symmetry.group.elements[name])]
+                       - np.roll(signals, -round(float(shift) * len(signals)), axis=0)).max()
+                < HOLDS * np.ptp(signals) for name, shift in symmetry.shifts
+                ) and not signal_symmetry(symmetry, signals, HOLDS):
+            return gait
+    return UNKNOWN
+
+
+# The basins that ``analyze --basin N`` reports: as text, and as JSON.
+
+def basins(analysis: Analysis, count: int, seed: int) -> dict[str, Basin]:
+    """Find the basin of each gait that attracts by itself, or else with the default gain."""
+    gains = {one.gait: 0.0 if one.stable else one.default_gain for one in analysis.existing
+             if one.stable or one.stable_with_default_gain}
+    found: dict[str, Basin] = {}
+    with progress_bar('random states', len(gains) * count) as bar:
+        for gait, gain in gains.items():
+            orbit, before = analysis.gaits[gait].orbit, len(found) * count
+            assert orbit is not None
+
+            def done(states: int, before: int = before) -> None:
+                bar(before + states)
+
+            found[gait] = basin(orbit, count, seed, gain, done)
+    return found
+
+
+def text(found: dict[str, Basin]) -> str:
+    """Return a table of the basins."""
+    if not found:
+        return 'Basins: no gait attracts.'
+    rows: list[tuple[str, ...]] = [('gait', 'gain', 'return', 'share', '95 % interval', 'others')]
+    for gait, one in found.items():
+        low, high = one.interval
+        others = ', '.join(f'{name} {number}' for name, number in one.others.items())
+        rows.append((gait, f'{one.gain:.4f}', str(one.returned), f'{one.fraction:.1%}',
+                     f'{low:.1%} to {high:.1%}', others or '-'))
+    first = next(iter(found.values()))
+    return '\n'.join([
+        f'Basins: of {first.states} random states each (seed {first.seed}; every variable of '
+        'every cell evenly over twice its range on',
+        'the orbit, and constant before), those that return to the gait, without a symmetry lock '
+        'where it is stable, or else',
+        'with the default gain; and what the others do:',
+        *(f'  {line}' for line in table(rows, '<>>>><'))])
+
+
+def as_dict(found: dict[str, Basin]) -> dict[str, Any]:
+    """Return the basins in plain types, gait -> basin."""
+    return {gait: {'symmetry_gain': one.gain, 'states': one.states, 'seed': one.seed,
+                   'returned': one.returned, 'share': one.fraction, 'interval': list(one.interval),
+                   'others': dict(one.others)} for gait, one in found.items()}

@@ -1,0 +1,267 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
+
+``python -m cpg_ros.analysis.gait_diagram gaits.png --network biped`` draws a network's gaits from
+their orbits. A leg stands while the signal that drives it falls, from peak to trough; where cells
+drive muscles, a muscle is active while its cell is above the middle of its range.
+"""
+
+from argparse import Namespace
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+import sys
+
+from cpg_ros.common.command_line import Parser, run
+from cpg_ros.common.errors import InputError
+from cpg_ros.common.files import write_atomically
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.fitting.gaits.steady_stretch import true_runs
+from cpg_ros.motion.phase_readout import evaluate, phase_map
+from cpg_ros.motion.robot import HARMONICS
+from cpg_ros.networks.leg_numbers import footfall_order
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.registry import find_network, SHIPPED
+import matplotlib
+from matplotlib import rcParams
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+import numpy as np
+
+# Footfall diagrams after Hildebrand: which foot stands when, and how fast the robot goes.
+
+#: A foot that bears more than this share of the weight stands.
+STANDING = 0.04
+#: Time over which the speed is averaged, s.
+SMOOTHING = 0.5
+#: Endings of the files that can be written.
+FORMATS = ('.png', '.svg', '.pdf')
+
+
+def stances(time: np.ndarray, standing: np.ndarray) -> list[tuple[float, float]]:
+    """Return the start and length of each stretch in which a foot stands, the bars of a diagram.
+
+    Args:
+        time: of the samples, s or strides, shape (n,), evenly spaced.
+        standing: whether the foot stands at them, shape (n,).
+
+    """
+    step = _spacing(time)
+    return [(float(time[first]), float((last + 1 - first) * step))
+            for first, last in true_runs(standing)]
+
+
+def draw_stances(axes: Axes, names: Sequence[str], bars: Sequence[list[tuple[float, float]]],
+                 colours: Sequence[str], alpha: float = 1.0) -> None:
+    """Draw the stances of legs as rows of bars, the first row on top.
+
+    Args:
+        axes: drawn into.
+        names: of the rows.
+        bars: of each row, as ``stances`` returns them.
+        colours: of each row.
+        alpha: opacity of the bars, 0 to 1.
+
+    """
+    for row, (own, colour) in enumerate(zip(bars, colours, strict=True)):
+        axes.broken_barh(own, (row - 0.36, 0.72), color=colour, alpha=alpha)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.45, -0.55)
+
+
+def _spacing(time: np.ndarray) -> float:
+    """Return the mean time between samples: those of a clock of another rate are not even."""
+    return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 0.0
+
+
+def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Return the ground speed, m/s, shape (n,): of the path, smoothed over SMOOTHING.
+
+    Args:
+        time: of the samples, s, shape (n,), evenly spaced.
+        position: at them, m, shape (n, 2).
+
+    """
+    wide = max(1, min(len(time) - 1, round(SMOOTHING / _spacing(time)))) // 2 + 1
+    low, high = np.arange(len(time)) - wide, np.arange(len(time)) + wide
+    low, high = np.maximum(low, 0), np.minimum(high, len(time) - 1)
+    return np.linalg.norm(position[high] - position[low], axis=1) / (time[high] - time[low])
+
+
+def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np.ndarray,
+                   position: np.ndarray, gaits: Sequence[tuple[float, str]] = ()) -> None:
+    """Draw which foot stands when, with the speed below.
+
+    Args:
+        path: picture to write, .png, .svg or .pdf.
+        legs: names of the legs, from the top.
+        time: of the samples, s, shape (n,), evenly spaced.
+        forces: of the floor on each leg, N, shape (n, legs).
+        position: of the base, m, shape (n, 2).
+        gaits: (time in s, name) of each change of gait.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    least = STANDING * float(forces.sum(axis=1).mean())
+    figure = Figure(figsize=(max(7.0, min(24.0, 0.8 * (time[-1] - time[0]))), 4.4),
+                    layout='constrained')
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    bars = [stances(time, column > least) for column in forces.T]
+    draw_stances(above, [leg.upper() for leg in legs], bars, [rcParams['text.color']] * len(legs))
+    for row, own in enumerate(bars):
+        fraction = sum(length for _, length in own) / (time[-1] - time[0])
+        above.annotate(f'{fraction:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
+                       xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)
+    above.set(ylabel='foot on the floor',
+              title='Footfalls (right: share of the time on the floor)')
+    below.plot(time, speed(time, position), color='tab:blue', linewidth=1.2)
+    below.set(xlabel='time [s]', ylabel='speed [m/s]', xlim=(time[0], time[-1]))
+    below.set_ylim(bottom=0.0)
+    below.grid(alpha=0.3)
+    for when, name in gaits:
+        for axes in (above, below):
+            axes.axvline(when, color='tab:red', linewidth=1.0)
+        below.annotate(name, (when, 1.0), xycoords=('data', 'axes fraction'), xytext=(3, -3),
+                       textcoords='offset points', va='top', color='tab:red', fontsize=8)
+    written = BytesIO()
+    figure.savefig(written, format=path.suffix[1:], dpi=110)
+    write_atomically(path, written.getvalue())
+
+
+STRIDES = 2.0
+#: Of the fore, the hind and the middle pairs, or of one leg after the other.
+COLOURS = ('#2b6cb0', '#c05621', '#2f855a')
+
+
+def rows(network: type[Network]) -> list[tuple[str, int, str]]:
+    """Return what is drawn, from the top: a leg or a muscle, its cell from 1, and its colour."""
+    legs, girdles = next(iter(network.legs.values())), network.girdles
+    if network.muscles:
+        names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
+        return [(names[cell], cell, COLOURS[k % 2]) for k, cells in enumerate(legs.values())
+                for cell in cells if cell in names]
+    colours = dict(zip(('fore', 'hind', 'middle'), COLOURS, strict=True))
+    return [(leg.upper(), legs[leg][0], colours[girdles.get(leg, 'fore')])
+            for leg in footfall_order(legs, network.sides, girdles)]
+
+
+def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
+    """Return what drives a leg: its cell over its range, smoothed as joints see it, from -1 to 1.
+
+    Args:
+        orbit: the gait.
+        cell: from 1.
+        theta: in cycles, any shape.
+        order: 1 for the derivative.
+
+    """
+    phase, wave = orbit.phases[cell - 1], int(orbit.waves[cell - 1])
+    if orbit.network.readout == 'waveform':
+        return orbit.waveform(theta + phase, order) / orbit.peak
+    return evaluate(phase_map(orbit, HARMONICS).terms[wave], theta + phase, order)
+
+
+def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[float, float]]:
+    """Intervals (begin, length), in strides, of a row's bars.
+
+    Args:
+        orbit: the gait.
+        cell: from 1.
+        strides: how long.
+
+    """
+    theta = np.linspace(0.0, strides, int(1000 * strides) + 1)
+    if orbit.network.muscles:
+        wave = int(orbit.waves[cell - 1])
+        on = orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) > orbit.levels[wave, 0, 0]
+    else:
+        # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
+        on = signal(orbit, cell, theta, 1) < -1e-9
+    return stances(theta, on)
+
+
+def draw(axes: Axes, orbit: Orbit, title: str) -> None:
+    """Draw one gait, with each row's cell as a line over it."""
+    drawn = rows(type(orbit.network))
+    theta = np.linspace(0.0, STRIDES, 801)
+    names, cells, colours = zip(*drawn, strict=True)
+    draw_stances(axes, names, [active(orbit, cell) for cell in cells], colours, 0.85)
+    for row, cell in enumerate(cells):
+        wave = int(orbit.waves[cell - 1])
+        middle, half = orbit.levels[wave, 0]
+        line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
+        axes.plot(theta, row - 0.33 * line, color=matplotlib.rcParams['text.color'],
+                  linewidth=0.9)
+    axes.set_xlim(0.0, STRIDES)
+    axes.set_title(title, fontsize=10, loc='left')
+    axes.spines[['top', 'right', 'left']].set_visible(False)
+    axes.tick_params(left=False)
+
+
+def picture(network: type[Network], path: Path) -> None:
+    """Write the picture of a network's gaits, each from the preset of its name.
+
+    Raises:
+        InputError: matplotlib does not write such files.
+
+    """
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    presets = {name: preset for name, preset in network.presets().items() if name == preset.gait}
+    columns = 3
+    lines = -(-len(presets) // columns)
+    figure, grid = pyplot.subplots(lines, columns, figsize=(10.5, 0.4 + 2.4 * lines), sharex=True,
+                                   sharey=True, layout='constrained')
+    for axes in grid.flat[len(presets):]:
+        axes.axis('off')
+    for axes, (name, preset) in zip(grid.flat, presets.items(), strict=False):
+        orbit = solve_preset(preset)
+        draw(axes, orbit, f'{name.replace("_", " ")}   (period {orbit.period:.4f})')
+    for axes in grid[-1]:
+        axes.set_xlabel('time [strides]')
+    bars = ('Bars: the cell is above the middle of its range.' if network.muscles else
+            'Bars: the leg stands, while the signal that drives it falls.')
+    figure.suptitle(f'{bars} Lines: the cell. Periods in model time.', fontsize=10)
+    try:
+        figure.savefig(path, dpi=130)
+    except ValueError as error:
+        # The ending of the file is of no format that matplotlib writes.
+        raise InputError(str(error)) from error
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='python -m cpg_ros.analysis.gait_diagram', description=__doc__)
+    parser.add_argument('picture', type=Path, help='file to write, .png or .pdf or .svg')
+    parser.add_argument('--network', default='delayed', metavar='NAME',
+                        help=f'{", ".join(SHIPPED)}, or a file (default: %(default)s)')
+    return parser
+
+
+def _draw(args: Namespace) -> int:
+    picture(find_network(args.network), args.picture)
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the picture; return the exit code."""
+    return run(_parser(), _draw, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,300 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Islands: populations that evolve separately, and periodically send their best to a neighbour.
+
+Each island is an NSGA-II of its own with random numbers of its own, derived from the seed, its
+number and the epoch. What is found depends on the number of islands, never on who computes them.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+from cpg_ros.analysis.objectives import evaluate, objective_names, Score, search_space, Space
+from cpg_ros.analysis.verification import NotVerified, polish, VerifiedGait
+from cpg_ros.common.command_line import progress_bar
+from cpg_ros.common.errors import CpgError, InputError, MissingLibraryError, ShortRepr
+from cpg_ros.networks.network import Network
+import numpy as np
+
+#: Generations between two migrations, and the share of a population that goes.
+EPOCH, MIGRANTS = 3, 0.1
+
+
+@dataclass(frozen=True)
+class SearchSetup:
+    """What all islands search, as the arguments of search_space, which can be pickled."""
+
+    network: str
+    gait: str
+    bounds: Mapping[str, tuple[float, float]]
+    fixed: Mapping[str, float]
+
+    @property
+    def space(self) -> Space:
+        """The parameter sets among which the gait is looked for."""
+        return search_space(self.network, self.gait, self.bounds, self.fixed)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Epoch(ShortRepr):
+    """An island for some generations.
+
+    Attributes:
+        setup: where it looks.
+        population: sets in a generation.
+        generations: how many.
+        random: seed of the island's random numbers.
+        seed: of the states that sets are judged from, the same for all.
+        start: first generation, shape (population, free variables); at random if None.
+        known: scores of sets that need not be judged anew.
+
+    """
+
+    setup: SearchSetup
+    population: int
+    generations: int
+    random: int
+    seed: int
+    start: np.ndarray | None = None
+    known: tuple[Score, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EpochResult(ShortRepr):
+    """An island after an epoch: its last generation, best first, and all sets it has judged."""
+
+    values: np.ndarray
+    scores: tuple[Score, ...]
+    tried: tuple[Score, ...]
+
+
+def evolve(epoch: Epoch,
+           progress: Callable[[int], None] = lambda generation: None) -> EpochResult:
+    """Run NSGA-II on an island for an epoch.
+
+    Raises:
+        MissingLibraryError: pymoo is missing.
+
+    """
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.core.problem import Problem
+        from pymoo.problems.static import StaticProblem
+    except ImportError as error:
+        raise MissingLibraryError('optimize needs pymoo: pip install pymoo'
+                                  ) from error
+    space = epoch.setup.space
+    problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
+                      n_ieq_constr=1,
+                      xl=np.array([variable.low for variable in space.free]),
+                      xu=np.array([variable.high for variable in space.free]))
+    algorithm = (NSGA2(pop_size=epoch.population) if epoch.start is None
+                 else NSGA2(pop_size=epoch.population, sampling=epoch.start))
+    algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
+    tried: dict[Network, Score] = {one.network: one for one in epoch.known}
+    for generation in range(epoch.generations):
+        population = algorithm.ask()
+        networks = [space.build(values) for values in population.get('X')]
+        new = list(dict.fromkeys(one for one in networks if one not in tried))
+        if new:
+            tried.update(zip(new, evaluate(new, space.gait, epoch.seed), strict=True))
+        scores = [tried[one] for one in networks]
+        # Bounds as the algorithm has them; waveforms that miss what is asked of them come
+        # after all others, whatever their phases.
+        static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
+                               G=np.array([[one.shortfall] for one in scores]))
+        Evaluator().eval(static, population)
+        algorithm.tell(infills=population)
+        progress(generation + 1)
+    values = algorithm.pop.get('X')
+    last = [tried[space.build(one)] for one in values]
+    best = sorted(range(len(last)), key=lambda k: (
+        last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
+    return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
+
+
+def _random(seed: int, island: int, epoch: int) -> int:
+    return int(np.random.SeedSequence([seed, island, epoch]).generate_state(1)[0])
+
+
+def archipelago(setup: SearchSetup, population: int, generations: int, seed: int, islands: int,
+                executor: Executor | None,
+                progress: Callable[[int], None] = lambda generation: None
+                ) -> tuple[Score, ...]:
+    """Return all sets that some islands have judged, in an order that is always the same.
+
+    Args:
+        setup: where they look.
+        population: sets in a generation of each.
+        generations: of each.
+        seed: of everything random.
+        islands: how many, in a ring; each sends its best to the next one.
+        executor: any; None for this process.
+        progress: takes the number of generations done.
+
+    """
+    tried: dict[Network, Score] = {}
+    starts: list[np.ndarray | None] = [None] * islands
+    known: list[tuple[Score, ...]] = [()] * islands
+    for epoch, begun in enumerate(range(0, generations, EPOCH)):
+        count = min(EPOCH, generations - begun)
+        # The generation that an epoch begins with is the last one of that before.
+        epochs = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
+                        starts[island], known[island]) for island in range(islands)]
+        found = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
+        for one in found:
+            for score in one.tried:
+                if score.network not in tried or score.exact > tried[score.network].exact:
+                    tried[score.network] = score
+        starts, known = migrate(found)
+        progress(begun + count)
+    return tuple(tried.values())
+
+
+def migrate(found: Sequence[EpochResult]
+            ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
+    """The best of each island in the place of the worst of the next one."""
+    many = max(1, round(MIGRANTS * len(found[0].values)))
+    starts: list[np.ndarray | None] = []
+    known = []
+    for island, own in enumerate(found):
+        other = found[island - 1]
+        starts.append(np.concatenate([own.values[:-many], other.values[:many]]))
+        known.append((*own.scores[:-many], *other.scores[:many]))
+    return starts, known
+
+
+# Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
+
+#: Sets of the front that are tried before the search is given up.
+TRIALS = 20
+#: Phase errors (degrees) that are all the same when one set is chosen, and the largest allowed.
+SAME, LARGEST = 0.1, 1.0
+
+
+class NoGaitFound(CpgError):
+    """No set passed; the message says how close the search came."""
+
+    exit_code = 1
+
+
+@dataclass(frozen=True)
+class Front:
+    """What a search has found.
+
+    Attributes:
+        space: what was varied.
+        scores: the Pareto front of all sets that were tried, best first.
+        tried: all of them, in the order in which they were tried.
+        args: the best one, with its exact orbit.
+
+    """
+
+    space: Space
+    scores: tuple[Score, ...]
+    tried: tuple[Score, ...]
+    args: VerifiedGait
+
+
+def optimise(network_name: str, gait: str, *, population: int = 60, generations: int = 12,
+             seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
+             fixed: Mapping[str, float] | None = None, progress: bool = True,
+             islands: int = 1, executor: Executor | None = None) -> Front:
+    """Look for weights that give a network a gait.
+
+    Args:
+        network_name: as search_space takes it.
+        gait: one of the network's.
+        population: parameter sets in a generation.
+        generations: how many.
+        seed: of everything random; the same seed finds the same.
+        bounds: variable -> lower and upper bound, instead of the usual ones.
+        fixed: variable -> its value.
+        progress: show a progress bar.
+        islands: populations that evolve apart and exchange their best; with more of them other
+            sets are found, on however many workers they are.
+        executor: any, for the islands; None for this process.
+
+    Raises:
+        InputError: an unknown network, gait or variable, or a bound that cannot be used.
+        MissingLibraryError: pymoo is missing.
+        NoGaitFound: no set passed.
+
+    """
+    space = search_space(network_name, gait, bounds or {}, fixed or {})
+    if population < 4 or generations < 1:
+        raise InputError(f'population {population} must be at least 4 and generations '
+                         f'{generations} at least 1')
+    if seed < 0:
+        raise InputError(f'seed {seed} must not be negative')
+    if islands < 1:
+        raise InputError(f'islands {islands} must be at least 1')
+    setup = SearchSetup(network_name, gait, dict(bounds or {}), dict(fixed or {}))
+    with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
+        if islands == 1:
+            epoch = Epoch(setup, population, generations, seed, seed)
+            tried = (evolve(epoch, bar) if executor is None
+                     else executor.submit(evolve, epoch).result()).tried
+        else:
+            tried = archipelago(setup, population, generations, seed, islands, executor, bar)
+    return _front(space, tried, seed)
+
+
+def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
+    """Choose from the front; a set that does not stand up to scrutiny is struck off it."""
+    left = [one for one in tried if one.exact and one.errors.max() <= LARGEST]
+    if not left:
+        best = min(tried, key=lambda one: (one.errors.max(), one.shortfall, one.stability))
+        raise _nothing(space, tried, _closeness(best))
+    for _ in range(TRIALS):
+        front = sorted(_non_dominated(left), key=_order)
+        try:
+            args = polish(front[0], space.gait, seed)
+        except NotVerified as error:
+            why = f'the best has the phases, but {error}'
+            left.remove(front[0])
+            if not left:
+                break
+            continue
+        return Front(space, tuple(front), tried, args)
+    raise _nothing(space, tried, why)
+
+
+def _closeness(best: Score) -> str:
+    """Say how close a set comes to its gait without being on it."""
+    if best.errors.max() > LARGEST:
+        return f'the best has phase errors of up to {best.errors.max():.1f} degrees'
+    if best.shortfall > 0.0:
+        return ('the best has the phases, but a waveform is too small, turns too unsteadily or is '
+                'too like the other')
+    return 'the best has the phases, but is not on an orbit of this gait'
+
+
+def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
+    return NoGaitFound(f'no {space.gait} among {len(tried)} sets of weights: {why}; more '
+                       'generations, a larger population or another seed may find one')
+
+
+def _order(score: Score) -> tuple[float, float]:
+    """Smallest phase errors first, then the most stable."""
+    return np.ceil(score.errors.max() / SAME), score.stability
+
+
+def _non_dominated(scores: list[Score]) -> list[Score]:
+    values = np.array([one.objectives for one in scores])
+    return [one for one, own in zip(scores, values, strict=True)
+            if not ((values <= own).all(axis=1) & (values < own).any(axis=1)).any()]

@@ -1,0 +1,356 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What makes a parameter set good for a gait: phases, stability, and waveforms that differ.
+
+Phase errors are those of Rashidi et al. (2016), eqs. 6-9, with the cell numbers of their Table 5:
+the phase of every cell against the first one, compared with the gait's. Where a gait has two
+waveforms they are taken between the cells that share one. Stability is the leading Floquet
+multiplier. All sets of a generation are simulated in one batch.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.integration.simulate import Trajectory
+from cpg_ros.dynamics.orbit import extra_symmetry
+from cpg_ros.dynamics.settling import (
+    ALIVE,
+    last_cycle,
+    population_run,
+    SettledCycle,
+    SPAN,
+    start_states,
+)
+from cpg_ros.dynamics.solve_orbit import solve_from_path
+from cpg_ros.fitting.gaits.recognition import lag, shape_difference, shifted, steadiness
+from cpg_ros.networks.network import known, Network
+from cpg_ros.networks.registry import find_network, is_path, NETWORKS, SHIPPED
+from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
+
+# What may vary when weights are looked for: couplings that keep a gait's symmetry, and cells.
+
+#: Shipped networks whose weights can be looked for.
+SEARCHED: dict[str, type[Network]] = {
+    name: SHIPPED[name] for name in sorted(SHIPPED) if SHIPPED[name].searched}
+#: Values have this many decimals, so that what is found can be written down as it is.
+DECIMALS = 4
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number to search for, or a given one where ``low`` and ``high`` agree.
+
+    Attributes:
+        name: by which it is fixed or bounded.
+        low, high: bounds.
+        members: parameters of the network that take its value.
+
+    """
+
+    name: str
+    low: float
+    high: float
+    members: tuple[str, ...]
+
+    @property
+    def free(self) -> bool:
+        """Whether it has a range."""
+        return self.low < self.high
+
+
+@dataclass(frozen=True)
+class Space:
+    """Parameter sets of a network that have the symmetry of a gait.
+
+    Attributes:
+        network: whose parameters.
+        gait: one of its gaits.
+        variables: all of them, free or given.
+
+    """
+
+    network: type[Network]
+    gait: str
+    variables: tuple[Variable, ...]
+
+    @property
+    def free(self) -> tuple[Variable, ...]:
+        """The variables to search for."""
+        return tuple(variable for variable in self.variables if variable.free)
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Symmetry of the gait, which all sets have."""
+        return self.build(np.array([one.low for one in self.free])).symmetry(self.gait)
+
+    def build(self, values: np.ndarray) -> Network:
+        """Return the network with values for the free variables, rounded to 4 decimals."""
+        places = iter(np.round(values, DECIMALS))
+        return self.network(**{
+            member: value for variable in self.variables
+            for value in (float(next(places)) if variable.free else variable.low,)
+            for member in variable.members})
+
+
+def _variables(network: type[Network], gait: str) -> list[Variable]:
+    """One variable for each family of parameters, those of groups first."""
+    # A family that is a whole group has the group's name.
+    names = {frozenset(members): group for group, members in network.groups.items()}
+    families = network.families(network.presets()[gait].network.symmetry(gait))
+    stated = {member: (name, limits) for name, limits in network.searched.items()
+              for member in network.groups.get(name, (name,))}
+    found = []
+    for family in families:
+        # Its members have the same bounds, whatever groups they are of.
+        name, limits = stated[min(family)]
+        found.append((name not in network.groups, Variable(
+            names.get(frozenset(family), min(family)), *limits, tuple(sorted(family)))))
+    return [variable for _, variable in sorted(
+        found, key=lambda one: (one[0], () if one[0] else one[1].members))]
+
+
+def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],
+                 fixed: Mapping[str, float]) -> Space:
+    """Return the parameter sets in which to search for a gait.
+
+    Args:
+        network_name: of a network that states what may be looked for, or its file.
+        gait: one of the network's.
+        bounds: variable, or any parameter that takes its value, -> lower and upper bound,
+            instead of the usual ones.
+        fixed: the same -> its value.
+
+    Raises:
+        InputError: the network or gait is unknown, or a bound or value cannot be used.
+
+    """
+    if not is_path(network_name) and (network_name not in NETWORKS
+                                      or not NETWORKS[network_name].searched):
+        raise InputError(f"network '{network_name}' is not one of {', '.join(SEARCHED)}")
+    network = find_network(network_name)
+    if not network.searched:
+        raise InputError(f'the network {network.name} does not state what may be looked for')
+    known(gait, network.gaits())
+    variables = _variables(network, gait)
+    places = {name: k for k, variable in enumerate(variables)
+              for name in (*variable.members, variable.name)}
+    given: dict[int, str] = {}
+    for name, (low, high) in [*bounds.items(), *((name, (value, value))
+                                                 for name, value in fixed.items())]:
+        if name not in places:
+            raise InputError(f"'{name}' is not one of the variables of {gait}: "
+                             f'{", ".join(variable.name for variable in variables)}')
+        place = places[name]
+        old = variables[place]
+        if place in given:
+            raise InputError(f'{name} is the same as {given[place]}, which is given already')
+        if name in bounds and not low < high:
+            raise InputError(f'{name}: the lower bound {low:g} is not below the upper bound '
+                             f'{high:g}')
+        allowed = network.ranges[old.members[0]]
+        if not allowed.low <= low <= high <= allowed.high:
+            raise InputError(f'{name}: {low:g}{"" if low == high else f" to {high:g}"} is not '
+                             f'within {allowed.low:g} to {allowed.high:g}')
+        given[place] = name
+        variables[place] = Variable(old.name, low, high, old.members)
+    space = Space(network, gait, tuple(variables))
+    if not space.free:
+        raise InputError('every variable is fixed: nothing is left to search')
+    return space
+
+
+#: Sets that are simulated at once, which limits memory: a usual generation is one batch.
+LARGEST_BATCH = 256
+#: How far a start is from the gait, as a share of the signals (see ``_mismatch``).
+START_MISMATCH = 0.2
+#: Smaller phase errors (degrees) are all the same: they tell of rounding, not of weights.
+RESOLUTION = 0.001
+#: Nearer to the gait than this its exact orbit is solved for: phases (degrees) and mismatch.
+NEAR, NEAR_MISMATCH = 5.0, 0.15
+#: That takes 20 to 300 ms, so no more of a generation have it done, those that seem most stable;
+#: and the period that is found may differ from the simulated one by this share.
+MOST_EXACT, SAME_PERIOD = 16, 0.02
+#: What is asked of every cell's range, of its turning (fitting.waveforms.steadiness), and of the
+#: difference in shape of two waveforms; the search keeps away from the limits by a factor.
+LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
+#: Objectives of a set that comes to rest or runs away, and of one that repeats nothing.
+WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Score(ShortRepr):
+    """A parameter set with its objectives, and a state on its gait.
+
+    Attributes:
+        network: the parameters.
+        errors: phase errors in degrees, shape (3,) or (2,); see ``pairs``.
+        stability: leading Floquet multiplier; an estimate where ``exact`` is not set.
+        difference: in shape of the gait's two waveforms; None for a gait with one.
+        shortfall: by how much waveforms miss their requirements, 0 if they do not.
+        exact: whether the orbit was solved for.
+        state: one on the exact orbit, shape (components,).
+        period: of that, model time.
+
+    """
+
+    network: Network
+    errors: np.ndarray
+    stability: float
+    difference: float | None
+    shortfall: float
+    exact: bool = False
+    state: tuple[float, ...] = ()
+    period: float = 0.0
+
+    @property
+    def objectives(self) -> np.ndarray:
+        """What is minimised: phase errors, stability, and minus a difference of waveforms."""
+        rest = [self.stability] + ([] if self.difference is None else [-self.difference])
+        return np.array([*np.maximum(self.errors, RESOLUTION), *rest])
+
+
+def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
+    """Pairs of cells (from 0) behind each phase error: a cell, and the first one of its waveform.
+
+    At most three errors: with more than three pairs the last one is the largest of the rest.
+    """
+    first = symmetry.first[symmetry.waves].tolist()
+    found = [(cell, one) for cell, one in enumerate(first) if cell != one]
+    return [[pair] for pair in found[:2]] + ([found[2:]] if found[2:] else [])
+
+
+def objective_names(symmetry: Symmetry) -> tuple[str, ...]:
+    """Names of the objectives with their units, in the order of Score.objectives."""
+    names = []
+    for group in pairs(symmetry):
+        cells = sorted(cell + 1 for cell, _ in group)
+        which = str(cells[0]) if len(cells) == 1 else f'{cells[0]} to {cells[-1]}'
+        names.append(f'phase error of cell {which} [deg]')
+    return (*names, 'leading multiplier [1]',
+            *(['minus difference of waveforms [1]'] if symmetry.waves.max() else []))
+
+
+def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
+    """How far signals are from the gait's symmetry: largest RMS over pairs, over the signal's."""
+    largest = 0.0
+    for cell, one in (pair for group in pairs(symmetry) for pair in group):
+        theta = symmetry.phases[cell] - symmetry.phases[one]
+        gap = np.sqrt(np.mean((signals[:, cell] - shifted(signals[:, one], theta))**2))
+        size = min(signals[:, cell].std(), signals[:, one].std())
+        largest = max(largest, float(gap / size) if size > 0.0 else 10.0)
+    return largest
+
+
+def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
+    """Phase errors of the groups of ``pairs`` in degrees, 0 to 180, shape (..., groups).
+
+    Args:
+        signals: of the cells on even points of a cycle, shape (..., m, cells or more).
+        symmetry: of the gait.
+
+    """
+    waves = np.swapaxes(signals, -1, -2)
+    errors = []
+    for group in pairs(symmetry):
+        cells, first = np.array(group).T
+        off = (lag(waves[..., cells, :], waves[..., first, :]) - symmetry.phases[cells]
+               + symmetry.phases[first])
+        errors.append(np.abs((off + 0.5) % 1.0 - 0.5).max(axis=-1) * 360.0)
+    return np.stack(errors, axis=-1)
+
+
+def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 1.0) -> float:
+    """Return by how much waveforms miss their requirements, relative to them; 0 if they do not.
+
+    Every cell has a range and turns steadily, so that its phase can be read in spite of noise;
+    two waveforms differ in shape.
+    """
+    cells, first = symmetry.group.cells, symmetry.first
+    have = [(np.ptp(signals[:, one]), LEAST_RANGE) for one in first]
+    have += [(steadiness(signals[:, one], signals[:, one + cells]), LEAST_STEADINESS)
+             for one in first]
+    if len(first) == 2:
+        have.append((shape_difference(*signals[:, first].T), LEAST_DIFFERENCE))
+    return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
+
+
+def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, SettledCycle | None]:
+    """Score a set by its simulation; also return its cycle if that is worth solving for."""
+    symmetry, cells = network.symmetry(gait), network.cells
+    first = symmetry.first
+    two = len(first) == 2
+    finite = bool(np.isfinite(run.x[-1]).all())
+    cycle = last_cycle(run, cells) if finite else None
+    if cycle is None:
+        alive = finite and np.ptp(run.x[run.t.size // 2:, :cells], axis=0).max() >= ALIVE
+        return Score(network, np.full(len(pairs(symmetry)), WORST),
+                     APERIODIC if alive else DEAD, 0.0 if two else None, 10.0), None
+    signals = cycle.signals
+    errors = phase_errors(signals, symmetry)
+    mismatch = _mismatch(signals, symmetry)
+    near = errors.max() <= NEAR and mismatch <= NEAR_MISMATCH
+    if near:
+        shortfall = waveform_shortfall(signals, symmetry, MARGIN)
+    else:
+        # The shapes are not those of the gait: only the range counts, and two waveforms that
+        # are not there at all fall shorter than any that are.
+        shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / LEAST_RANGE)
+        shortfall += (MARGIN + errors.max() / WORST) if two else 0.0
+    difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None
+    # An estimate at no cost: by how much a cycle has brought the disturbance of the start nearer
+    # to the gait. It is above 1 where the network has left, and smaller the slower it left.
+    stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)**(cycle.period / SPAN))
+    score = Score(network, errors, float(stability), difference, float(shortfall))
+    return score, cycle if near and shortfall == 0.0 else None
+
+
+def _proven(score: Score, cycle: SettledCycle, gait: str) -> Score:
+    """Solve for the exact orbit of a set that ends near its gait, from its cycle."""
+    symmetry = score.network.symmetry(gait)
+    orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
+    if orbit is None or extra_symmetry(orbit) or abs(orbit.period / cycle.period
+                                                     - 1.0) > SAME_PERIOD:
+        # What is near the gait but not on it has no right to the estimate.
+        return replace(score, stability=max(1.0, score.stability))
+    return replace(score, stability=multipliers(orbit).leading, exact=True,
+                   state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)
+
+
+def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
+    """Simulate the parameter sets of a generation in a batch, and score each.
+
+    Args:
+        networks: of one kind.
+        gait: one of theirs.
+        seed: of the start.
+
+    """
+    found = []
+    for first in range(0, len(networks), LARGEST_BATCH):
+        batch = networks[first:first + LARGEST_BATCH]
+        runs = population_run(batch, start_states(batch, gait, seed))
+        found += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
+                  for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]
+    scores = [score for score, _ in found]
+    worth = sorted((k for k, (_, cycle) in enumerate(found) if cycle is not None),
+                   key=lambda k: scores[k].stability)
+    for k in worth[:MOST_EXACT]:
+        cycle = found[k][1]
+        assert cycle is not None
+        scores[k] = _proven(scores[k], cycle, gait)
+    return scores

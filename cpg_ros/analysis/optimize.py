@@ -1,0 +1,283 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``optimize``: weights that give a network a gait, found by NSGA-II.
+
+``optimize --network biped --gait skip --seed 0`` prints the set that was chosen and writes the
+Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator`` loads.
+"""
+
+import argparse
+from collections.abc import Sequence
+import csv
+from functools import partial
+import io
+from pathlib import Path
+import re
+import sys
+from typing import Any
+
+from cpg_ros.analysis.nsga2 import Front, optimise
+from cpg_ros.analysis.objectives import APERIODIC, objective_names, RESOLUTION, SEARCHED
+from cpg_ros.analysis.verification import orbit_signals
+from cpg_ros.common.command_line import (
+    assignment,
+    named_interval,
+    note,
+    Parser,
+    refuse_repeated,
+    run,
+    say,
+)
+from cpg_ros.common.files import write_atomically
+from cpg_ros.common.workers import add_options, executor_for
+from cpg_ros.networks.presets import write_presets
+import matplotlib
+from matplotlib.axes import Axes
+import numpy as np
+
+# The Pareto front of a search for weights, as a table in a file and as a picture.
+
+#: Colours of the waveforms, of sets that were tried or solved, and of the front.
+WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
+#: The smallest multiplier that is drawn.
+FLOOR = 1e-6
+
+
+def write_front(path: Path, front: Front) -> None:
+    """Write the front, best set first: variables, objectives and periods, units in the names."""
+    names = [variable.name for variable in front.space.variables]
+    two = front.scores[0].difference is not None
+    errors = [name for name in objective_names(front.space.symmetry) if name.startswith('phase')]
+    text = io.StringIO(newline='')
+    rows = csv.writer(text)
+    rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
+                   *(['difference of waveforms [1]'] if two else []),
+                   'period [model time]', 'chosen'])
+    for score in front.scores:
+        parameters = score.network.as_dict()
+        values = [parameters[variable.members[0]] for variable in front.space.variables]
+        rows.writerow([*values, *(f'{error:.4g}' for error in score.errors),
+                       f'{score.stability:.6g}',
+                       *([f'{score.difference:.6g}'] if two else []),
+                       f'{score.period:.6f}',
+                       int(score.network == front.args.preset.network)])
+    write_atomically(path, text.getvalue())
+
+
+def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndarray]) -> None:
+    """Draw two objectives of all sets; the front and the chosen set stand out."""
+    on = np.array([score.network in {one.network for one in front.scores}
+                   for score in front.tried])
+    args = np.array([score.network == front.args.preset.network for score in front.tried])
+    exact = np.array([score.exact for score in front.tried])
+    axes.scatter(values[x][~exact], values[y][~exact], s=12, color=TRIED, marker='x',
+                 linewidths=0.7, label='tried, multiplier estimated')
+    rest = exact & ~on
+    axes.scatter(values[x][rest], values[y][rest], s=12, color=SOLVED, alpha=0.7, linewidths=0,
+                 label='tried, orbit solved')
+    axes.scatter(values[x][on], values[y][on], s=22, color=BEST, label='Pareto front', zorder=3)
+    axes.scatter(values[x][args], values[y][args], s=110, facecolors='none',
+                 edgecolors='#1a202c', linewidths=1.3, label='chosen', zorder=4)
+    for name, scale, limits in ((x, axes.set_xscale, axes.set_xlim),
+                                (y, axes.set_yscale, axes.set_ylim)):
+        if 'phase' in name:
+            scale('log')
+            limits(0.5 * RESOLUTION, 300.0)
+        elif 'multiplier' in name:
+            scale('log')
+            # Whole decades, so that there are some to label.
+            limits(10.0**np.floor(np.log10(0.999 * values[name].min())), 3.0)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+
+
+def _signals(axes: Axes, front: Front) -> None:
+    """Draw what every cell does over two cycles of the exact orbit, one row each."""
+    orbit = front.args.orbit
+    points = 512
+    once = orbit_signals(orbit, points)[:, :orbit.network.cells]
+    signals = np.concatenate([once, once, once[:1]])
+    time = np.arange(2 * points + 1) / points * orbit.period
+    spacing = 1.15 * float(np.ptp(once, axis=0).max())
+    cells = orbit.network.cells
+    middles = (cells - 1 - np.arange(cells)) * spacing
+    for cell in range(cells):
+        middle = 0.5 * float(once[:, cell].max() + once[:, cell].min())
+        axes.plot(time, middles[cell] + signals[:, cell] - middle,
+                  color=WAVES[int(orbit.waves[cell])], linewidth=1.4)
+    axes.axvline(orbit.period, color=TRIED, linewidth=0.8, linestyle=':')
+    axes.set_yticks(middles, [f'cell {cell + 1}' for cell in range(cells)])
+    # Without dimension, like everything in these networks: a bar tells how large.
+    unit = float(f'{0.5 * spacing:.1g}')
+    axes.plot([time[-1] * 1.02] * 2, [middles[-1] - 0.5 * unit, middles[-1] + 0.5 * unit],
+              color='#1a202c', linewidth=2.0, clip_on=False)
+    axes.text(time[-1] * 1.03, middles[-1], f'{unit:g}', va='center', fontsize=9)
+    axes.set_xlim(0.0, time[-1])
+    axes.set_xlabel('time [model time], two cycles of the exact orbit')
+    axes.set_ylabel('potential v [1]')
+
+
+def draw_front(path: Path, front: Front) -> None:
+    """Draw objectives against each other, and the chosen set's signals."""
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    names = objective_names(front.space.symmetry)
+    values = dict(zip(names, np.array([one.objectives for one in front.tried]).T, strict=True))
+    multiplier = 'leading multiplier a cycle [1]'
+    stability = values.pop('leading multiplier [1]')
+    exact = np.array([one.exact for one in front.tried])
+    values[multiplier] = np.clip(stability, FLOOR, APERIODIC)
+    phases = [name for name in names if name.startswith('phase')]
+    worst = 'largest phase error [deg]'
+    values[worst] = np.max([values[name] for name in phases], axis=0)
+    panels = [(phases[0], phases[1]), (worst, multiplier)]
+    if front.args.orbit.waves.max():
+        difference = 'difference in shape of the waveforms [1]'
+        values[difference] = np.array([one.difference for one in front.tried])
+        # Elsewhere the gait's two waveforms are not there to be compared.
+        values[difference][~exact] = np.nan
+        panels.append((difference, multiplier))
+    else:
+        panels.insert(1, (phases[0], phases[2]))
+    figure = pyplot.figure(figsize=(12.0, 7.6), layout='constrained')
+    parts: Any = figure.subfigures(2, 1)
+    upper, lower = parts
+    for axes, (x, y) in zip(upper.subplots(1, len(panels)), panels, strict=True):
+        _scatter(axes, front, x, y, values)
+        axes.grid(linewidth=0.3)
+        axes.spines[['top', 'right']].set_visible(False)
+    upper.legend(*axes.get_legend_handles_labels(), fontsize=9, loc='outside lower center',
+                 ncols=4, frameon=False)
+    axes = lower.subplots()
+    _signals(axes, front)
+    axes.spines[['top', 'right', 'left']].set_visible(False)
+    axes.tick_params(left=False)
+    orbit = front.args.orbit
+    figure.suptitle(f'{front.space.gait.replace("_", " ")} of the {front.space.network.name}: '
+                    f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
+                    f'chosen: period {orbit.period:.3f} model time, leading multiplier '
+                    f'{front.args.leading:.2g} a cycle', fontsize=11)
+    image = io.BytesIO()
+    figure.savefig(image, dpi=120, format='png')
+    pyplot.close(figure)
+    write_atomically(path, image.getvalue())
+
+
+DESCRIPTION = """\
+Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
+phase errors of the cells, the leading Floquet multiplier of the gait's orbit and, for a gait with
+two waveforms, minus their difference in shape. The set chosen from the Pareto front has the
+smallest phase errors and then the smallest multiplier; it is verified by its exact orbit and under
+noise."""
+EPILOG = """\
+variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
+such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
+phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them; hopf and
+matsuoka: k_side k_girdle k_diagonal, or for walks the weights that the symmetry makes equal.
+
+files: front.csv, front.png and preset.yaml, for
+  ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME
+
+exit codes: 0 found, 1 nothing found, 2 invalid arguments."""
+
+
+def _name(text: str) -> str:
+    if not re.fullmatch(r'[A-Za-z]\w*', text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a name of letters, digits and _")
+    return text
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG)
+    parser.add_argument('--network', default='biped', metavar='NAME',
+                        help=f'{", ".join(SEARCHED)}, or the path of a Python file with a '
+                        'network (default: %(default)s)')
+    parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
+        f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHED.items()))
+    parser.add_argument('--population', type=int, default=60, metavar='N',
+                        help='parameter sets per generation (default: %(default)s)')
+    parser.add_argument('--generations', type=int, default=12, metavar='N',
+                        help='number of generations (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=0, metavar='N',
+                        help='seed of the search; the same seed gives the same result '
+                        '(default: %(default)s)')
+    parser.add_argument('--islands', type=int, default=1, metavar='N', help='number of '
+                        'populations that evolve separately and exchange their best members, one '
+                        'job each; the result depends on this number, but not on the number of '
+                        'workers (default: %(default)s)')
+    add_options(parser)
+    parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
+                        metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
+                        'current=0.229 phi=0.254')
+    parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=named_interval,
+                        metavar='VARIABLE=LOW:HIGH', help='search bounds other than the default, '
+                        'such as w_a=-0.5:0.5')
+    parser.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
+                        help='folder for the files (default: %(default)s)')
+    parser.add_argument('--name', type=_name, help="name of the preset (default: the gait's, "
+                        'followed by _optimised)')
+    return parser
+
+
+def table(front: Front) -> str:
+    """Say what was chosen, in lines of a name, a value and a unit."""
+    args, space = front.args, front.space
+    parameters = args.preset.network.as_dict()
+    rows = []
+    for variable in space.variables:
+        members = variable.members if len(variable.members) == 2 else (variable.name,)
+        rows.append((' = '.join(members), f'{parameters[variable.members[0]]:.4f}',
+                     '' if variable.free else 'given'))
+    rows.append(('phase errors', ', '.join(f'{error:.3f}' for error in args.errors), 'degrees'))
+    rows.append(('period', f'{args.orbit.period:.4f}', 'model time'))
+    rows.append(('leading multiplier', f'{args.leading:.4f}', 'a cycle'))
+    if args.orbit.waves.max():
+        rows.append(('waveforms differ by', f'{args.differences[0]:.3f}', 'of their RMS'))
+    width, middle = (max(len(row[k]) for row in rows) for k in (0, 1))
+    lines = [f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
+             f'{len(front.scores)} on the Pareto front; chosen:']
+    return '\n'.join([*lines, *(f'  {name:<{width}}  {value:>{middle}}  {unit}'.rstrip()
+                                for name, value, unit in rows)])
+
+
+def _optimize(args: argparse.Namespace) -> int:
+    for option in ('fix', 'bounds'):
+        refuse_repeated(f'argument --{option}', [name for name, _ in getattr(args, option)])
+    name = args.name or f'{args.gait}_optimised'
+    # Now, and not when the work is done.
+    args.out.mkdir(parents=True, exist_ok=True)
+    with executor_for(max(1, args.islands), args, 'epochs of islands',
+                      partial(note, 'optimize')) as executor:
+        front = optimise(args.network, args.gait, population=args.population,
+                         generations=args.generations, seed=args.seed,
+                         bounds=dict(args.bounds), fixed=dict(args.fix),
+                         progress=executor is None and sys.stderr.isatty(),
+                         islands=args.islands, executor=executor)
+    write_front(args.out / 'front.csv', front)
+    draw_front(args.out / 'front.png', front)
+    write_presets(args.out / 'preset.yaml', front.space.network, {name: front.args.preset},
+                  f'Found by: {args.command}')
+    say(f'{table(front)}\n'
+        f'written: front.csv, front.png and preset.yaml (preset {name}) in {args.out}')
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the search; return the exit code."""
+    return run(_parser(), _optimize, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,427 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Buono & Golubitsky (2001), sections 4 to 6: Table 12, the stand, Theorems 4.1 to 4.3."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import cast
+
+from cpg_ros.analysis.papers.buono_gaits import AUTHORS
+from cpg_ros.analysis.papers.buono_linear import Sample, UNCOUPLED
+from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow
+from cpg_ros.dynamics.equilibrium import equilibrium
+from cpg_ros.dynamics.hopf import hopf_at, hopf_points, HopfPoint
+from cpg_ros.dynamics.isotypic import blocks
+from cpg_ros.networks.library.quadruped import Quadruped
+from cpg_ros.networks.network import known, Network, ParameterLine
+from cpg_ros.networks.symmetry import GAITS
+import numpy as np
+from scipy.optimize import brentq
+
+#: Section 6.
+STAND, NU_0 = ('0.31', '0.52'), '-1.24'
+#: Table 12: alpha = beta, gamma = delta, xi = eta.
+TABLE_12 = {'pace': ('0.3', '-0.32', '0'), 'bound': ('-0.32', '0.3', '0'),
+            'trot': ('0.15', '-0.16', '-0.31')}
+#: 'Approximate values': this much of them.
+APPROXIMATE = 0.1
+#: Erratum 6: the signs with which the trot's Hopf point is there.
+TROT = (-0.15, -0.16, 0.31)
+
+#: Theorem 4.2: clause, gait, alpha, sign of beta, between which values of gamma the point lies,
+#: whether the clause calls it stable.
+THEOREM = (
+    ('a', 'pronk', 0.05, 1.0, (0.05, 0.08), True), ('a', 'pronk', -0.05, 1.0, (0.14, 0.2), False),
+    ('b', 'pace', 0.3, 1.0, (-0.35, -0.2), True), ('b', 'pace', 0.3, 1.0, (0.1, 0.16), False),
+    ('c', 'bound', -0.3, 1.0, (0.25, 0.35), True), ('c', 'bound', 0.05, 1.0, (0.08, 0.1), False),
+    ('d', 'trot', -0.6, 1.0, (-0.6, -0.5), True),
+    ('e', 'jump', 0.05, -1.0, (0.1, 0.2), True), ('f', 'walk', 0.01, -1.0, (-1.2, -1.05), True),
+    ('f', 'walk', 0.05, -1.0, (-1.1, -0.9), True))
+#: Of these the one where the clause does not hold, by its gait and alpha.
+FAILING = ('walk', 0.05)
+
+
+def stand_sample(network: Network) -> Sample:
+    """Return the linearisation at the stand of a network."""
+    return Sample(cast(Quadruped, network), equilibrium(network))
+
+
+def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> HopfPoint:
+    """Find the Hopf point of a gait between two values of parameters.
+
+    Args:
+        network: the other parameters.
+        line: the parameters that move, as in ``ParameterLine``.
+        gait: one of the six.
+        low: value on one side of the point.
+        high: value on the other side.
+
+    """
+    along, (j, k) = ParameterLine.parse(line, Quadruped), GAITS[gait]
+
+    def largest(value: float) -> float:
+        return stand_sample(along.at(network, value)).largest(f'L_{j}{k}')
+
+    there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
+    # Of the two senses of a wave the one whose critical eigenvalue turns forward.
+    blocks = stand_sample(there).blocks
+    root, mode = min(((root, (way, k)) for way in {j, -j % 4}
+                      for root in blocks[f'L_{way}{k}'].roots(2) if root.imag > 0.0),
+                     key=lambda one: abs(one[0].real))
+    return hopf_at(there, along, mode, root.imag)
+
+
+def the_stand() -> Iterator[ReproducedRow | Picture]:
+    """Section 6: the stand of the uncoupled cells, and hypothesis 4.6."""
+    at = Citation(AUTHORS, 'section 6')
+    sample = stand_sample(UNCOUPLED)
+    for name, printed, value in zip(('v_0', 'w_0'), STAND, sample.state, strict=True):
+        yield at.number(f'{name} of the stand', printed, float(value))
+    yield at.number('nu_0, the trace of a cell there', NU_0, sample.trace('L_00').real)
+    roots = sample.blocks['L_00'].roots(2)
+    yield at.holds('the stand is a spiral sink, hypothesis 4.6',
+                   bool((roots.real < 0.0).all() and (roots.imag != 0.0).all()))
+
+
+def existence() -> Iterator[ReproducedRow | Picture]:
+    """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
+    nu = stand_sample(UNCOUPLED).trace('L_00').real
+    for place, gait, line, text, value, speed in (
+            ('Theorem 4.1', 'walk', 'gamma=delta=-alpha=-beta', 'nu_0/2', nu / 2.0, '-2'),
+            ('Theorem 4.1', 'trot', 'xi=eta=-alpha=-beta', '-nu_0/4', -nu / 4.0, None),
+            ('Theorem 4.3', 'pace', 'alpha=beta=-gamma=-delta', '-nu_0/4', -nu / 4.0, None),
+            ('Theorem 4.3', 'bound', 'alpha=beta=-gamma=-delta', 'nu_0/4', nu / 4.0, None)):
+        point = hopf(UNCOUPLED, line, gait, value - 0.1, value + 0.1)
+        at = Citation(AUTHORS, place)
+        yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, value,
+                         point.value)
+        if speed:
+            yield at.formula(f'{gait}: speed at which the eigenvalues cross', speed,
+                             float(speed), point.normal_form.k1.real,
+                             erratum=(13, float(speed) / 2.0))
+    # On xi = -(alpha + gamma) with gamma fixed, nu - 2 (alpha + gamma) + 2 xi by xi is 4, of
+    # which the proof takes the part by xi alone.
+    point = hopf(UNCOUPLED, 'xi=eta=-alpha=-beta', 'trot', 0.2, 0.4)
+    yield Citation(AUTHORS, 'Theorem 4.1').formula(
+        'trot: speed at which the eigenvalues cross, xi = -(alpha + gamma)', '2', 2.0,
+        point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
+        'grows by 4, the real part by 2')
+    walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
+    sample = stand_sample(walk.network)
+    alpha = sample.network.alpha
+    at = Citation(AUTHORS, 'Proposition 5.6')
+    zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
+    yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
+                  ', '.join(zero), erratum=(21, 'L_11'))
+    yield at.formula('trace of L_01 there', '2 alpha', 2.0 * alpha, sample.trace('L_01').real)
+    yield at.formula('trace of L_21 there', '-2 alpha', -2.0 * alpha, sample.trace('L_21').real)
+    yield at.holds('an eigenvalue has a positive real part there', walk.unstable_roots > 0)
+
+
+def table_12() -> Iterator[ReproducedRow | Picture]:
+    """Table 12: Hopf points to pace, bound and trot, and what branches off."""
+    at = Citation(AUTHORS, 'Table 12')
+    points = {}
+    for gait, name, line, (alpha, gamma) in (
+            ('pace', 'gamma = delta', 'gamma=delta', (0.3, 0.0)),
+            ('bound', 'alpha = beta', 'alpha=beta', (0.0, 0.3))):
+        printed = TABLE_12[gait][1 if name.startswith('gamma') else 0]
+        points[gait] = hopf(Quadruped(alpha, alpha, gamma, gamma), line, gait, -0.35, -0.2)
+        yield at.number(f'{gait}: {name} at the Hopf point', printed, points[gait].value,
+                        within=APPROXIMATE * abs(float(printed)),
+                        note='the table says approximate; the other coupling as printed')
+    alpha, gamma, xi = (float(one) for one in TABLE_12['trot'])
+    sample = stand_sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
+    leading = max(sample.largest(name) for name in sample.blocks)
+    yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
+                    leading, within=0.1, erratum=(6, '-0.449'))
+    alpha, gamma, xi = TROT
+    for n, (name, line) in enumerate((('alpha = beta', 'alpha=beta'),
+                                      ('gamma = delta', 'gamma=delta'), ('xi = eta', 'xi=eta'))):
+        near = TROT[n]
+        point = hopf(Quadruped(alpha, alpha, gamma, gamma, xi, xi), line, 'trot', near - 0.05,
+                     near + 0.05)
+        yield at.number(f'trot: {name} at the Hopf point', TABLE_12['trot'][n], point.value,
+                        erratum=(6, f'{near:g}'), note=f'the others at {alpha}, {gamma}, {xi}')
+        points['trot'] = point
+    for gait, point in points.items():
+        yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
+                      'stable' if point.stable else 'unstable',
+                      note=f'leading one {point.leading_other:.4f}')
+        yield Citation(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
+            f'{gait}: the solution that branches off at Table 12', 'stable',
+            'stable' if point.stable and point.supercritical else 'unstable',
+            erratum=(22, 'unstable'),
+            note=f'first Lyapunov coefficient {point.lyapunov:.3f}')
+
+
+def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
+    found: dict[str, HopfPoint] = {}
+    for clause, gait, alpha, sign, (low, high), stable in THEOREM:
+        point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
+        found.setdefault(gait, point)
+        yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
+            f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
+            f'{point.value:.4f}', 'stable' if stable else 'unstable',
+            'stable' if point.stable else 'unstable',
+            erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
+            note=f'{point.unstable_roots} other eigenvalues with positive real part')
+    trot = found['trot']
+    sample = stand_sample(trot.network)
+    n = sample.network
+    at = Citation(AUTHORS, 'Proposition 5.5')
+    for name, text, value in (
+            ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma)),
+            ('L_01', '4 alpha', 4.0 * n.alpha), ('L_20', '4 gamma', 4.0 * n.gamma),
+            ('L_10', '2 alpha + 4 gamma', 2.0 * n.alpha + 4.0 * n.gamma),
+            ('L_11', '2 alpha', 2.0 * n.alpha)):
+        yield at.formula(f'trace of {name} (real part) at the Hopf point to the trot', text,
+                         value, sample.trace(name).real)
+    at = Citation(AUTHORS, 'Proposition 5.7')
+    for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
+        sample = stand_sample(found[gait].network)
+        gamma = sample.network.gamma
+        phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
+        root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
+        four = f'{"-" if sign < 0.0 else ""}4 gamma'
+        with_it = {'jump': ('L_01', 'L_00'), 'walk': ('L_00', 'L_01')}[gait]
+        for name, text, value, ours in (
+                (other, four, sign * 4.0 * gamma, 2.0 * sample.largest(other)),
+                (with_it[0], f'{four} - X', sign * 4.0 * gamma - root,
+                 sample.trace(with_it[0]).real),
+                (with_it[1], '-X', -root, sample.trace(with_it[1]).real)):
+            yield at.formula(f'sigma of {name} at the Hopf point to the {gait}', text, value,
+                             ours, note='X = sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)')
+
+
+# Theorem 4.2 of Buono & Golubitsky (2001): which Hopf bifurcations of the quadruped are stable.
+
+#: Gait -> sign of beta against alpha, and the signs that alpha and gamma must have; 0 is any.
+SIGNS = {'pronk': (1, 1, 1), 'pace': (1, 1, -1), 'bound': (1, -1, 1), 'trot': (1, -1, -1),
+         'jump': (-1, 0, 1), 'walk': (-1, 0, -1)}
+#: Couplings are equal, and eigenvalues on the imaginary axis, within this.
+EQUAL = 1e-7
+
+
+@dataclass(frozen=True)
+class TheoremVerdict:
+    """What the theorem says of a Hopf bifurcation.
+
+    Attributes:
+        gait: that branches off.
+        unmet: hypotheses of the theorem that do not hold, as text.
+        condition: on the signs, as text.
+        met: whether it holds.
+        overlooked: what the theorem's proof takes for granted though it does not hold, as text:
+            the theorem, as stated, may be wrong there.
+
+    """
+
+    gait: str
+    unmet: tuple[str, ...]
+    condition: str
+    met: bool
+    overlooked: tuple[str, ...]
+
+    @property
+    def applies(self) -> bool:
+        """Whether all hypotheses hold."""
+        return not self.unmet
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether the theorem calls the bifurcation stable; None where it does not apply."""
+        return self.met if self.applies else None
+
+    def __str__(self) -> str:
+        if self.unmet:
+            return (f'theorem 4.2 does not apply to this {self.gait}: it requires '
+                    f'{", ".join(self.unmet)}')
+        text = (f'theorem 4.2: the bifurcation to {self.gait} is '
+                f'{"stable" if self.met else "not stable"}, as {self.condition} '
+                f'{"holds" if self.met else "does not hold"}')
+        if self.overlooked:
+            text += f'; but its proof takes for granted that {" and ".join(self.overlooked)}'
+        return text
+
+
+def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
+    """Apply the theorem at a Hopf point of the gait; that it is one is taken for granted.
+
+    For jump and walk the proof holds only for the rightmost pair of the class ("we always refer
+    to the real part of the eigenvalue with greatest real part", corollary 5.4) and for alpha so
+    small that the real blocks have complex eigenvalues ("if we choose alpha small enough").
+    Where alpha is 0 the cells of a ring do not hear one another, classes coincide, and no
+    bifurcation is simple.
+
+    Raises:
+        InputError: the gait is not one of the six, or a parameter is not finite.
+        NoEquilibrium: the network has no stand.
+
+    """
+    mirror, along, across = SIGNS[known(gait, tuple(GAITS))]
+    required = {'delta = gamma': network.delta - network.gamma,
+                'xi = 0': network.xi, 'eta = 0': network.eta,
+                'beta = alpha' if mirror > 0 else 'beta = -alpha':
+                    network.beta - mirror * network.alpha}
+    unmet = [text for text, gap in required.items() if not abs(gap) <= EQUAL]
+    if abs(network.alpha) <= EQUAL:
+        unmet.append('alpha different from 0')
+    signs = [('alpha', along, network.alpha), ('gamma', across, network.gamma)]
+    condition = ' and '.join(f'{name} {">" if sign > 0 else "<"} 0'
+                             for name, sign, _ in signs if sign)
+    met = all(sign * value > 0.0 for _, sign, value in signs if sign)
+
+    overlooked = []
+    split = blocks(network, equilibrium(network))
+    if max(block.leading.real for block in split if block.gait == gait) > EQUAL:
+        overlooked.append('the critical pair is the rightmost of its class')
+    # Where beta = alpha all real blocks have the discriminant of the critical one.
+    if mirror < 0 and any(block.real and block.leading.imag == 0.0 for block in split):
+        overlooked.append('the real blocks have complex eigenvalues')
+    return TheoremVerdict(gait, tuple(unmet), condition, met, tuple(overlooked))
+
+
+# Buono & Golubitsky (2001), sections 4 and 5: what the proofs claim beside their numbers.
+
+#: Gait -> the line of the proof, the parameter that eq. 5.6 differentiates by, what it multiplies
+#: in E = nu + ..., and the Hopf point on the line in units of nu_0.
+PROOFS = {'walk': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.5),
+          'jump': ('gamma=delta=-alpha=-beta', 'gamma=delta', 2.0, -0.5),
+          'pace': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.25),
+          'bound': ('gamma=delta=-alpha=-beta', 'gamma=delta', 2.0, -0.25),
+          'trot': ('xi=eta=-alpha=-beta', 'xi=eta', 2.0, -0.25)}
+#: Differences for the gradient of nu; how far off its line a Hopf point is followed; determinants
+#: and speeds above this are not 0.
+DIFFERENCE, OFF, NONZERO = 1e-5, 0.02, 1e-6
+#: A critical pair's real part is 0 within this.
+ON_AXIS = 1e-7
+#: Theorem 4.2 'remains valid if |alpha - beta| and |gamma - delta| are nonzero and small'.
+SMALL = (0.004, -0.003)
+#: Values of alpha at which Hopf points are searched, and how far in gamma.
+ALPHAS, GAMMAS = (-0.3, 0.1), (-1.2, 0.5)
+
+
+def genericity_matrix(gait: str) -> np.ndarray:
+    """Return the matrix of eq. 5.6 for a gait, at the uncoupled stand, shape (3, 3).
+
+    Rows are the gradients of F, G and E by x, y and the gait's coupling.
+    """
+    sample = stand_sample(UNCOUPLED)
+    matrix = np.empty((3, 3))
+    matrix[:2, :2] = sample.blocks['L_00'].now.real
+    matrix[2, :2] = [(_nu(sample.state + step) - _nu(sample.state - step)) / (2.0 * DIFFERENCE)
+                     for step in DIFFERENCE * np.eye(2)]
+    matrix[:2, 2], matrix[2, 2] = sample.state, PROOFS[gait][2]
+    return matrix
+
+
+def _nu(state: np.ndarray) -> float:
+    return Sample(UNCOUPLED, state).trace('L_00').real
+
+
+def _on_line(gait: str) -> HopfPoint:
+    line, _, _, fraction = PROOFS[gait]
+    there = fraction * stand_sample(UNCOUPLED).trace('L_00').real
+    return hopf(UNCOUPLED, line, gait, there - 0.05, there + 0.05)
+
+
+def genericity() -> Iterator[ReproducedRow | Picture]:
+    """Eq. 5.6, and Hopf points beyond the lines of the proofs."""
+    for gait, (_, free, _, _) in PROOFS.items():
+        found = float(np.linalg.det(genericity_matrix(gait)))
+        place = ('section 6', 'easily verified') if gait in ('pace', 'bound', 'trot') else (
+            'eq. 5.6', 'generically nonzero')
+        yield Citation(AUTHORS, place[0]).holds(
+            f'{gait}: the determinant of eq. 5.6, of the genericity condition, is not 0',
+            abs(found) > NONZERO, note=f'{place[1]}: {found:.4f}')
+        point = _on_line(gait)
+        network = point.network
+        assert isinstance(network, Quadruped)
+        beside = network.replace(alpha=network.alpha + OFF, beta=network.beta + OFF)
+        start = getattr(network, free.split('=')[0])
+        near = hopf(beside, free, gait, start - 4.0 * OFF, start + 4.0 * OFF)
+        speed = near.normal_form.k1.real
+        yield Citation(AUTHORS, 'Theorem 4.1').holds(
+            f'{gait}: a branch of Hopf points leaves the line of the proof, at nonzero speed',
+            abs(speed) > NONZERO,
+            note=f'at alpha = beta = {beside.alpha:.4f}: {free} = {near.value:.4f}, speed '
+                 f'{speed:.3f}')
+
+
+def jump() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 4.1 for the jump, 'done in a similar way'."""
+    nu, point = stand_sample(UNCOUPLED).trace('L_00').real, _on_line('jump')
+    at = Citation(AUTHORS, 'Theorem 4.1')
+    yield at.formula('jump: gamma at the Hopf point, gamma=delta=-alpha=-beta', '-nu_0/2',
+                     -nu / 2.0, point.value, note='where sigma_10 = nu + 2 gamma vanishes')
+    yield at.word('jump: gait of the class whose eigenvalues cross', 'jump', point.gait)
+    yield at.formula('jump: speed at which the eigenvalues cross', '2', 2.0,
+                     point.normal_form.k1.real, erratum=(13, 1.0))
+
+
+def stable_points() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 4.3: the Hopf points of the proof are stable; the trot's by Lemma 5.8."""
+    nu = stand_sample(UNCOUPLED).trace('L_00').real
+    at = Citation(AUTHORS, 'Theorem 4.3')
+    # alpha = gamma = nu_0/8, so that -(alpha + gamma) = -nu_0/4.
+    eighth = nu / 8.0
+    trot = hopf(Quadruped(eighth, eighth, eighth, eighth), 'xi=eta', 'trot', -nu / 4.0 - 0.05,
+                -nu / 4.0 + 0.05)
+    yield at.formula('trot: xi at the Hopf point, alpha = gamma = nu_0/8', '-nu_0/4', -nu / 4.0,
+                     trot.value)
+    yield Citation(AUTHORS, 'Lemma 5.8').holds(
+        'trot: alpha_0 < 0, gamma_0 < 0 and xi_0 > alpha_0/2 there',
+        eighth < 0.0 and trot.value > eighth / 2.0)
+    for gait, point in (('pace', _on_line('pace')), ('bound', _on_line('bound')),
+                        ('trot', trot)):
+        yield at.word(f'{gait}: Hopf bifurcation at the point of the proof', 'stable',
+                      'stable' if point.stable else 'unstable',
+                      note=f'leading other eigenvalue {point.leading_other:.4f}')
+
+
+def near_equal() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 4.2 where alpha and beta, gamma and delta differ a little."""
+    for clause, gait, alpha, sign, (low, high), stable in THEOREM:
+        if not stable or (gait, alpha) == FAILING:
+            continue
+        first = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
+        beta, delta = sign * alpha + SMALL[0], first.value + SMALL[1]
+        point = hopf(Quadruped(alpha, beta, 0.0, delta), 'gamma', gait, first.value - 0.05,
+                     first.value + 0.05)
+        yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
+            f'remains valid near: Hopf bifurcation to the {gait}, alpha {alpha:g}, beta '
+            f'{beta:.4f}, gamma {point.value:.4f}, delta {delta:.4f}', 'stable',
+            'stable' if point.stable else 'unstable',
+            note=f'alpha + beta {alpha + beta:+.3f}, gamma + delta {point.value + delta:+.3f}')
+
+
+def necessary_and_sufficient() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 4.2 at all Hopf points with gamma = delta for some alpha = beta, or -beta."""
+    points = {mirror: [(alpha, point) for alpha in ALPHAS for point in hopf_points(
+        Quadruped(alpha, mirror * alpha, 0.0, 0.0), 'gamma=delta', *GAMMAS)]
+        for mirror in (1, -1)}
+    for gait, (mirror, along, across) in SIGNS.items():
+        found = [(along * alpha >= 0.0 and across * point.value > 0.0, point.stable)
+                 for alpha, point in points[mirror] if point.gait == gait
+                 # 'We always refer to the eigenvalue with greatest real part' (section 5.3).
+                 and point.block.roots(2).real.max() < ON_AXIS]
+        otherwise = sum(met != stable for met, stable in found)
+        yield Citation(AUTHORS, 'Theorem 4.2').holds(
+            f'{gait}: the conditions are necessary and sufficient at equal couplings',
+            bool(found) and not otherwise, erratum=23 if mirror < 0 else None,
+            note=f'{len(found)} Hopf points, {sum(stable for _, stable in found)} of them '
+                 f'stable, {otherwise} otherwise than by the conditions')

@@ -1,0 +1,311 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rashidi, Noorani & Shoaran (2016), Optimization of coupling weights in a 4-cell CPG network."""
+
+from collections.abc import Iterator
+from functools import cache
+
+from cpg_ros.analysis.papers.rhythm import cell_constants, disturbed_start, Rhythm, rhythm
+from cpg_ros.analysis.papers.row import (
+    Citation,
+    Paper,
+    PHASE,
+    Picture,
+    ReproducedRow,
+    trajectories,
+)
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.fitting.gaits.mean_cycle import mean_cycle
+from cpg_ros.fitting.gaits.recognition import lag, shape_difference
+from cpg_ros.networks.library.biped import Biped, GAITS, PRIMARY
+from cpg_ros.networks.symmetry import admissible_pairs, D2, Symmetry
+import numpy as np
+from scipy.integrate import solve_ivp
+
+AUTHORS = 'Rashidi et al. 2016'
+NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
+
+#: Table 1.
+TABLE_1 = {'gCa': '0.9', 'gK': '2.00', 'gL': '0.5', 'vCa': '1.00', 'vK': '-0.7', 'vL': '-0.5',
+           'v1': '0.01', 'v2': '0.15', 'v3': '0.10', 'v4': '0.15'}
+#: Table 2: I, phi; w_a, w_b, w_c.
+TABLE_2 = {'walk': (0.229, 0.254, 0.390, -0.681, 0.489),
+           'run': (0.290, 0.394, -0.936, 1.000, 0.652),
+           'two_legged_jump': (0.279, 0.194, 0.982, -0.013, -0.221),
+           'two_legged_hop': (0.279, 0.294, 0.362, 0.328, -0.016)}
+#: Table 3: initial v, then u, of cells 1 to 4.
+TABLE_3 = {'walk': ((0.280, 0.277, -0.197, 0.159), (-0.197, 0.159, 0.280, 0.277)),
+           'run': ((-0.304, 0.163, -0.304, 0.163), (0.169, 0.229, 0.169, 0.229)),
+           'two_legged_jump': ((-0.046, 0.398, 0.327, 0.253), (-0.046, 0.398, 0.327, 0.253)),
+           'two_legged_hop': ((-0.059, 0.225, -0.059, 0.225), (-0.059, 0.225, -0.059, 0.225))}
+ODD = {'walk': 'printed u is v with its rows exchanged, so negative in cell 1',
+       'two_legged_jump': 'printed u is v', 'two_legged_hop': 'printed u is v'}
+#: Figure 2: phases of right and left flexor, then of the left extensor against its flexor.
+FIGURE_2 = {'walk': ('1/2', '1/2'), 'run': ('1/2', '0'), 'two_legged_jump': ('0', '1/2'),
+            'two_legged_hop': ('0', '0')}
+#: Table 4: signals of the left leg's flexor and extensor, then the right leg's.
+TABLE_4 = {'skip': '(y1, y2), (y1+0.5, y2+0.5)', 'gallop': '(y1, y1+0.5), (y2, y2+0.5)',
+           'hesitation_walk': '(y1, y2+0.5), (y2, y1+0.5)',
+           'asymmetric_hop': '(y1, y2), (y2, y1)', 'one_legged_hop': '(y1, y1), (y2, y2)'}
+#: Table 5: H, K, and the signals of cells 1 to 4.
+TABLE_5 = {'walk': ('D', 'rho-tau', '(y1, y1+0.5, y1+0.5, y1)'),
+           'run': ('D', 'tau', '(y1, y1+0.5, y1, y1+0.5)'),
+           'two_legged_jump': ('D', 'rho', '(y1, y1, y1+0.5, y1+0.5)'),
+           'two_legged_hop': ('D', 'D', '(y1, y1, y1, y1)'),
+           'skip': ('rho', 'I', '(y1, y1+0.5, y2, y2+0.5)'),
+           'gallop': ('tau', 'I', '(y1, y2, y1+0.5, y2+0.5)'),
+           'hesitation_walk': ('rho-tau', 'I', '(y1, y2, y2+0.5, y1+0.5)')}
+#: Equations 6 to 9: phases of cells 2 to 4 against cell 1, in degrees.
+EQUATIONS = {'walk': ('eq. 6', (180.0, 180.0, 0.0)), 'run': ('eq. 7', (0.0, 180.0, 180.0)),
+             'two_legged_jump': ('eq. 8', (180.0, 0.0, 180.0)),
+             'two_legged_hop': ('eq. 9', (180.0, 0.0, 180.0))}
+#: Figures 3 to 6, and 8 to 11: from which primary gait to which secondary one.
+FIGURES = {'walk': 3, 'run': 4, 'two_legged_jump': 5, 'two_legged_hop': 6}
+TRANSITIONS = {8: ('walk', 'skip'), 9: ('walk', 'gallop'), 10: ('run', 'skip'),
+               11: ('two_legged_jump', 'hesitation_walk')}
+#: Section 5: transitions that Pinto & Golubitsky predict, and the paper could not reach.
+PREDICTED = (('two_legged_jump', 'gallop'), ('run', 'hesitation_walk'))
+#: Section 5: gaits that the paper could not reach.
+NOT_REACHED = ('asymmetric_hop', 'one_legged_hop')
+
+#: Model time in which a gait settles; degrees from 0 that an objective may be.
+SETTLING, CLOSE = 1500.0, 1.0
+#: Two waveforms whose shapes differ by less than this, over their RMS, are one.
+SAME = 0.02
+POINTS = 512
+
+
+@cache
+def simulated(network: Biped, start: tuple[float, ...]) -> Rhythm:
+    """Simulate from a state until the gait has settled."""
+    return rhythm(network, start, SETTLING, D2,
+                  {gait: Symmetry.of(D2, shifts) for gait, shifts in GAITS.items()})
+
+
+def disturbed(gait: str) -> tuple[float, ...]:
+    """Return a state near the orbit of a shipped preset, every variable disturbed."""
+    return tuple(disturbed_start(Biped.presets()[gait]).tolist())
+
+
+def named(gait: str) -> str:
+    """Return a gait's name as the paper writes it."""
+    return gait.replace('_legged', '-legged').replace('_', ' ')
+
+
+def printed(gait: str) -> Biped:
+    """Return the network with a row of Table 2."""
+    return Biped.symmetric(*TABLE_2[gait])
+
+
+def settled(gait: str) -> Rhythm:
+    """Return a gait: primary ones by Table 2, the others by the shipped presets."""
+    network = printed(gait) if gait in PRIMARY else Biped.presets()[gait].network
+    assert isinstance(network, Biped)
+    return simulated(network, disturbed(gait))
+
+
+def signals(seen: Rhythm) -> list[str]:
+    """Name the cells' signals as Table 5 does: y1 and y2 for waveforms, +0.5 for a shift.
+
+    Measured on the mean cycle: cells whose waveforms agree after the best shift have one name.
+    """
+    run, period = seen.run, seen.found.period
+    late = run.t >= run.t[-1] - 10.0 * period
+    cycle = mean_cycle(run.t[late], run.x[late, :4], period)(np.arange(POINTS) / POINTS)
+    first: list[int] = []
+    names = []
+    for cell in range(4):
+        like = next((n for n, other in enumerate(first)
+                     if shape_difference(cycle[:, cell], cycle[:, other]) < SAME), None)
+        if like is None:
+            first.append(cell)
+            names.append(f'y{len(first)}')
+            continue
+        shift = float(lag(cycle[:, cell], cycle[:, first[like]])) % 1.0
+        half = round(2.0 * shift) / 2.0 % 1.0
+        exact = abs((shift - half + 0.5) % 1.0 - 0.5) <= PHASE
+        shown = half if exact else round(shift, 3)
+        names.append(f'y{like + 1}' + (f'+{shown:g}' if shown else ''))
+    return names
+
+
+def _written(elements: tuple[str, ...]) -> str:
+    """Return a subgroup of D2 as Table 5 writes it."""
+    others = [name for name in elements if name != '1']
+    return 'D' if len(others) == 3 else others[0].replace(' ', '-') if others else 'I'
+
+
+def cell() -> Iterator[ReproducedRow | Picture]:
+    """Table 1, and equations 1 and 2."""
+    network = printed('walk')
+    found = cell_constants(network, network.current)
+    at = Citation(AUTHORS, 'Table 1')
+    for name, value in TABLE_1.items():
+        yield at.number(name, value, found[name], within=1e-8,
+                        note='read off the compiled rates')
+    yield Citation(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
+                                             '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
+                                             found['tau_far'])
+    at = Citation(AUTHORS, 'eq. 1')
+    yield at.holds("the walk's cells oscillate with u' = -phi tau(v) (n(v) - u), as printed",
+                   _oscillates(-1.0), erratum=8, note='u runs away')
+    yield at.holds("they do with u' = phi tau(v) (n(v) - u)", _oscillates(1.0))
+
+
+def _oscillates(sign: float) -> bool:
+    """Whether Table 2's walk still oscillates after 300, u' being multiplied by a sign."""
+    network = printed('walk')
+
+    def rates(_: float, x: np.ndarray) -> np.ndarray:
+        return np.concatenate([network.rates(x)[:4], sign * network.rates(x)[4:]])
+
+    def far(_: float, x: np.ndarray) -> float:
+        return 10.0 - float(np.abs(x).max())
+
+    far.terminal = True  # type: ignore[attr-defined]
+    # A step that ends far out may pass through numbers that are no longer finite.
+    with np.errstate(over='ignore', invalid='ignore'):
+        run = solve_ivp(rates, (0.0, 300.0), np.ravel(TABLE_3['walk']), events=far, max_step=0.5)
+    return bool(run.t[-1] >= 300.0 and np.ptp(run.y[0, run.t > 250.0]) > 0.1)
+
+
+def primary() -> Iterator[ReproducedRow | Picture]:
+    """Tables 2, 3 and 5, Figures 2 to 6, equations 6 to 9: the four primary gaits."""
+    for gait in PRIMARY:
+        seen = settled(gait)
+        name, phases = named(gait), seen.found.phases
+        at = Citation(AUTHORS, 'Table 2')
+        yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
+                      note=f'period {seen.found.period:.4f}')
+        yield at.stable(f'the {name} attracts',
+                        multipliers(solve_orbit(printed(gait), gait)).leading)
+        at = Citation(AUTHORS, 'Figure 2')
+        for text, cell_a, cell_b, value in (
+                ('right against left flexor', 1, 0, FIGURE_2[gait][0]),
+                ('right against left extensor', 3, 2, FIGURE_2[gait][0]),
+                ('left extensor against flexor', 2, 0, FIGURE_2[gait][1]),
+                ('right extensor against flexor', 3, 1, FIGURE_2[gait][1])):
+            yield at.phases(f'{name}: {text}', value, [phases[cell_a] - phases[cell_b]])
+        place, wanted = EQUATIONS[gait]
+        for n, (degrees, phase) in enumerate(zip(wanted, phases[1:], strict=True), 1):
+            off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
+            yield Citation(AUTHORS, place).number(
+                f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
+                within=CLOSE, erratum=(8, '180'),
+                note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
+        yield from _table_5(gait, seen)
+        start = simulated(printed(gait), tuple(np.ravel(TABLE_3[gait]).tolist()))
+        yield Citation(AUTHORS, 'Table 3').word(
+            f'gait from the initial values of the {name}', name, named(start.gait),
+            note=ODD.get(gait, ''))
+        yield _drawn(f'Figure {FIGURES[gait]}', name, start, 'From the initial values of Table 3.')
+
+
+def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
+    at, name = Citation(AUTHORS, 'Table 5'), named(gait)
+    h, k, response = TABLE_5[gait]
+    yield at.word(f'H of the {name}', h, _written(seen.found.h))
+    yield at.word(f'K of the {name}', k, _written(seen.found.k))
+    yield at.word(f'signals of cells 1 to 4 in the {name}', response,
+                  f'({", ".join(signals(seen))})')
+
+
+def _drawn(place: str, name: str, seen: Rhythm, caption: str) -> Picture:
+    run = seen.run
+    late = run.t >= run.t[-1] - 5.0 * seen.found.period
+    shapes = [int(signal[1]) - 1 for signal in signals(seen)]
+    return Picture(AUTHORS, place, caption, trajectories(
+        f'{AUTHORS}, {place}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,
+        shapes, variable='v'))
+
+
+def secondary() -> Iterator[ReproducedRow | Picture]:
+    """Tables 4 and 5, Figures 8 to 11: the secondary gaits. Their weights are not printed."""
+    for gait in TABLE_4:
+        seen, name = settled(gait), named(gait)
+        one, two, three, four = signals(seen)
+        yield Citation(AUTHORS, 'Table 4').word(
+            f'signals in the {name}, left and right leg', TABLE_4[gait],
+            f'({one}, {three}), ({two}, {four})', note='weights are ours: none are printed')
+        if gait in TABLE_5:
+            yield from _table_5(gait, seen)
+        if gait in NOT_REACHED:
+            found = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
+            reached = seen.gait == gait and found.leading < 1.0
+            yield Citation(AUTHORS, 'section 5').word(
+                f'the {name} in this network', 'not reached',
+                'reached' if reached else 'not reached', erratum=(18, 'reached'),
+                note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
+    for number, (before, gait) in TRANSITIONS.items():
+        network = Biped.presets()[gait].network
+        assert isinstance(network, Biped)
+        seen = simulated(network, disturbed(before))
+        yield Citation(AUTHORS, f'Figure {number}').word(
+            f'gait that follows the {named(before)} with other weights', named(gait),
+            named(seen.gait), note='weights are ours: none are printed')
+        yield _drawn(f'Figure {number}', f'{named(gait)}, from the {named(before)}', seen,
+                     'With weights of ours, as the paper prints none; settled.')
+
+
+def predicted() -> Iterator[ReproducedRow | Picture]:
+    """Section 5: which gait a primary one can break into, and the two transitions predicted."""
+    at = Citation(AUTHORS, 'section 5')
+    for before, gait in (*TRANSITIONS.values(), *PREDICTED):
+        whole = D2.generated(GAITS[before])
+        kept = {name: shift for name, shift in D2.generated(GAITS[gait]).items() if name != '1'}
+        yield at.holds(f'the {named(gait)} keeps symmetries of the {named(before)}, and no others',
+                       bool(kept) and all(whole[name] == shift for name, shift in kept.items()),
+                       note=', '.join(f'{name} by {shift}' for name, shift in kept.items()))
+    for before, gait in PREDICTED:
+        network = Biped.presets()[gait].network
+        assert isinstance(network, Biped)
+        seen = simulated(network, disturbed(before))
+        note = 'weights are ours: none are printed'
+        yield at.word(f'gait that follows the {named(before)}, as predicted', named(gait),
+                      named(seen.gait), note=note)
+        yield at.word(f'the {named(gait)} by way of the {named(before)}', 'not reached',
+                      'reached' if seen.gait == gait else 'not reached', erratum=(26, 'reached'),
+                      note=note)
+
+
+def kinds() -> Iterator[ReproducedRow | Picture]:
+    """Section 5: the eleven kinds of rhythm, and what Table 5 calls H and K."""
+    at = Citation(AUTHORS, 'section 5')
+    waveforms = [pair.waveforms for pair in admissible_pairs(D2)]
+    yield at.number('kinds of rhythm that D2 allows', '11', len(waveforms))
+    for count, number, what in (('4', 1, 'one waveform'), ('6', 2, 'two waveforms'),
+                                ('1', 4, 'four waveforms')):
+        yield at.number(f'of these with {what}', count, waveforms.count(number))
+    gaits = [gait for gait in GAITS if settled(gait).gait == gait]
+    yield Citation(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
+                                              str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
+    in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
+    yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
+                   erratum=11, note='they are in: ' + ', '.join(map(named, in_phase)))
+    walk = settled('walk').found
+    for letter, elements, wrong, right in (('K', walk.k, 'spatio-temporal', 'spatial'),
+                                           ('H', walk.h, 'spatial', 'spatio-temporal')):
+        # On the elements the walk's best shifts: all of them 0, or not.
+        h = max(abs((walk.distances[name][0] + 0.5) % 1.0 - 0.5) for name in elements)
+        yield Citation(AUTHORS, 'Table 5').word(
+            f'the symmetries in {letter} are', wrong,
+            'spatio-temporal' if h > PHASE else 'spatial', erratum=(17, right))
+
+
+PAPER = Paper('rashidi', AUTHORS,
+              'S. F. Rashidi, M. S. Noorani, M. Shoaran: Optimization of coupling weights in a '
+              '4-cell central pattern generator network for bipedal locomotion gait generation '
+              '(2016)', (cell, primary, secondary, predicted, kinds))

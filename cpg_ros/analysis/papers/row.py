@@ -1,0 +1,254 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A quantity as a paper prints it, its computed value, and whether the two agree."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+
+from matplotlib.figure import Figure
+import numpy as np
+
+# Figures of the papers: what the cells do over time.
+
+#: Colours of the waveforms, as in the other pictures.
+WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')
+
+
+def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
+                 waves: Sequence[int] | None = None, variable: str = 'x') -> Figure:
+    """Draw cells over time, one under the other.
+
+    Args:
+        title: paper and number of the figure.
+        t: model time, shape (m,).
+        x: one cell per column, shape (m, cells).
+        names: of the cells.
+        waves: number of each cell's waveform, from 0, which gives the colour; one each by
+            default.
+        variable: what is drawn, for the axis.
+
+    """
+    waves = range(len(names)) if waves is None else waves
+    figure = Figure(figsize=(6.4, 0.9 + 0.75 * len(names)), layout='constrained')
+    low, high = float(x.min()), float(x.max())
+    margin = 0.08 * (high - low)
+    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for cell, axes in enumerate(grid):
+        axes.plot(t, x[:, cell], color=WAVES[waves[cell]], linewidth=1.1)
+        axes.set_ylim(low - margin, high + margin)
+        axes.set_ylabel(names[cell], rotation=0, ha='right', va='center', fontsize=9)
+        axes.tick_params(labelsize=8)
+        axes.grid(linewidth=0.3)
+        axes.spines[['top', 'right']].set_visible(False)
+    grid[-1].set_xlim(float(t[0]), float(t[-1]))
+    grid[-1].set_xlabel('time [model time]', fontsize=9)
+    figure.supylabel(f'{variable} [1]', fontsize=9)
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+#: Phases agree to this part of a cycle; values of a formula to this part of their size.
+PHASE, FORMULA = 0.002, 1e-9
+#: Of a number printed with n decimals, this many more are shown.
+MORE = 2
+
+
+@dataclass(frozen=True)
+class ReproducedRow:
+    """A published quantity and the computed one.
+
+    Attributes:
+        paper: authors and year.
+        place: section, table, equation or figure of it.
+        quantity: what it is.
+        published: as the paper prints it.
+        computed: its value, written alike.
+        agrees: whether the two do.
+        compared: how, in words.
+        value: the computed number; None where it is a word or has several numbers.
+        erratum: number of the one that covers this row (see ``errata``), or None.
+        corrected: what is right according to the erratum, or ''.
+        explained: whether the computed one is that.
+        note: for the reader, or ''.
+
+    """
+
+    paper: str
+    place: str
+    quantity: str
+    published: str
+    computed: str
+    agrees: bool
+    compared: str
+    value: float | None = None
+    erratum: int | None = None
+    corrected: str = ''
+    explained: bool = False
+    note: str = ''
+
+    @property
+    def verdict(self) -> str:
+        """'agrees', 'erratum N', or 'FAILS' where they differ and no erratum says how."""
+        if self.agrees:
+            return 'agrees'
+        return f'erratum {self.erratum}' if self.explained else 'FAILS'
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a paper, drawn anew.
+
+    Attributes:
+        paper: authors and year.
+        place: the figure's number.
+        caption: what is shown, and where it differs from the paper's.
+        figure: its title names paper and figure.
+
+    """
+
+    paper: str
+    place: str
+    caption: str
+    figure: Figure
+
+
+#: What a formula gives.
+Value = float | complex | np.ndarray
+#: A part of a paper: computes some of its rows and pictures.
+Section = Callable[[], Iterable[ReproducedRow | Picture]]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper: a short name, authors and year, what it is, and its parts."""
+
+    name: str
+    authors: str
+    reference: str
+    sections: tuple[Section, ...]
+
+
+@dataclass(frozen=True)
+class Citation:
+    """A place in a paper, from which rows are quoted.
+
+    An erratum comes with the correct value: a computed value that is neither that nor the
+    published one fails.
+    """
+
+    paper: str
+    place: str
+
+    def _row(self, quantity: str, published: str, shown: str, same: Callable[[str], bool],
+             how: str, value: float | None, erratum: tuple[int, str] | None,
+             note: str) -> ReproducedRow:
+        number, corrected = erratum or (None, '')
+        return ReproducedRow(self.paper, self.place, quantity, published, shown, same(published),
+                             how, value, number, corrected, bool(erratum) and same(corrected),
+                             note)
+
+    def number(self, quantity: str, published: str, computed: float, *,
+               within: float | None = None, erratum: tuple[int, str] | None = None,
+               note: str = '') -> ReproducedRow:
+        """Quote a number with the digits printed.
+
+        Args:
+            quantity: what it is.
+            published: as printed; its last digit gives its precision.
+            computed: ours.
+            within: largest difference; by default half a unit of the last digit printed.
+            erratum: that covers a difference, and the right number with its precision.
+            note: for the reader.
+
+        """
+        def same(text: str) -> bool:
+            own = 0.5 * 10.0**_exponent(text)
+            limit = own if within is None or text != published else within
+            # A little more, for the rounding of binary numbers that lie on the limit.
+            return bool(abs(computed - float(text)) <= limit * (1.0 + 1e-9))
+
+        exponent = _exponent(published) if within is None else int(np.floor(np.log10(within)))
+        digits = max(0, -exponent) + MORE
+        # A count has no more digits than it has.
+        shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
+        how = 'to the last digit printed' if within is None else f'within {within:g}'
+        return self._row(quantity, published, shown, same, how, float(computed), erratum, note)
+
+    def phases(self, quantity: str, published: str, computed: Sequence[float] | np.ndarray, *,
+               within: float = PHASE, erratum: tuple[int, str] | None = None,
+               note: str = '') -> ReproducedRow:
+        """Quote phases in cycles, printed as fractions with blanks between; compared modulo 1."""
+        ours = np.asarray(computed, dtype=float)
+
+        def same(text: str) -> bool:
+            printed = np.array([float(Fraction(part)) for part in text.split()])
+            return bool((np.abs((ours - printed + 0.5) % 1.0 - 0.5) <= within).all())
+
+        # A rounding error below 0 is 0, not 1.
+        shown = ' '.join(f'{round(phase % 1.0, 4) % 1.0:.4f}' for phase in ours)
+        return self._row(quantity, published, shown, same, f'within {within:g} cycles',
+                         float(ours[0] % 1.0) if ours.size == 1 else None, erratum, note)
+
+    def word(self, quantity: str, published: str, computed: str, *,
+             erratum: tuple[int, str] | None = None, note: str = '') -> ReproducedRow:
+        """Quote a name or a list of names."""
+        return self._row(quantity, published, computed, lambda text: text == computed, 'equal',
+                         None, erratum, note)
+
+    def holds(self, quantity: str, computed: bool, *, erratum: int | None = None,
+              note: str = '') -> ReproducedRow:
+        """Quote a statement that the paper makes; an erratum says that it is false."""
+        return self.word(quantity, 'true', str(bool(computed)).lower(), note=note,
+                         erratum=None if erratum is None else (erratum, 'false'))
+
+    def stable(self, quantity: str, multiplier: float, *, erratum: int | None = None,
+               which: str = 'leading') -> ReproducedRow:
+        """Quote that a gait is stable, judged by a Floquet multiplier; an erratum: it is not."""
+        return self.word(quantity, 'stable', 'stable' if multiplier < 1.0 else 'unstable',
+                         erratum=None if erratum is None else (erratum, 'unstable'),
+                         note=f'{which} Floquet multiplier {multiplier:.3g} a cycle')
+
+    def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
+                erratum: tuple[int, Value] | None = None, note: str = '') -> ReproducedRow:
+        """Quote a formula by its value at some arguments, compared with ours at the same."""
+        ours = np.ravel(computed)
+        limit = FORMULA * max(1.0, float(np.abs(ours).max()))
+
+        def same(other: Value) -> bool:
+            theirs = np.ravel(other)
+            return theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
+
+        single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
+        number, right = erratum or (None, None)
+        return ReproducedRow(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
+                             _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}',
+                             single, number, '' if right is None else _shown(right),
+                             right is not None and same(right), note)
+
+
+def _exponent(text: str) -> int:
+    """Decimal exponent of the last digit of a number."""
+    exponent = Decimal(text).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return exponent
+
+
+def _shown(value: Value) -> str:
+    values = np.ravel(value)
+    if np.iscomplexobj(values) and np.abs(values.imag).max() > 1e-12:
+        return ', '.join(f'{one.real:.4f}{one.imag:+.4f}i' for one in values)
+    return ', '.join(f'{one.real + 0.0:.4f}' for one in values)

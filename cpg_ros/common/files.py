@@ -1,0 +1,217 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Opening files that others name: regular files of a bounded size, and nothing that can block.
+
+A FIFO holds up whoever opens it, ``/dev/zero`` never ends, and files below ``/proc`` state a size
+of 0, whatever is in them. None of them is a robot, a mesh or a recording.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+import errno
+import ipaddress
+import json
+import os
+from pathlib import Path
+import stat
+from typing import Any, BinaryIO
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from cpg_ros.common.command_line import printable
+from cpg_ros.common.errors import CpgError
+
+# Files are written whole or not at all: under another name, then renamed.
+
+def write_atomically(path: str | Path, content: str | bytes) -> None:
+    """Write a file, which until then stays what it was.
+
+    Raises:
+        OSError: it cannot be written; the error has the file's name, also where a disk is full.
+
+    """
+    try:
+        with replacing(Path(path)) as beside:
+            beside.write_bytes(content.encode() if isinstance(content, str) else content)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the name of a file to write, which then replaces another one, unless writing fails."""
+    beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
+    try:
+        yield beside
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def stored_json(path: Path) -> Any:
+    """Return what a file of JSON holds; None if it is missing, or damaged by a disk failure."""
+    try:
+        return json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return None
+
+
+# Where the package's shipped files are, installed or in a source tree.
+
+def resource_folder() -> Path:
+    """Return the folder that holds ``config``: that of the sources, or share/cpg_ros above.
+
+    Raises:
+        FileNotFoundError: the installation is incomplete.
+
+    """
+    package = Path(__file__).resolve().parents[1]
+    for folder in (package.parent, *(above / 'share' / 'cpg_ros' for above in package.parents)):
+        if (folder / 'config' / 'presets').is_dir():
+            return folder
+    raise FileNotFoundError(f'share/cpg_ros/config is missing from the installation at {package}')
+
+
+# XML that others write, as a tree: without entities, and no deeper than anything is described.
+
+#: Elements within one another; descriptions of robots have a dozen, assemblies in Collada more.
+DEEPEST = 200
+#: Elements of a document; a robot with meshes has a few thousand.
+MOST = 1_000_000
+
+
+def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
+    """Return the root of a document; names keep their prefixes, which need not be declared.
+
+    Args:
+        data: the file.
+        fail: makes the error out of its reason.
+
+    Raises:
+        CpgError: as ``fail`` makes it: it is no XML, declares an entity, is nested too deep,
+            or has too many elements.
+
+    """
+    builder, parser, depth, count = TreeBuilder(), expat.ParserCreate(), 0, 0
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if count > MOST:
+            raise fail(f'it has more than {MOST} elements')
+        if depth > DEEPEST:
+            raise fail(f'line {parser.CurrentLineNumber}: elements are nested more than '
+                       f'{DEEPEST} deep')
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    def entity(name: str, *_: object) -> None:
+        raise fail(f"it declares the entity '{name}'; entities are not read")
+
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    parser.CharacterDataHandler, parser.EntityDeclHandler = builder.data, entity
+    parser.buffer_text = True
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        raise fail(f'line {error.lineno}: {expat.ErrorString(error.code)}') from error
+    except CpgError:
+        raise
+    # An encoding that Python does not know, or cannot use.
+    except (ValueError, LookupError) as error:
+        raise fail(str(error)) from error
+    return builder.close()
+
+
+# Addresses that only this machine can reach.
+
+def is_loopback(host: str) -> bool:
+    """Tell whether only this machine can reach a host: a name or an address, without a port."""
+    if host == 'localhost':
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+#: Largest file that is read at once, bytes.
+LARGEST = 64_000_000
+#: Kinds of files that are refused.
+KINDS = {stat.S_IFIFO: 'a pipe', stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device',
+         stat.S_IFSOCK: 'a socket'}
+
+
+@contextmanager
+def opened(path: str | Path, error: type[CpgError], what: str = '',
+           largest: float = LARGEST) -> Iterator[BinaryIO]:
+    """Open a regular file to read its bytes.
+
+    Args:
+        path: of the file.
+        error: kind of error to raise.
+        what: a word or two for what the file should be, before its name in the message.
+        largest: size above which it is refused, bytes; infinite where it is read piece by piece.
+
+    Raises:
+        CpgError: of the given kind, one line with the file and the reason: it is not there, may
+            not be read, is too large, or is a folder, a pipe, a device or a socket.
+
+    """
+    name = f'{what} {path}'.strip()
+
+    def check(found: os.stat_result) -> None:
+        if stat.S_ISDIR(found.st_mode):
+            raise error(one_line(f'{name}: {os.strerror(errno.EISDIR)}'))
+        if not stat.S_ISREG(found.st_mode):
+            kind = KINDS.get(stat.S_IFMT(found.st_mode), 'something else')
+            raise error(one_line(f'{name}: is {kind}, not a regular file'))
+        if found.st_size > largest:
+            raise error(one_line(f'{name}: has {found.st_size / 1e6:.4g} MB, more than the '
+                                 f'{largest / 1e6:g} MB that are read; make it smaller'))
+
+    try:
+        # Looked at first: some devices act when they are opened. Without O_NONBLOCK, a pipe that
+        # took the file's place since would hold the process up.
+        check(os.stat(path))
+        file = os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC),
+                         'rb')
+    except CpgError:
+        raise
+    except (OSError, ValueError) as why:  # ValueError: a byte 0 in the name
+        raise error(one_line(f'{name}: {getattr(why, "strerror", None) or why}')) from why
+    with file:
+        check(os.fstat(file.fileno()))
+        yield file
+
+
+def read_bytes(path: str | Path, error: type[CpgError], what: str = '',
+               largest: float = LARGEST) -> bytes:
+    """Read a regular file; arguments and errors as of ``opened``."""
+    with opened(path, error, what, largest) as file:
+        try:
+            # No more than the size it states: what grows, or states none, is read to there.
+            return file.read(os.fstat(file.fileno()).st_size)
+        except OSError as why:
+            raise error(one_line(f'{what} {path}: {why.strerror}'.strip())) from why
+
+
+def one_line(text: str) -> str:
+    """Return a text as one line that can be printed, whatever bytes a file's name has."""
+    return printable(' '.join(text.split()))

@@ -1,0 +1,166 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Reading YAML files that people write: an error names the file, the key and the reason."""
+
+from collections.abc import Mapping, Sequence, Set
+from itertools import pairwise
+import math
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.common.files import one_line, read_bytes
+import yaml
+
+#: Nodes within one another, and nodes with those that aliases stand for, that are read.
+DEEPEST, MOST = 50, 1_000_000
+#: Largest YAML file that is read, bytes: a robot of a hundred joints has 30 thousand.
+LARGEST = 4_000_000
+
+
+class _UniqueKeys(yaml.SafeLoader):
+    """YAML without silently overwritten keys, of a bounded depth and size."""
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._depth = self._nodes = 0
+        self._sizes: dict[int, int] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Count nodes: an alias is as many as what it stands for, which may hold aliases, too."""
+        event, before = self.peek_event(), self._nodes  # type: ignore[no-untyped-call]
+        mark, alias = event.start_mark, isinstance(event, yaml.AliasEvent)
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise yaml.composer.ComposerError(None, None, f'nested more than {DEEPEST} deep', mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if alias and id(node) not in self._sizes:
+            raise yaml.composer.ComposerError(None, None, 'an alias of what it is part of', mark)
+        self._nodes += self._sizes[id(node)] if alias else 1
+        if self._nodes > MOST:
+            raise yaml.composer.ComposerError(None, None, f'more than {MOST} nodes, with those '
+                                              'that aliases stand for', mark)
+        self._sizes.setdefault(id(node), self._nodes - before)
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str):
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'the key {quoted(key)} is not a name', key_node.start_mark)
+            if key in seen:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key '{key}' appears twice", key_node.start_mark)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def parsed(text: str) -> Any:
+    """Parse YAML.
+
+    Raises:
+        yaml.YAMLError: it is none, is nested too deep or is too much, has a key twice or one that
+            is no name.
+
+    """
+    try:
+        return yaml.load(text, Loader=_UniqueKeys)
+    # What PyYAML lets pass of values that their tags do not fit: '!!int x', '2020-13-01'.
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise yaml.YAMLError(f'a value cannot be used: {type(error).__name__}: {error}') from error
+
+
+def quoted(value: Any) -> str:
+    """Return a value as it is shown in a message."""
+    try:
+        return 'nothing' if value is None else repr(value)[:60]
+    except ValueError:  # whole numbers of thousands of digits
+        return 'a huge number'
+
+
+class YamlReader:
+    """Takes checked values out of one file's tree; errors name the place of a bad value."""
+
+    def __init__(self, path: Path, what: str, error: type[CpgError], largest: float) -> None:
+        """Read for a file that is called ``what``; failures are of the type ``error``.
+
+        No number may be larger than ``largest``.
+        """
+        self.path, self.what, self.error, self.largest = path, what, error, largest
+
+    def fail(self, where: str, why: str) -> CpgError:
+        """Return the error that says where and why."""
+        return self.error(one_line(f'{self.what} {self.path}: {where}: {why}'))
+
+    def tree(self) -> Any:
+        """Parse the file."""
+        data = read_bytes(self.path, self.error, self.what, LARGEST)
+        try:
+            return parsed(data.decode())
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            mark = getattr(error, 'problem_mark', None)
+            line = f'line {mark.line + 1}' if mark else 'file'
+            raise self.fail(line, str(getattr(error, 'problem', error))) from error
+
+    def keys(self, tree: Any, where: str, required: Set[str], optional: Set[str] = frozenset()
+             ) -> Mapping[str, Any]:
+        """Return a mapping that has all required keys and none unknown."""
+        if not isinstance(tree, Mapping):
+            raise self.fail(where, f'must be a mapping, not {quoted(tree)}')
+        for key in tree:
+            if key not in required | optional:
+                allowed = ', '.join(sorted(required | optional))
+                raise self.fail(f'{where}.{key}', f'unknown key (allowed: {allowed})')
+        for key in sorted(required - set(tree)):
+            raise self.fail(f'{where}.{key}', 'is missing')
+        return tree
+
+    def number(self, value: Any, where: str) -> float:
+        """Return a finite number."""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.fail(where, f'must be a number, not {quoted(value)}')
+        if value != value or value in (math.inf, -math.inf):
+            raise self.fail(where, f'must be finite, not {value}')
+        if abs(value) > self.largest:
+            raise self.fail(where, f'must be at most {self.largest:g}, not {quoted(value)}')
+        return float(value)
+
+    def numbers(self, value: Any, where: str, count: int | None = None) -> tuple[float, ...]:
+        """Return a list of finite numbers, at least one, or as many as ``count``."""
+        listed = self.items(value, where)
+        if count not in (None, len(listed)):
+            raise self.fail(where, f'takes {count} numbers, not {len(listed)}')
+        return tuple(self.number(entry, f'{where}[{k}]') for k, entry in enumerate(listed))
+
+    def check_rising(self, values: Sequence[float], where: str) -> None:
+        """Check that each number is above the one before it."""
+        for k, (before, after) in enumerate(pairwise(values)):
+            if not before < after:
+                raise self.fail(f'{where}[{k + 1}]', f'{after:g} is not above {before:g}')
+
+    def text(self, value: Any, where: str) -> str:
+        """Return a name."""
+        if not isinstance(value, str) or not value.strip():
+            raise self.fail(where, f'must be a name, not {quoted(value)}')
+        return value
+
+    def items(self, value: Any, where: str) -> list:
+        """Return a list with at least one entry."""
+        if not isinstance(value, list) or not value:
+            raise self.fail(where, f'must be a list with at least one entry, not {quoted(value)}')
+        return value

@@ -1,0 +1,522 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Hopf points of the equilibrium of any network, with their normal forms.
+
+On the centre manifold ``x = rest + z q + conj(z q) + ...`` with the eigenvector q of the class,
+the same for every cell but for the character chi. B(x, y) of two classes lies in the class of the
+product of their characters, so the reduction needs the characteristic matrices Delta of the
+classes 1 and chi^2 only (Kuznetsov, *Elements of Applied Bifurcation Theory*, chapter 5; with a
+delay Diekmann et al., *Delay Equations*, chapter IX)::
+
+    k2 = <p, C(q, q, q*) + 2 B(q, Delta_1(0)^-1 B(q, q*))
+             + B(q*, Delta_chi^2(2 i omega)^-1 B(q, q))> / 2
+
+with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from itertools import pairwise
+import math
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.arclength import crossings, NoOrbit
+from cpg_ros.dynamics.characteristic import characteristic_matrix, delay_crossings, rightmost_first
+from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
+from cpg_ros.dynamics.isotypic import (
+    Block,
+    block_at,
+    block_of,
+    blocks,
+    character,
+    classes,
+    Expansion,
+    power,
+)
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.network import Network, ParameterLine
+import numpy as np
+
+# The normal form of a Hopf bifurcation: ``z' = (i omega + k1 mu) z + k2 z |z|^2``.
+
+@dataclass(frozen=True)
+class NormalForm:
+    """Coefficients of the normal form in the units of its own time.
+
+    Attributes:
+        k1: derivative of the critical eigenvalue by the parameter.
+        k2: cubic coefficient.
+
+    """
+
+    k1: complex
+    k2: complex
+
+    @property
+    def degenerate(self) -> bool:
+        """Whether there is no term of third order to tell anything about orbits: Re k2 = 0."""
+        return self.k2.real == 0.0
+
+    @property
+    def supercritical(self) -> bool:
+        """Whether the orbits attract on the centre manifold: k2 < 0.
+
+        They then lie where rest is unstable. Liu & Zhang (2024), theorem 2.1, say stable for
+        k2 < 0 and supercritical for k1 k2 < 0; for k1 > 0, as they have it, that is one thing.
+        """
+        return self.k2.real < 0.0
+
+    @property
+    def side(self) -> int:
+        """1 if the orbits lie where mu > 0 (k1 k2 < 0), -1 if where mu < 0, 0 if degenerate."""
+        if self.degenerate:
+            return 0
+        return 1 if self.k1.real * self.k2.real < 0.0 else -1
+
+    def radius(self, mu: float) -> float:
+        """Radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
+
+        Raises:
+            NoOrbit: on this side there is none, or it is degenerate.
+
+        """
+        if self.degenerate:
+            raise NoOrbit('the normal form is degenerate: it has no term of third order')
+        square = -self.k1.real * mu / self.k2.real
+        if square < 0.0:
+            raise NoOrbit(f'at mu {mu:g} the normal form has no orbit')
+        return math.sqrt(square)
+
+    def shift(self, mu: float) -> float:
+        """Return the orbit's angular frequency less omega: ``Im k1 mu + Im k2 r^2``."""
+        return self.k1.imag * mu + self.k2.imag * self.radius(mu)**2
+
+
+#: Roots this close to the imaginary axis lie on it, 1/model time or against omega.
+ON_AXIS = 1e-8
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class HopfPoint(ShortRepr):
+    """A crossing of the imaginary axis by a pair of roots.
+
+    Attributes:
+        network: there.
+        line: on which it lies.
+        value: of the parameters there; of the delay, model time.
+        block: the critical class's block, with its gait, mode and wave.
+        omega: of the critical root i omega, rad per model time, positive.
+        rest: state of every cell at the equilibrium, shape (variables,).
+        n: where the delay moves, how many turns more than the smallest it holds.
+
+    """
+
+    network: Network
+    line: ParameterLine
+    value: float
+    block: Block
+    omega: float
+    rest: np.ndarray
+    n: int = 0
+
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name} at {self.line} {self.value:.7g}, '
+                f'omega {self.omega:.7g}')
+
+    @property
+    def gait(self) -> str:
+        """The primary gait that branches off, whichever way its wave runs."""
+        return self.block.gait
+
+    @property
+    def mode(self) -> tuple[int, ...]:
+        """The class (j, k)."""
+        return self.block.mode
+
+    @property
+    def wave(self) -> str:
+        """How the wave runs, as in the block."""
+        return self.block.wave
+
+    @cached_property
+    def _eigenvectors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return q of one cell with <q, q> = 1 over all cells, and p with <p, Delta' q> = 1."""
+        matrix, slope = characteristic_matrix(1j * self.omega, self.block.now, self.block.past,
+                                              self.network.delay)
+        left, _, right = np.linalg.svd(matrix)
+        q, p = right[-1].conj(), left[:, -1].conj()
+        largest = q[np.abs(q).argmax()]
+        q = q * (largest.conjugate() / abs(largest)) / np.sqrt(self.network.cells)
+        return q, p / (p @ slope @ q)
+
+    @property
+    def vector(self) -> np.ndarray:
+        """Eigenvector q of one cell, shape (variables,); over the whole network <q, q> = 1."""
+        return self._eigenvectors[0]
+
+    @property
+    def eigenvector(self) -> np.ndarray:
+        """Eigenvector q of the whole network, shape (components,)."""
+        return np.kron(self.vector, self.block.vector)
+
+    @property
+    def state(self) -> np.ndarray:
+        """Equilibrium of the whole network, shape (components,)."""
+        return everywhere(self.network, self.rest)
+
+    @cached_property
+    def normal_form(self) -> NormalForm:
+        """In model time, mu = value' - value; z belongs to q."""
+        expansion, delay = self._expansion, self.network.delay
+        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
+        one, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
+        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
+        double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
+        ahead = expansion.heard(q, chi, axis)
+        back, second = ahead.conj(), expansion.second
+        flat = expansion.heard(_moved(still, second(ahead, back)), one)
+        fast = expansion.heard(_moved(double, second(ahead, ahead)), twice, 2.0 * axis)
+        k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
+                         + second(back, fast)))
+
+        return NormalForm(self._speed(self.line), complex(k2))
+
+    @cached_property
+    def _expansion(self) -> Expansion:
+        return Expansion(self.network, self.rest)
+
+    def _speed(self, line: ParameterLine) -> complex:
+        """Return the derivative of the critical root by the value on a line of parameters."""
+        expansion, delay = self._expansion, self.network.delay
+        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
+        one, late = np.ones_like(chi), np.exp(-axis * delay)
+        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
+        moves = expansion.heard(_moved(still, expansion.along(line)), one)
+        now, past = expansion.linear_along(line, chi)
+        change = (now + past * late) @ q + expansion.second(moves, expansion.heard(q, chi, axis))
+        if self.network.delay_parameter in line.names:
+            sign = line.signs[line.names.index(self.network.delay_parameter)]
+            change = change - sign * axis * late * (self.block.past @ q)
+        return complex(p @ change)
+
+    @property
+    def in_delays(self) -> NormalForm:
+        """In time over the delay, as Liu & Zhang (2024) have it, which the delay scales as well.
+
+        z is half the amplitude of a cell's first variable.
+        """
+        form, delay = self.normal_form, self.network.delay
+        return NormalForm(1j * self.omega + delay * form.k1,
+                          delay * form.k2 / abs(self.vector[0])**2)
+
+    @property
+    def slopes(self) -> dict[str, float]:
+        """Derivatives of the value on the line by the network's other parameters, by name.
+
+        The critical root stays on the axis: what one parameter moves it by, the line takes back.
+        """
+        back = -self._speed(self.line).real
+        return {name: self._speed(ParameterLine((name,), (1.0,))).real / back
+                for name in self.network.parameters() if name not in self.line.names}
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the gait's own class has a real root with positive real part as well."""
+        close = ON_AXIS * max(1.0, self.omega)
+        roots = self.block.right_of(close)
+        return bool((np.abs(roots.imag) <= close).any())
+
+    @property
+    def direction(self) -> int:
+        """1 where the critical pair moves to the right as the value grows, -1 to the left."""
+        return 1 if self.normal_form.k1.real > 0.0 else -1
+
+    @property
+    def supercritical(self) -> bool:
+        """Whether the orbits attract on the centre manifold."""
+        return self.normal_form.supercritical
+
+    @property
+    def lyapunov(self) -> float:
+        """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, section 3.5; <q, q> = 1)."""
+        return self.normal_form.k2.real / self.omega
+
+    def but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
+        """Return a block's roots without the critical one or pair, where it is the block's."""
+        mine = dict(block.symmetry.shifts)
+        for critical, symmetry in ((1j * self.omega, self.block.symmetry),
+                                   (-1j * self.omega, power(self.block.symmetry, -1))):
+            if mine == dict(symmetry.shifts) and len(roots):
+                roots = np.delete(roots, np.abs(roots - critical).argmin())
+        return roots
+
+    @cached_property
+    def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
+        """All blocks with their other roots on the axis and right of it."""
+        close = ON_AXIS * max(1.0, self.omega)
+        return tuple((one, self.but_critical(one, one.right_of(-close)))
+                     for one in blocks(self.network, self.rest))
+
+    @property
+    def leading_other(self) -> complex:
+        """The rightmost root but for the critical pair, 1/model time."""
+        return complex(rightmost_first(np.concatenate([
+            self.but_critical(one, one.roots(3))
+            for one in blocks(self.network, self.rest)]))[0])
+
+    def _right(self, within: bool) -> int:
+        close = ON_AXIS * max(1.0, self.omega)
+        return int(sum((roots.real > close).sum() for other, roots in self._others
+                       if within or not other.within(self.block)))
+
+    @property
+    def unstable_roots(self) -> int:
+        """How many of the other roots have a positive real part."""
+        return self._right(within=True)
+
+    @property
+    def unstable_transverse_roots(self) -> int:
+        """How many of these lie outside the gait's class: none would have to be there."""
+        return self._right(within=False)
+
+    @property
+    def simple(self) -> bool:
+        """Whether no other root lies on the imaginary axis."""
+        return all((roots.real > ON_AXIS * max(1.0, self.omega)).all()
+                   for _, roots in self._others)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the bifurcation is stable in the sense of Buono & Golubitsky (section 4).
+
+        Critical roots simple, all others to the left; the orbits attract if the bifurcation is
+        supercritical as well.
+        """
+        return self.simple and self.unstable_roots == 0
+
+    def amplitude(self, value: float) -> float:
+        """Amplitude of every cell's first variable near onset, half its range: 2 |q_1| r.
+
+        Raises:
+            NoOrbit: the orbits lie on the other side.
+
+        """
+        return 2.0 * abs(self.vector[0]) * self.normal_form.radius(value - self.value)
+
+    def period(self, value: float) -> float:
+        """Period near onset in model time, to first order in value' - value.
+
+        Raises:
+            NoOrbit: the orbits lie on the other side.
+
+        """
+        return 2.0 * np.pi / (self.omega + self.normal_form.shift(value - self.value))
+
+    def path(self, value: float, theta: np.ndarray) -> np.ndarray:
+        """States near onset at times in cycles: ``rest + 2 Re(q z)``, shape (m, components).
+
+        Raises:
+            NoOrbit: the orbits lie on the other side.
+
+        """
+        network = self.line.at(self.network, value)
+        turning = np.exp(2j * np.pi * (np.asarray(theta)[:, None] + self.block.symmetry.phases))
+        swing = self.normal_form.radius(value - self.value) * np.concatenate(
+            [entry * turning for entry in self.vector], axis=1)
+        return everywhere(network, equilibrium(network)) + 2.0 * swing.real
+
+
+def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """Solve for what a push moves; where there is none, a singular matrix does not matter."""
+    return np.linalg.solve(matrix, push) if push.any() else np.zeros_like(push)
+
+
+def first_hopf(network: Network, gait: str) -> HopfPoint | None:
+    """Return where a primary gait is born as the delay grows; None if at no delay, or without one.
+
+    It is the smallest delay at which a pair of roots of the gait's class moves to the right.
+
+    Args:
+        network: parameters; its own delay does not matter.
+        gait: one of its gaits.
+
+    Raises:
+        InputError: an unknown gait.
+        NoEquilibrium: the network has no equilibrium.
+
+    """
+    symmetry, delay = network.symmetry(gait), network.delay_parameter
+    if not delay or len(symmetry.shifts) < len(symmetry.group.elements):
+        return None
+    rest, line = equilibrium(network), ParameterLine((delay,), (1.0,))
+    block = block_of(Expansion(network, rest), symmetry)
+    points = [crossing_at(block, line, rest, omega, tau)
+              for omega, tau in delay_crossings(block.now, block.past)]
+    # With one variable the fast wave is the one that is born, and the slow one ends.
+    born = points[:1] if len(rest) == 1 else [one for one in points if one.direction > 0]
+    return min(born, key=lambda one: one.value, default=None)
+
+
+def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: float, tau: float,
+                n: int = 0) -> HopfPoint:
+    """Return the Hopf point of a block at a delay.
+
+    Args:
+        block: of a network with any delay.
+        line: of the delay alone.
+        rest: state of every cell at the equilibrium, shape (variables,).
+        omega: rad per model time.
+        tau: a delay at which the block's roots cross, and n turns more.
+        n: how many turns.
+
+    """
+    tau += 2.0 * np.pi * n / omega
+    there = line.at(block.network, tau)
+    return HopfPoint(there, line, tau, replace(block, network=there), omega, rest, n)
+
+
+# All Hopf points of a network's equilibrium along a line of parameters.
+
+#: Values of the parameters at which the equilibrium is looked at before crossings are refined.
+GRID = 241
+#: With a delay, how many roots of a class are followed beside those that are to the right of the
+#: axis somewhere on the grid.
+SPARE = 2
+
+
+def hopf_points(network: Network, line: ParameterLine | str, low: float, high: float
+                ) -> list[HopfPoint]:
+    """Find all Hopf points of the equilibrium between two values of parameters, by rising value.
+
+    Values at which the network has no equilibrium are passed over. Where not the delay alone
+    moves, points closer to one another than (high - low)/240 are distinguished only where a pair
+    crosses twice in the same class.
+
+    Args:
+        network: the other parameters.
+        line: the parameters that move, or their text: 'tau', 'alpha=-beta', or a group.
+        low: least value, in the parameter's unit.
+        high: greatest value, in the parameter's unit.
+
+    Raises:
+        NoEquilibrium: it exists nowhere on the way.
+        InputError: low is not below high, no such parameter, one is not finite, the delay would be
+            negative, or the weights have not the symmetry of the network.
+
+    """
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise InputError(f'low {low} must be less than high {high}')
+    line = ParameterLine.of(line, type(network))
+    if not network.rests:
+        equilibrium(network)
+    delay = network.delay_parameter
+    if min(line.at(network, value).delay for value in (low, high)) < 0.0:
+        raise InputError(f'{line} from {low:g} to {high:g} makes {delay} negative')
+    if line.names == (delay,) and delay not in equations_of(type(network)).rows:
+        return _by_delay(network, line, low, high)
+    return _on_grid(network, line, low, high)
+
+
+def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega: float
+            ) -> HopfPoint:
+    """Return a Hopf point whose place is known.
+
+    Args:
+        network: at the point.
+        line: the parameters by which the pair crosses.
+        mode: the critical class.
+        omega: about that of the critical root i omega, to tell it from others of its block.
+
+    """
+    rest = equilibrium(network)
+    block = block_at(network, rest, mode)
+    # Its real part is zero but for rounding, unless the caller was wrong by more.
+    roots = block.right_of(-1e-3)
+    root = roots[np.abs(roots - 1j * omega).argmin()]
+    return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
+
+
+def _by_delay(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
+    rest, found = equilibrium(network), []
+    for block in blocks(network, rest):
+        for omega, tau in delay_crossings(block.now, block.past):
+            turn = 2.0 * np.pi / omega
+            found += [crossing_at(block, line, rest, omega, tau, n) for n in range(
+                max(0, int(np.ceil((low - tau) / turn))), int(np.floor((high - tau) / turn)) + 1)]
+    return sorted(found, key=lambda point: point.value)
+
+
+def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
+    @cache
+    def split(value: float) -> tuple[Block, ...]:
+        """Return the blocks; none where there is no equilibrium."""
+        there = line.at(network, value)
+        try:
+            return blocks(there, equilibrium(there))
+        except NoEquilibrium:
+            return ()
+
+    @cache
+    def roots(value: float, which: int, count: int) -> np.ndarray:
+        if not split(value):
+            return np.full(count, np.nan, dtype=complex)
+        return split(value)[which].roots(count)
+
+    grid = _with_edges([float(value) for value in np.linspace(low, high, GRID)],
+                       lambda value: bool(split(value)))
+    if not any(split(value) for value in grid):
+        equilibrium(line.at(network, low))
+    found: list[HopfPoint] = []
+    for which in range(len(classes(network))):
+        count = _tracked_block([split(value)[which] for value in grid if split(value)])
+        known: list[tuple[float, float]] = []
+        for rank in range(count):
+            def real_part(value: float, at: tuple[int, int, int] = (which, count, rank)) -> float:
+                return float(roots(value, *at[:2])[at[2]].real)
+
+            for value in crossings(real_part, np.array(grid)):
+                # Two roots of a block may cross together; each is met twice then.
+                for root in roots(value, which, count):
+                    omega = float(root.imag)
+                    if (abs(root.real) <= ON_AXIS < omega
+                            and not any(np.allclose((value, omega), one) for one in known)):
+                        known.append((value, omega))
+                        found.append(hopf_at(line.at(network, value), line,
+                                             split(value)[which].mode, omega))
+    # Points that symmetry puts in one place differ by rounding.
+    return sorted(found, key=lambda point: (round(point.value, 9), point.omega, point.mode))
+
+
+def _tracked_block(along: list[Block]) -> int:
+    """How many roots of a class can cross on the grid: without a delay, all."""
+    if not any(one.past.any() for one in along):
+        return along[0].network.variables
+    return SPARE + max(len(one.right_of(0.0)) for one in along)
+
+
+def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:
+    """Add the last places before and the first ones after those where nothing exists."""
+    whole = grid[:1]
+    for left, right in pairwise(grid):
+        if exists(left) != exists(right):
+            inside, outside = (left, right) if exists(left) else (right, left)
+            for _ in range(20):
+                middle = 0.5 * (inside + outside)
+                inside, outside = (middle, outside) if exists(middle) else (inside, middle)
+            if left < inside < right:
+                whole.append(inside)
+        whole.append(right)
+    return whole

@@ -1,0 +1,233 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The exported C as the kernels of a process, in place of those that numba compiles.
+
+The equations and their steps are those that an export has (field_source, ``c/network.c``), in
+float64 and for histories of any length; the system's compiler makes a library of them, which is
+kept on disk. A step takes about as long as numba's; lanes are stepped one by one.
+"""
+
+from collections.abc import Iterator, Sequence
+import ctypes
+from functools import cache
+import hashlib
+import os
+from pathlib import Path
+import platform
+import shutil
+import subprocess
+import tempfile
+
+from cpg_ros.common.cache_folder import writing
+from cpg_ros.common.errors import CpgError, InputError, needed
+from cpg_ros.dynamics.integration import kernel
+from cpg_ros.dynamics.integration.c_text import FOLDER, part
+from cpg_ros.dynamics.integration.compilation import COMPILED
+from cpg_ros.dynamics.integration.kernel import Kernels, Ring, Samples, System
+from cpg_ros.networks import equations as generated
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.network import Network
+import numpy as np
+
+OPTIONS = ('-std=c99', '-O2', '-shared', '-fPIC')
+COMPILERS = ('cc', 'gcc', 'clang')
+MOST_NODES = 2**15 - 1
+#: By which kernels are made: numba where it is installed, else C.
+KERNELS = ('auto', 'numba', 'c')
+
+
+class NoCompiler(CpgError):
+    """The system has no C compiler that works."""
+
+
+def compiler() -> str:
+    """Return the C compiler: that of the environment's ``CC``, or one of the usual names.
+
+    Raises:
+        NoCompiler: there is none.
+
+    """
+    wanted = (os.environ['CC'],) if os.environ.get('CC') else COMPILERS
+    for name in wanted:
+        if shutil.which(name) is not None:
+            return name
+    raise NoCompiler(f'no C compiler ({", ".join(wanted)}) is installed, by which kernels are '
+                     'made where numba is missing: apt install gcc')
+
+
+def _sources(network: type[Network]) -> dict[str, str]:
+    """Return the files of a network's kernel, name -> text."""
+    # sympy takes a third of a second to load, and is needed once for each set of equations.
+    from cpg_ros.dynamics.integration.kernel_source import field_source
+    equations = equations_of(network)
+    field = field_source(equations, network.cells, each=True)
+    sizes = {'CPG_CELLS': network.cells, 'CPG_COMPONENTS': network.cells * network.variables,
+             'CPG_DRIVEN': field.driven, 'CPG_DRIVEN_ROOM': max(1, field.driven * network.cells)}
+    defines = '\n'.join(f'#define {name} {value}' for name, value in sizes.items())
+    common, *rest = (part(f'{name}.c') for name in ('common', 'kernel_slopes', 'network',
+                                                    'kernel'))
+    return {'cpg.h': part('kernel.h', {'DEFINES': defines}),
+            'cpg.c': ''.join([common, field.text, *rest])}
+
+
+def _compiled(network: type[Network], library: Path) -> None:
+    """Write a network's library.
+
+    Raises:
+        NoCompiler: there is no compiler, or it fails.
+
+    """
+    name = compiler()
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        for file, text in _sources(network).items():
+            (Path(folder) / file).write_text(text)
+        done = subprocess.run([name, *OPTIONS, 'cpg.c', '-lm', '-o', 'cpg.so'], cwd=folder,
+                              capture_output=True, text=True)
+        if done.returncode:
+            line = next((line for line in done.stderr.splitlines() if 'error' in line),
+                        f'it ended with {done.returncode}')
+            raise NoCompiler(f"the C compiler '{name}' cannot make the kernels of the network "
+                             f"'{network.name}': {line}")
+        os.replace(Path(folder) / 'cpg.so', library)
+
+
+@cache
+def _version() -> str:
+    """Return a word that changes whenever something does that the C is written by."""
+    digest = hashlib.sha256(platform.machine().encode())
+    for source in sorted(FOLDER.parent.rglob('*.[chp]*')):
+        if source.suffix in ('.c', '.h', '.py'):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:14]
+
+
+def _library(network: type[Network]) -> ctypes.CDLL:
+    folder = generated.folder(equations_of(network).key)
+    if folder is not None:
+        library = folder / f'kernel-{_version()}.so'
+        if not library.exists():
+            with writing():
+                _compiled(network, library)
+        if library.exists():
+            return ctypes.CDLL(str(library))
+    with tempfile.TemporaryDirectory() as place:
+        library = Path(place) / 'kernel.so'
+        _compiled(network, library)
+        return ctypes.CDLL(str(library))
+
+
+def _track_of(components: int) -> type[ctypes.Structure]:
+    """Return the struct cpg_track of ``c/kernel.h``."""
+    pointer, real, short = ctypes.c_void_p, ctypes.c_double, ctypes.c_int16
+    return type('Track', (ctypes.Structure,), {'_fields_': [
+        ('p', pointer), ('gain', real), ('delay', real), ('step', real), ('ahead', real),
+        ('x', pointer), ('slope', pointer), ('before', pointer), ('basis_rows', short),
+        ('basis', pointer), ('gait', short), ('nodes', short), ('head', short),
+        ('carry', real * components)]})
+
+
+class _Lane:
+    """A system of one lane and its history, as C takes them."""
+
+    def __init__(self, kind: type[ctypes.Structure], system: System, ring: Ring) -> None:
+        if len(ring.x) > MOST_NODES:
+            raise InputError(f'a history of {len(ring.x)} steps is too long for kernels in C: '
+                             f'they have at most {MOST_NODES}')
+        # The arrays are kept as long as their addresses.
+        self.system, self.ring = system, ring
+        p, basis, x, after, before = (array.ctypes.data for array in (
+            system.p, system.basis, ring.x, ring.after, ring.before))
+        self._track = kind(p, system.gain, system.tau[0] / ring.step, ring.step, 0.0, x, after,
+                           before, len(system.basis), basis, 0, len(ring.x), 0)
+        self.pointer = ctypes.byref(self._track)
+
+
+def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Ring]]:
+    """Yield each lane by itself; what is done to its history is taken over."""
+    for lane in range(lanes):
+        arrays = [array[:, lane::lanes] for array in (ring.x, ring.after, ring.before)]
+        own = [array.copy() for array in arrays]
+        yield (System(system.p[:, lane::lanes].copy(), system.tau[lane:], system.gain,
+                      system.basis), Ring(ring.step, *own))
+        for array, changed in zip(arrays, own, strict=True):
+            array[:] = changed
+
+
+@cache
+def c_kernels(network: type[Network]) -> Kernels:
+    """Return a network's kernels in C, for ``integration.kernel.use``.
+
+    Raises:
+        NoCompiler: they are not on disk, and there is no compiler, or it fails.
+
+    """
+    library, components = _library(network), network.cells * network.variables
+    kind, last = _track_of(components), None
+    pointer, whole = ctypes.c_void_p, ctypes.c_int
+    library.set_slope.argtypes = pointer, whole
+    library.advance.argtypes = pointer, pointer, ctypes.c_double, pointer
+    library.steps.argtypes = pointer, whole, whole, whole, whole, pointer, pointer
+
+    def set_slope(system: System, ring: Ring, head: int) -> None:
+        for one in _split(system, ring, ring.x.shape[1] // components):
+            library.set_slope(_Lane(kind, *one).pointer, head)
+
+    def advance(system: System, ring: Ring, clock: np.ndarray, duration: float, out: np.ndarray
+                ) -> None:
+        nonlocal last
+        lane = last
+        # Of the same stepper as the last time, mostly: its addresses are known.
+        if lane is None or lane.system is not system or lane.ring is not ring:
+            last = lane = _Lane(kind, system, ring)
+        library.advance(lane.pointer, clock.ctypes.data, duration, out.ctypes.data)
+
+    def integrate(system: System, ring: Ring, head: int, steps: int, noise: float, seed: int,
+                  record: Samples, row: int) -> int:
+        if noise:
+            raise InputError('noise needs numba: kernels in C have none')
+        every, states, slopes = record
+        spare, end = np.empty((2, *states.shape[1:])), head
+        for lane, one in enumerate(_split(system, ring, ring.x.shape[1] // components)):
+            kept = (states[lane], slopes[lane]) if lane < len(states) else spare
+            end = library.steps(_Lane(kind, *one).pointer, head, steps, every, row,
+                                *(array.ctypes.data for array in kept))
+        return end
+
+    def integrate_many(system: System, ring: Ring, head: int, steps: int, noise: float,
+                       seeds: Sequence[int], record: Samples, row: int) -> int:
+        lanes, end = system.tau.shape[1], head
+        for block, seed in enumerate(seeds):
+            mine = slice(block * lanes, (block + 1) * lanes)
+            end = integrate(
+                System(system.p[block], system.tau[block], system.gain, system.basis),
+                Ring(ring.step, ring.x[block], ring.after[block], ring.before[block]), head,
+                steps, noise, seed, Samples(record.every, record.states[mine],
+                                            record.slopes[mine]), row)
+        return end
+
+    return Kernels(set_slope, advance, integrate, integrate, integrate_many)
+
+
+def choose(wanted: str = 'auto') -> None:
+    """Let one of KERNELS make the kernels of this process from now on.
+
+    Raises:
+        MissingLibraryError: numba is asked for, and not installed.
+
+    """
+    if wanted == 'numba':
+        needed('numba')
+    in_c = wanted == 'c' or (wanted == 'auto' and not COMPILED)
+    kernel.use(c_kernels if in_c else kernel.numba_kernels)

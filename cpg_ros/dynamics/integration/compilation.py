@@ -1,0 +1,140 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How the numerical kernels are compiled, and the elementary functions they share.
+
+By numba; where that is missing they are plain Python, whose steps are made in C
+(integration.kernel), and which is too slow for feedback and simulation (see ``compiled``).
+"""
+
+from importlib.util import find_spec
+import math
+
+import numpy as np
+
+#: Whether kernels are machine code.
+COMPILED = find_spec('numba') is not None
+if COMPILED:
+    from cpg_ros.dynamics.integration.machine_code import (
+        cached_on_disk,
+        inline,
+        jit,
+        jit_entry,
+        on_compile,
+        prange,
+        specialised,
+    )
+else:
+    from cpg_ros.dynamics.integration.plain_code import (
+        cached_on_disk,
+        inline,
+        jit,
+        jit_entry,
+        on_compile,
+        prange,
+        specialised,
+    )
+
+__all__ = ['COMPILED', 'bound_by_first_call', 'cached_on_disk', 'exp', 'fetch', 'inline', 'jit',
+           'jit_entry', 'on_compile', 'prange', 'renamed', 'specialised', 'tanh']
+
+
+def bound_by_first_call(kernel):
+    """Return a kernel that is bound, see above, to arguments like those of its first call."""
+    code = None
+
+    def call(*arguments):
+        nonlocal code
+        if code is None:
+            code = specialised(kernel, *arguments)
+        return code(*arguments)
+    return call
+
+
+def renamed(function, key: str):
+    """Give a function that is compiled once for each network a name of its own for this one.
+
+    numba names machine code by the function's qualified name and a running number. Code that two
+    processes have put into the disk cache under one name is taken for the same when a third one
+    loads both: a network would run another's equations, on arrays of another length.
+
+    Args:
+        function: to be renamed.
+        key: of the network's equations.
+
+    """
+    function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
+    return function
+
+
+_LOG2E = 1.0 / math.log(2.0)
+# ln 2 split so that n * _LN2_HIGH is exact (fdlibm).
+_LN2_HIGH = 6.93147180369123816490e-01
+_LN2_LOW = 1.90821492927058770002e-10
+# Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits of the mantissa.
+_ROUND = 6755399441055744.0
+
+
+@jit
+def _reduced(z):
+    """Return 2^n and expm1(r) with z = n ln 2 + r, |r| <= ln(2)/2, for |z| <= 708."""
+    rounded = z * _LOG2E + _ROUND
+    n = rounded - _ROUND
+    r = (z - n * _LN2_HIGH) - n * _LN2_LOW
+    # sum_{k=2}^{13} r^(k-2) / k!, in Estrin's order: short chains of dependent operations.
+    r2 = r * r
+    r4 = r2 * r2
+    low = (0.5 + r * (1 / 6)) + r2 * ((1 / 24) + r * (1 / 120))
+    middle = (1 / 720 + r * (1 / 5040)) + r2 * (1 / 40320 + r * (1 / 362880))
+    high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
+    q = low + r4 * (middle + r4 * high)
+    power = np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
+    return power, r + r2 * q
+
+
+@jit
+def tanh(x):
+    """Hyperbolic tangent, within 4 units in the last place, without a branch.
+
+    libm's tanh cannot be vectorised; this one runs over the cells of a network several at a
+    time. expm1 by reduction and a Taylor polynomial of degree 13, then
+    tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
+    """
+    z = abs(x)
+    power, rest = _reduced(2.0 * (20.0 if z > 20.0 else z))
+    expm1 = power * rest + (power - 1.0)
+    return math.copysign(expm1 / (expm1 + 2.0), x)
+
+
+@jit
+def exp(x):
+    """Exponential, within 4 units in the last place for |x| <= 700, limited beyond; see tanh."""
+    z = 700.0 if x > 700.0 else x
+    z = -700.0 if z < -700.0 else z
+    power, rest = _reduced(z)
+    return power + power * rest
+
+
+@jit
+def fetch(lanes, source, given, out):
+    """Copy what each cell hears: of cell ``source[cell]`` all lanes."""
+    if lanes == 1:
+        for cell in range(len(source)):
+            out[cell] = given[source[cell]]
+    else:
+        for cell in range(len(source)):
+            begin = source[cell] * lanes
+            there, here = given[begin:begin + lanes], out[cell * lanes:(cell + 1) * lanes]
+            for lane in range(lanes):
+                here[lane] = there[lane]

@@ -1,0 +1,104 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Machine code of the numerical kernels, made by numba and kept on disk."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.cache_folder import writing
+from cpg_ros.networks import equations
+from numba import config, njit, prange, typeof
+from numba.core import event
+from numba.core.caching import FunctionCache
+
+__all__ = ['cached_on_disk', 'inline', 'jit', 'jit_entry', 'on_compile', 'prange', 'specialised']
+
+#: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
+#: and the interpreter lock released: the publishing thread must not wait for parameters.
+OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
+
+jit = njit(**OPTIONS)
+#: For what is built into its caller, where a loop of known length can be unrolled.
+inline = njit(inline='always', **OPTIONS)
+
+
+class _Disk(FunctionCache):
+    """Machine code on disk, as far as there is room: numba would end with a full disk."""
+
+    def save_overload(self, sig, data):
+        with writing():
+            super().save_overload(sig, data)
+
+
+def cached_on_disk(function, folder: Path | None, **options):
+    """Compile a function when it is first called, and keep its machine code on disk.
+
+    Args:
+        function: not compiled yet.
+        folder: which is another one whenever something that the function calls has changed;
+            without one, nothing is kept.
+        options: of numba, beside those of every kernel.
+
+    """
+    if folder is not None:
+        # Read here and now: what others compile with numba is kept where it was.
+        numba: Any = config
+        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
+        try:
+            compiled = njit(**OPTIONS, **options)(function)
+            compiled._cache = _Disk(function)
+        finally:
+            numba.CACHE_DIR = others
+        # Where the folder cannot be written numba tries others, whose code may be out of date.
+        if Path(compiled.stats.cache_path).is_relative_to(folder):
+            return compiled
+    return njit(**OPTIONS, **options)(function)
+
+
+def jit_entry(function):
+    """Compile an entry point of the package, whose machine code is kept on disk."""
+    return cached_on_disk(function, equations.folder())
+
+
+def specialised(kernel, *arguments):
+    """Return a kernel's machine code for arguments like these, to be called as it is.
+
+    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
+    than a small kernel does. The machine code does not look: the arguments it is called with must
+    be of these types, arrays of these numbers of dimensions and orders in memory.
+    """
+    return kernel.compile(tuple(typeof(argument) for argument in arguments))
+
+
+class _Notice(event.Listener):
+    """Calls a function when something is compiled."""
+
+    def __init__(self, compiling: Callable[[], None]) -> None:
+        self._compiling = compiling
+
+    def on_start(self, event: event.Event) -> None:
+        self._compiling()
+
+    def on_end(self, event: event.Event) -> None:
+        """Whatever follows has been announced."""
+
+
+@contextmanager
+def on_compile(compiling: Callable[[], None]) -> Iterator[None]:
+    """Call a function for each function that is not on disk yet, before it is compiled."""
+    with event.install_listener('numba:compile', _Notice(compiling)):
+        yield

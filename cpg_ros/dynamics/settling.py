@@ -1,0 +1,294 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Gaits sought by letting the network run, held in the gait's symmetry, until it repeats."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.equilibrium import equilibrium
+from cpg_ros.dynamics.integration.simulate import History, LANES, simulate, Trajectory
+from cpg_ros.dynamics.orbit import signal_symmetry
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
+
+# The settled cycles of networks, many of which are simulated at once.
+
+#: Model time that every set is simulated for, and between the states that are kept.
+SPAN, KEPT_FRACTION = 500.0, 0.1
+#: Steps of the network's real-time step at once: still more exact than adaptive methods with
+#: their usual tolerances (benchmarks/bench_optimize.py).
+COARSE_STEPS = 2.5
+#: Of every component at the start, which breaks all symmetry.
+DISTURBANCE = 0.05
+#: Cycles that are averaged, and points of one.
+AVERAGED, POINTS = 3, 256
+#: Below this range of the first variable nothing oscillates.
+ALIVE = 0.05
+#: A state has come back when it is this near, over the range of the states.
+RETURNED = 0.1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SettledCycle(ShortRepr):
+    """The cycle in which a network settles, from a simulation.
+
+    Attributes:
+        run: the simulation.
+        begin: where cell 1 peaks for the last time but one, model time.
+        period: in model time.
+        signals: mean of the last cycles on even points, shape (POINTS, components).
+
+    """
+
+    run: Trajectory
+    begin: float
+    period: float
+    signals: np.ndarray
+
+    def __call__(self, theta: np.ndarray) -> np.ndarray:
+        """States at times in cycles from such a peak on, 0 to 1, shape (m, components)."""
+        return self.run(self.begin + theta * self.period)
+
+
+def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarray:
+    """Start every network near the gait's pattern on a typical cycle, all disturbed alike.
+
+    So only a gait that attracts is found. A second waveform starts smaller than the first one
+    and anywhere in its cycle.
+
+    Returns:
+        States, shape (networks, components).
+
+    """
+    rng = np.random.default_rng(seed)
+    sizes, offsets = np.array([1.0, rng.uniform(0.4, 1.0)]), np.array([0.0, rng.uniform()])
+    disturbance = DISTURBANCE * rng.standard_normal(networks[0].components)
+    found = []
+    for network in networks:
+        symmetry = network.symmetry(gait)
+        turn = 2.0 * np.pi * (symmetry.phases + offsets[symmetry.waves])
+        size = sizes[symmetry.waves]
+        found.append(np.concatenate([
+            middle + half * size * np.cos(turn - 2.0 * np.pi * late)
+            for middle, half, late in network.typical_cycle]))
+    return np.array(found) + disturbance
+
+
+def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajectory:
+    """Simulate networks from a start each, all at once, on all cores."""
+    step = COARSE_STEPS * networks[0].step
+    return simulate(networks, starts, SPAN, step, every=max(1, round(KEPT_FRACTION / step)),
+                    progress=False)
+
+
+def last_cycle(run: Trajectory, cells: int) -> SettledCycle | None:
+    """Find a simulation's cycle; None where it rests, runs away or does not repeat.
+
+    Cycles begin where the liveliest cell crosses its middle upwards, which it does fast; of
+    several such crossings in a cycle the whole state tells which belong together.
+    """
+    half = run.t.size // 2
+    span = np.ptp(run.x[half:, :cells], axis=0)
+    if not span.max() >= ALIVE:
+        return None
+    cell = int(span.argmax())
+    v = run.x[half:, cell]
+    middle = 0.5 * (v.max() + v.min())
+    before = np.flatnonzero((v[:-1] < middle) & (v[1:] >= middle))
+    if before.size < 2:
+        return None
+    low, high = run.t[half + before], run.t[half + before + 1]
+    for _ in range(30):
+        between = 0.5 * (low + high)
+        under = run(between)[:, cell] < middle
+        low, high = np.where(under, between, low), np.where(under, high, between)
+    states = run(high)
+    gaps = np.abs(states[:-1] - states[-1]).max(axis=1) / np.ptp(run.x[half:], axis=0).max()
+    if gaps.min() > RETURNED:
+        return None
+    back = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
+    period = float(high[-1] - high[back])
+    cycles = min(AVERAGED, int(high[-1] / period))
+    times = high[-1] + period * (np.arange(cycles * POINTS) / POINTS - cycles)
+    signals = run(times).reshape(cycles, POINTS, -1).mean(axis=0)
+    # An orbit begins where cell 1 peaks, and so must the guess at it. The first of the crossings
+    # is past the middle of the run, so that two periods fit in before the last one.
+    begin = high[-1] + period * (signals[:, 0].argmax() / POINTS - 2.0)
+    return SettledCycle(run, float(begin), period, signals)
+
+
+#: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
+SETTLING, HOLD = 30, 1.0
+#: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
+#: from so many states in the gait's class at random about it, this far in the mean. Variables that
+#: are beyond 1 at the equilibrium are taken over what they are there.
+SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
+#: After how many steps it is looked whether a start has settled, twice as many each time, the
+#: last of them only where that is asked for; how many are taken at once where there is no delay.
+LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
+#: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
+#: their size, where they repeat: neither changes any more.
+RESTING, REPEATING = 1e-9, 1e-3
+#: How well what the network settles on has to repeat the gait's shifts, over its range, and from
+#: where on it has a further symmetry.
+KEPT, ADDED = 0.05, 0.01
+#: States over times in cycles, from a peak of cell 1 on.
+Path = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """What a simulation repeats.
+
+    Attributes:
+        path: states over times in cycles, from a peak of cell 1 on.
+        period: model time.
+        drift: difference between the first and the last state that should be one, over the size.
+
+    """
+
+    path: Path
+    period: float
+    drift: float
+
+
+class _Past:
+    """States of a trajectory up to its end, at its nodes, as a history."""
+
+    def __init__(self, run: Trajectory) -> None:
+        self._run = run
+
+    def _nodes(self, times: np.ndarray) -> np.ndarray:
+        return np.maximum(np.rint(times / self._run.t[1]).astype(int) - 1, -len(self._run.t))
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        return self._run.x[self._nodes(times)]
+
+    def derivative(self, times: np.ndarray) -> np.ndarray:
+        return self._run.slopes[self._nodes(times)]
+
+
+def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
+           hold: float = HOLD) -> tuple[Path, float] | None:
+    """Let the network run from a state and find its period: (states over cycles, period).
+
+    None where it comes to rest or repeats nothing within three of the given periods.
+    """
+    step = min(network.step, period / 400.0)
+    lock = (hold, symmetry) if hold else None
+    history: History = start
+    early = 0 if network.delay_parameter else SETTLING // 4
+    if early:
+        # Most states from which no gait is reached come to rest soon.
+        run = simulate(network, start, early * period, step, lock=lock, progress=False)
+        if _ends(run, run.t.size // 2):
+            return None
+        history = run.x[-1]
+    rest = SETTLING + 3 - early
+    run = simulate(network, history, rest * period, step, lock=lock, progress=False)
+    found = _cycle(run, int((rest - 3) * period / step))
+    return None if found is None else (found.path, found.period)
+
+
+def _ends(run: Trajectory, first: int) -> bool:
+    """Whether the network rests from a step on, or has left all bounds."""
+    return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
+
+
+def _cycle(run: Trajectory, first: int) -> LimitCycle | None:
+    """Find what a simulation repeats from a step on."""
+    v, rise = run.x[first:, 0], run.slopes[first:, 0]
+    if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
+        return None
+    peaks = first + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
+    peaks = peaks[run.x[peaks, 0] > v.max() - 0.02 * np.ptp(v)]
+    if peaks.size < 2:
+        return None
+    size = np.ptp(run.x[first:], axis=0).max()
+    gaps = np.abs(run.x[peaks[1:]] - run.x[peaks[0]]).max(axis=1) / size
+    close = np.flatnonzero(gaps < max(0.05, 1.5 * gaps.min()))
+    if gaps.min() > 0.2:
+        return None
+    begin, found = run.t[peaks[0]], float(run.t[peaks[1 + close[0]]] - run.t[peaks[0]])
+    # Of a cycle with several peaks alike, those that are one and the same point.
+    same = peaks[::1 + close[0]]
+    fraction = run.slopes[same, 0] / (run.slopes[same, 0] - run.slopes[same + 1, 0])
+    states = run(run.t[same] + fraction * run.t[1])
+    drift = float(np.abs(states - states[0]).max() / size) if len(same) > 2 else np.inf
+    return LimitCycle(lambda theta: run(begin + theta * found), found, drift)
+
+
+def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
+    """States that the gait is sought from: waves with its phases, then any of its class."""
+    variables = np.arange(network.variables)[:, None]
+    turn = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
+    waves = np.multiply.outer(SIZES, np.cos(turn).ravel())
+    scattered = SCATTER * np.random.default_rng(0).standard_normal((random, network.components))
+    # On the class, of any length there: fewer numbers, each as large.
+    inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
+    inside *= np.sqrt(network.components / len(symmetry.basis))
+    rest = np.repeat(equilibrium(network), network.cells)
+    # A variable in mV swings by more than 1.
+    return rest + np.maximum(1.0, np.abs(rest)) * np.concatenate([waves, inside])
+
+
+def find_orbit(network: Network, gait: str, random: int = RANDOM,
+               longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
+    """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
+
+    Args:
+        network: parameters.
+        gait: one of its gaits.
+        random: number of states at random, besides the waves.
+        longer: whether to wait longer for starts that have not settled, as slow relaxation
+            oscillations need it.
+
+    Yields:
+        States over cycles, and the period in model time.
+
+    """
+    symmetry = network.symmetry(gait)
+    step = network.step * (1.0 if network.delay_parameter else COARSER)
+    # As many at a time as advance together.
+    for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
+        histories: list[History] = list(some)
+        before = 0
+        for steps in LOOKED + LONGER:
+            if not histories or (before == LOOKED[-1] and not longer()):
+                break
+            batch = simulate(network, histories, (steps - before) * step, step,
+                             lock=(HOLD, symmetry), progress=False)
+            histories = []
+            for x, slopes in zip(batch.x, batch.slopes, strict=True):
+                run = Trajectory(batch.t, x, slopes)
+                first = steps * 3 // 4 - before
+                found = _cycle(run, first)
+                settled = _ends(run, first) or (found is not None and found.drift <= REPEATING)
+                if not settled:
+                    histories.append(_Past(run))
+                if ((settled or steps >= LOOKED[-1]) and found is not None
+                        and _fits(found.path, symmetry)):
+                    yield found.path, found.period
+            before = steps
+
+
+def _fits(path: Path, symmetry: Symmetry) -> bool:
+    """Whether a cycle has the symmetry of a gait, and no more."""
+    count = 24 * symmetry.order
+    x = path(np.arange(count) / count)[:, :symmetry.group.cells]
+    gap = np.abs(x[:, symmetry.turn] - np.roll(x, -24, axis=0)).max()
+    return bool(gap < KEPT * np.ptp(x)) and not signal_symmetry(symmetry, x, ADDED)

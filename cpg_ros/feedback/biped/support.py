@@ -1,0 +1,252 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Force of the legs that stand: height, attitude, centre of pressure within the soles.
+
+One force and one moment are wanted of the ground. Its horizontal part points from the centre of
+pressure to the centre of mass, which turns nothing; what is to turn the body is added. The legs
+share it, and each leg's joints get J' F.
+"""
+
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.biped.links import carry
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.feedback.laws.law import Gain
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.robot import Robot
+import numpy as np
+
+# Velocity of a biped's base from the sole that stands, the accelerometer in between.
+
+VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
+                                        'in which the soles that stand correct the '
+                               "accelerometer's velocity")}
+#: Share of the weight from which on a sole counts, and over which it comes to count in full.
+FROM, OVER = 0.06, 0.18
+#: Speed and rate of turning of a sole at which it counts half, m/s and rad/s.
+SLIP, ROLL = 0.2, 1.0
+
+
+@jit
+def update(turn, acceleration, soles, loads, dt, gains, velocity):
+    """Update the base's velocity, world's axes, m/s, shape (3,), in place.
+
+    Args:
+        turn: rotation of the base, shape (3, 3).
+        acceleration: as an accelerometer measures it, m/s^2, shape (3,).
+        soles: velocities of the soles from the base's, m/s, shape (2, 6).
+        loads: share of the weight on each foot, shape (2,).
+        dt: since the last time, s.
+        gains: BipedGains.
+        velocity: changed.
+
+    """
+    for k in range(3):
+        velocity[k] += dt * (carry(turn, acceleration, k) - (GRAVITY if k == 2 else 0.0))
+    first, second = _trust(soles[0], loads[0], velocity), _trust(soles[1], loads[1], velocity)
+    total = first + second
+    if total > 0.0:
+        pull = (1.0 - math.exp(-dt * min(total, 1.0) / max(gains.velocity_time, 1e-4))) / total
+        for k in range(3):
+            # Where a sole stands, the base moves against it.
+            velocity[k] -= pull * (first * (soles[0, k] + velocity[k])
+                                   + second * (soles[1, k] + velocity[k]))
+
+
+@jit
+def _trust(sole, load, velocity):
+    """Return how far a sole counts as standing, 0 to 1.
+
+    One that turns rolls over an edge or strikes the ground; one that moves at this velocity of the
+    base slips. It still counts a little, since integrated accelerations drift.
+    """
+    off = turned = 0.0
+    for k in range(3):
+        off += (sole[k] + velocity[k])**2
+        turned += sole[3 + k]**2
+    return min(max((load - FROM) / OVER, 0.0), 1.0) / (
+        (1.0 + off / SLIP**2) * (1.0 + turned / ROLL**2))
+
+
+# Arms of a biped: joints of no leg that swing with the waveforms of the network's cells.
+
+#: From rest to the whole swing, and back, s.
+RISE = 1.0
+#: Largest speed, also where gaits change, rad/s.
+FASTEST = 10.0
+#: Instants at which an orbit is searched for the range of a cell.
+SAMPLES = 256
+
+
+class Arms:
+    """Where the joints that a robot file holds are to be driven.
+
+    One with a cell and a swing goes by that many radians about its angle as the cell's last
+    variable goes from its mean to its peak; the others stay where they are held. Of a Morris-Lecar
+    cell that is the recovery variable, a quarter of a stride behind the voltage: an arm that is
+    driven by the other leg's flexor is fastest forward as that leg is, which takes the yaw of the
+    swing.
+
+    Attributes:
+        names: of all held joints, in the order of the robot file.
+        rest: where they are held, rad, shape (joints,).
+        positions: where they are to be driven, rad, shape (joints,).
+        swing: whether any of them swings.
+
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Take what the robot file holds."""
+        links = robot.biped.links if robot.biped is not None else {}
+        self.names = tuple(robot.held)
+        self.rest = np.array(list(robot.held.values()))
+        self.positions = self.rest.copy()
+        self._swings = np.array([links[name].swing for name in self.names])
+        self._cells = np.array([max(links[name].cell - 1, 0) for name in self.names], dtype=int)
+        # Of each joint's cell in the network's state.
+        self._places = self._cells
+        self.swing = bool(self._swings.any())
+        self._level, self._waves = 0.0, np.zeros(len(self.names))
+        self._middle, self._half = np.zeros(len(self.names)), np.ones(len(self.names))
+
+    def follow(self, plan: GaitPlan) -> None:
+        """Read the cells of another gait from now on."""
+        if not self.swing:
+            return
+        orbit = plan.orbit
+        network = orbit.network
+        self._places = self._cells + network.cells * (len(network.states) - 1)
+        waves = orbit(np.arange(SAMPLES) / SAMPLES * orbit.period)[:, self._places]
+        low, high = waves.min(axis=0), waves.max(axis=0)
+        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+
+    def advance(self, dt: float, moving: bool, state: np.ndarray | None = None) -> None:
+        """Fill the positions dt in s later.
+
+        Args:
+            dt: s.
+            moving: whether arms are to swing; where they are not, they return to rest.
+            state: of the network, shape (components,); None where it does not move.
+
+        """
+        if not self.swing:
+            return
+        self._level = min(max(self._level + (dt if moving else -dt) / RISE, 0.0), 1.0)
+        if state is not None:
+            self._waves = (state[self._places] - self._middle) / self._half
+        wanted = self.rest + self._level * self._swings * self._waves
+        self.positions += np.clip(wanted - self.positions, -FASTEST * dt, FASTEST * dt)
+
+
+STANCE_GAINS = {
+    'height': Gain(0.647, 3.0, 'm', 'of the centre of mass over the soles'),
+    'height_kp': Gain(4186.0, 5e4, 'N/m', 'upward force by the height'),
+    'height_kd': Gain(246.0, 5e3, 'N s/m', 'the same by its rate'),
+    'roll_kp': Gain(59.8, 5e3, 'N m/rad', 'moment by roll'),
+    'roll_kd': Gain(35.7, 500.0, 'N m s/rad', 'the same by its rate'),
+    'pitch_kp': Gain(207.6, 5e3, 'N m/rad', 'moment by pitch'),
+    'pitch_kd': Gain(15.5, 500.0, 'N m s/rad', 'the same by its rate'),
+    'yaw_kp': Gain(121.4, 5e3, 'N m/rad', 'moment by the heading'),
+    'yaw_kd': Gain(18.7, 500.0, 'N m s/rad', 'the same by its rate'),
+    'lean': Gain(0.0662, 0.5, 'rad', 'pitch that the base is to have, positive forward',
+                 low=-0.5),
+    'pressure_x': Gain(2.60, 10.0, '', "centre of pressure's shift by the capture point's error"),
+    'pressure_y': Gain(0.769, 10.0, '', 'the same sideways'),
+    'pressure_reach_x': Gain(0.0566, 0.3, 'm', 'its largest shift from the middle of a sole'),
+    'pressure_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
+    'stand': Gain(2.5, 10.0, '', 'centre of pressure by the capture point while standing'),
+    'stance_damping': Gain(1.63, 20.0, 'N m s/rad', 'of the joints of a leg that stands'),
+    'reaction': Gain(0.0032, 1.5, '', "share of the swing leg's moment that the stance leg gives"),
+    'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
+    'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
+    'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
+#: Least and most upward force by the weight.
+LEAST, MOST = 0.3, 1.8
+
+
+@jit
+def pressure_shift(error, half, gains):
+    """Return the centre of pressure's shift in the sole's axes, m.
+
+    Args:
+        error: of the capture point, forward and left, m.
+        half: half the length and width of a sole, m.
+        gains: BipedGains.
+
+    """
+    reach_x = min(gains.pressure_reach_x, half[0])
+    reach_y = min(gains.pressure_reach_y, half[1])
+    return (min(max(gains.pressure_x * error[0], -reach_x), reach_x),
+            min(max(gains.pressure_y * error[1], -reach_y), reach_y))
+
+
+@jit
+def upward_force(wanted, height, rise, mass, gains):
+    """Return the upward force that holds the body at a height, N.
+
+    Args:
+        wanted: height of the centre of mass over the soles that bear, m.
+        height: that it has, m.
+        rise: its upward speed, m/s.
+        mass: of the robot, kg.
+        gains: BipedGains.
+
+    """
+    weight = mass * GRAVITY
+    up = weight + gains.height_kp * (wanted - height) - gains.height_kd * rise
+    return min(max(up, LEAST * weight), MOST * weight)
+
+
+@jit
+def ground_force(center, pressure, up, moment, gains):
+    """Return the force that the ground is to exert, N.
+
+    Args:
+        center: of mass, m.
+        pressure: centre of it, m.
+        up: the upward force, N.
+        moment: that is to turn the body, about x and y, N m.
+        gains: BipedGains.
+
+    """
+    arm = max(center[2] - pressure[2], 0.3)
+    x = ((center[0] - pressure[0]) * up - moment[1]) / arm
+    y = ((center[1] - pressure[1]) * up + moment[0]) / arm
+    size, most = math.sqrt(x * x + y * y), gains.friction * up
+    if size > most:
+        x, y = x * most / size, y * most / size
+    return x, y, up
+
+
+@jit
+def attitude_moment(rpy, turning, heading_error, reaction, gains):
+    """Return the moment about the world's axes that is to right the body, N m.
+
+    Args:
+        rpy: of the base, rad.
+        turning: angular velocity, world's axes, rad/s.
+        heading_error: rad.
+        reaction: moment that the leg that swings takes, N m, (3,).
+        gains: BipedGains.
+
+    """
+    about_x, about_y = -gains.roll_kp * rpy[0], -gains.pitch_kp * (rpy[1] - gains.lean)
+    c, s = math.cos(rpy[2]), math.sin(rpy[2])
+    about_z = (gains.yaw_kp * heading_error - gains.yaw_kd * turning[2]
+               + gains.reaction_yaw * reaction[2])
+    return (c * about_x - s * about_y - gains.roll_kd * turning[0] + gains.reaction * reaction[0],
+            s * about_x + c * about_y - gains.pitch_kd * turning[1] + gains.reaction * reaction[1],
+            min(max(about_z, -gains.twist), gains.twist))

@@ -1,0 +1,367 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Plausibility of sensor messages: each is checked before the feedback uses it.
+
+Rules of thumb for legged robots. A value that is far too large counts as a fault only if it lasts
+longer than a stumble does.
+"""
+
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.pattern import smoothstep
+
+# Monitoring of the feedback's inputs: whether each is valid, or since when it is not.
+
+#: An input is out after this time without a valid message, s.
+STALE = 0.05
+#: A stamp that is older, or further ahead, than this, s.
+DELAYED = 0.1
+#: Largest age of measurements, low-passed, when they are used, s: that of a quadruped's gaits, and
+#: of a balanced walk, each below the delay at which it falls in simulation.
+LATE, LATE_BALANCE = 0.03, 0.012
+#: Time constant of that low-pass, s; an input that is late counts as good again below this share.
+AGE_MEMORY, IN_TIME = 0.1, 0.9
+#: From full feedback to none, and from none to full once all inputs have been good for a while, s.
+FADE, GOOD = 0.15, 0.3
+
+
+class InputMonitor:
+    """Monitors the age of one input and the faults of its messages.
+
+    Attributes:
+        name: of the input.
+        believed: when its last valid message came, s; -inf before the first one.
+        since: when it went out, s; NaN while it is in.
+        age: of its newest measurement when it is used, by its stamp, low-passed, s; NaN where
+            messages have no stamps, and before the first one.
+
+    """
+
+    def __init__(self, name: str, latest: float = math.inf) -> None:
+        """Monitor an input of which measurements count up to an age in s."""
+        self.name, self._latest = name, latest
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all messages."""
+        self.believed, self.since = -math.inf, math.nan
+        self._changed, self._content, self._wrong = -math.inf, b'', ''
+        self._came = self._measured = -math.inf
+        self._used = self.age = math.nan
+        self._late = False
+
+    @property
+    def refused(self) -> bool:
+        """Whether messages have come, none of them valid."""
+        return self.believed == -math.inf and bool(self._wrong)
+
+    def gap(self, now: float) -> float:
+        """Time since the last valid message, s, at most 1."""
+        return min(now - self.believed, 1.0)
+
+    def interval(self, now: float) -> float:
+        """Time since the last message, valid or not, s, at most 1."""
+        return min(now - self._came, 1.0)
+
+    def note(self, now: float, stamp: float | None, content: bytes, wrong: str = '',
+             patience: float = 0.0) -> None:
+        """Record a new message.
+
+        Args:
+            now: s.
+            stamp: of the message, the same clock's, s; None if it has none.
+            content: its numbers as bytes.
+            wrong: what is wrong with them, '' for nothing.
+            patience: for how long the same numbers may come again, s.
+
+        """
+        self._came = now
+        if content != self._content:
+            self._content, self._changed = content, now
+        elif now > self._changed + patience:
+            wrong = wrong or 'the same numbers again and again'
+        if stamp is not None and not abs(now - stamp) <= DELAYED:
+            late = now - stamp
+            wrong = (f'stamps {late:.2f} s old' if late > 0.0 else
+                     f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
+        self._wrong = wrong
+        if not wrong:
+            self.believed = now
+            self._measured = -math.inf if stamp is None else stamp
+
+    def _is_late(self, now: float) -> bool:
+        """Update the age of what is used now, s; tell whether it is too large."""
+        if self._measured == -math.inf:
+            return False
+        age = max(now - self._measured, 0.0)
+        if math.isnan(self.age):
+            self.age = age
+        else:
+            self.age += min((now - self._used) / AGE_MEMORY, 1.0) * (age - self.age)
+        self._used = now
+        self._late = self.age > self._latest * (IN_TIME if self._late else 1.0)
+        return self._late
+
+    def fault(self, now: float) -> str:
+        """Say why the input is out, or ''."""
+        stale = now - self.believed > STALE
+        late = not stale and self._is_late(now)
+        if stale:
+            # What comes after a gap is as old as it is, whatever was before.
+            self.age, self._late = math.nan, False
+        if not (late or stale):
+            self.since = math.nan
+            return ''
+        if math.isnan(self.since):
+            self.since = now
+        if not stale:
+            return (f'the measurement is {1e3 * self.age:.0f} ms old when it is used, more than '
+                    f'feedback.max_delay, {1e3 * self._latest:.0f} ms')
+        return self._wrong or ('no message yet' if self.believed == -math.inf else 'no messages')
+
+
+class Fade:
+    """The share of the feedback: smoothly to 0 where an input is out, and back."""
+
+    def __init__(self) -> None:
+        self._way, self._good = 0.0, 0.0
+
+    def advance(self, good: bool, dt: float) -> float:
+        """Return the share dt in s later; good if all inputs are valid."""
+        self._good = self._good + dt if good else 0.0
+        if self._good >= GOOD or (good and self._way >= 1.0):
+            self._way = min(1.0, self._way + dt / FADE)
+        else:
+            # Also where a good message comes between bad ones.
+            self._way = max(0.0, self._way - dt / FADE)
+        return smoothstep(self._way)[0]
+
+
+#: What is wrong with a message, by the number that the checks return.
+VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
+            'no orientation (its covariance begins with -1)', 'an impossible angular velocity',
+            'an impossible acceleration',
+            'an orientation and an angular velocity that contradict each other',
+            'a joint far beyond its limits', 'an impossible speed of a joint',
+            'impossible loads on the feet',
+            'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
+            'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed')
+#: Length of an orientation, from 1; rad/s; m/s^2 within TELLING, in s.
+UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
+#: How far orientation and the sum of angular velocities may part, rad, within a time in s, and
+#: the longest gap between messages over which they are compared, s.
+APART, FORGET, GAP = 0.15, 0.2, 0.05
+#: Orientation and angular velocity contradict each other where this share of their motion differs,
+#: until it is below the second one, averaged over a time in s, and where they move, rad.
+DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
+#: Mean acceleration may be off gravity by so much while the robot stands and while it walks, and
+#: counts as right again below the last, m/s^2.
+STANDING_OFF, WALKING_OFF, RIGHT = 2.5, 6.0, 2.0
+#: Times over which it is averaged while the robot stands and walks, and from which on it is
+#: judged, s.
+STANDING_MEAN, WALKING_MEAN, JUDGED = 0.3, 1.0, 0.25
+#: Joints beyond their limits, rad, and by how much they outrun their largest speeds.
+BEYOND, OUTRUN = 0.3, 3.0
+#: Loads of all feet within TELLING, and drawn by one, in weights.
+HEAVIEST, DRAWN = 4.0, -0.5
+#: Numbers of a sensor_msgs/Imu, and of the memory of its check: acceleration (3), vertical (3),
+#: its recent change as the orientation (3) and as the angular velocity (3) have it, mean squares
+#: of their difference and of both, what the mean acceleration is off gravity (3), time so far,
+#: whether that is too far, whether orientation and angular velocity contradict each other, and the
+#: time since the vertical last changed.
+IMU, IMU_MEMORY = 37, 21
+
+
+@jit
+def turned_by(mount, x, y, z):
+    """Return a vector turned by a quaternion, x y z w."""
+    a, b, c, w = mount[0], mount[1], mount[2], mount[3]
+    d, e, f = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return (x + w * d + b * f - c * e, y + w * e + c * d - a * f, z + w * f + a * e - b * d)
+
+
+@jit
+def _contradicts(up, turning, memory):
+    """Tell whether the vertical, in the base's frame, moves otherwise than it turns, rad/s."""
+    if up[0] == memory[3] and up[1] == memory[4] and up[2] == memory[5]:
+        # A driver may repeat an orientation, or its last message.
+        return memory[19] > 0.0
+    dt, memory[20] = memory[20], 0.0
+    # What stands still in the world turns the other way in the base's frame.
+    turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
+              up[0] * turning[1] - up[1] * turning[0])
+    known, parted, moved = memory[17] > 0.0 and dt < GAP, 0.0, 0.0
+    stays = 1.0 - min(dt / FORGET, 1.0)
+    for k in range(3):
+        stated = stays * memory[6 + k] + up[k] - memory[3 + k]
+        measured = stays * memory[9 + k] + dt * turned[k]
+        memory[3 + k] = up[k]
+        memory[6 + k], memory[9 + k] = (stated, measured) if known else (0.0, 0.0)
+        parted += (memory[6 + k] - memory[9 + k])**2
+        moved += memory[6 + k]**2 + memory[9 + k]**2
+    fraction = min(dt / COMPARED, 1.0)
+    memory[12] += fraction * (parted - memory[12])
+    memory[13] += fraction * (moved - memory[13])
+    if memory[13] > MOVES**2:
+        if memory[12] > DIFFERS * memory[13]:
+            memory[19] = 1.0
+        elif memory[12] < AGREE * memory[13]:
+            memory[19] = 0.0
+    return memory[19] > 0.0 or math.sqrt(parted) > APART
+
+
+@jit
+def _is_off_gravity(up, acceleration, moving, dt, memory):
+    """Tell whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
+    memory[17] += dt
+    fraction = min(dt / min(WALKING_MEAN if moving else STANDING_MEAN, memory[17]), 1.0)
+    square = 0.0
+    for k in range(3):
+        memory[14 + k] += fraction * (acceleration[k] - GRAVITY * up[k] - memory[14 + k])
+        square += memory[14 + k]**2
+    off = math.sqrt(square)
+    if memory[17] > JUDGED and off > (WALKING_OFF if moving else STANDING_OFF):
+        memory[18] = 1.0
+    elif off < RIGHT:
+        memory[18] = 0.0
+    return memory[18] > 0.0
+
+
+@jit_entry
+def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
+    """Fill the last three if the message is plausible; return an index into VERDICTS, 0 for good.
+
+    Args:
+        values: the numbers of a sensor_msgs/Imu in its order, shape (IMU,).
+        dt: since the last one, s.
+        moving: whether the robot walks.
+        mount: orientation of the IMU in the base's frame, x y z w, shape (4,).
+        memory: shape (IMU_MEMORY,), zeros at first; overwritten.
+        rpy: roll, pitch and yaw of the base, rad, shape (3,).
+        angular_velocity: of the base in its own frame, rad/s, shape (3,).
+        acceleration: what the accelerometer shows, base's frame, m/s^2, shape (3,).
+
+    """
+    memory[20] += dt
+    for k in (0, 1, 2, 3, 13, 14, 15, 25, 26, 27):
+        if not math.isfinite(values[k]):
+            return 1
+    if values[4] == -1.0:
+        return 3
+    x, y, z, w = values[0], values[1], values[2], values[3]
+    if abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) > UNIT:
+        return 2
+    # The base's orientation is the IMU's after the inverse of the mount.
+    a, b, c, d = -mount[0], -mount[1], -mount[2], mount[3]
+    x, y, z, w = (w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a,
+                  w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c)
+    turning = turned_by(mount, values[13], values[14], values[15])
+    felt = turned_by(mount, values[25], values[26], values[27])
+    if math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > FASTEST:
+        return 4
+    hard = 0.0
+    for k in range(3):
+        memory[k] += min(dt / TELLING, 1.0) * (felt[k] - memory[k])
+        hard += memory[k] * memory[k]
+    if math.sqrt(hard) > HARDEST:
+        return 5
+    up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
+    contradicts = _contradicts(up, turning, memory)
+    if _is_off_gravity(up, felt, moving, dt, memory):
+        return 10
+    if contradicts:
+        return 6
+    rpy[0] = math.atan2(up[1], up[2])
+    rpy[1] = math.asin(min(max(-up[0], -1.0), 1.0))
+    rpy[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    for k in range(3):
+        angular_velocity[k], acceleration[k] = turning[k], felt[k]
+    return 0
+
+
+@jit_entry
+def judge_joints(positions, velocities, places, lower, upper, fastest, angles, rates):
+    """Fill angles and rates if plausible; return an index into VERDICTS, 0 for good.
+
+    Args:
+        positions: of a message, in its own order, rad.
+        velocities: the same, rad/s.
+        places: index of each joint in the message, shape (joints,).
+        lower: limits of the joints, rad, shape (joints,).
+        upper: the same.
+        fastest: the same, rad/s.
+        angles: rad, shape (joints,).
+        rates: rad/s, shape (joints,).
+
+    """
+    for k in range(len(places)):
+        angle, rate = positions[places[k]], velocities[places[k]]
+        if not math.isfinite(angle + rate):
+            return 1
+        if not lower[k] - BEYOND <= angle <= upper[k] + BEYOND:
+            return 7
+        if abs(rate) > OUTRUN * fastest[k]:
+            return 8
+    for k in range(len(places)):
+        angles[k], rates[k] = positions[places[k]], velocities[places[k]]
+    return 0
+
+
+@jit_entry
+def judge_loads(loads, places, weight, dt, memory, forces):
+    """Fill forces if plausible; return an index into VERDICTS, 0 for good.
+
+    Args:
+        loads: of the feet, N, in any order.
+        places: index of each foot among them, shape (legs,).
+        weight: of the robot, N.
+        dt: since the last ones, s.
+        memory: shape (1,), zeros at first; overwritten.
+        forces: N, shape (legs,).
+
+    """
+    whole = 0.0
+    for load in loads:
+        if not math.isfinite(load):
+            return 1
+        if load < DRAWN * weight:
+            return 9
+        whole += load
+    memory[0] += min(dt / TELLING, 1.0) * (whole - memory[0])
+    if memory[0] > HEAVIEST * weight:
+        return 9
+    for k in range(len(places)):
+        forces[k] = loads[places[k]]
+    return 0
+
+
+@jit_entry
+def agreement(loads, least, swinging, fraction, before):
+    """Return how well contacts go with a gait, 0 to 1, low-passed.
+
+    Args:
+        loads: of the feet, N, shape (legs,).
+        least: load of a foot that stands, N.
+        swinging: whether each leg is meant to, shape (legs,).
+        fraction: of the new in the mean.
+        before: the mean so far.
+
+    """
+    same = 0
+    for leg in range(len(loads)):
+        same += (loads[leg] > least) != swinging[leg]
+    return before + fraction * (same / len(loads) - before)

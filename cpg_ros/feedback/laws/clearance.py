@@ -1,0 +1,61 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Clearance: swing feet are lifted higher while the ground makes them stumble, as stairs do."""
+
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.reflexes import EARLY, STUMBLE
+
+LAW = Law(
+    'clearance', 'lift feet higher in swing while they stumble again and again', True,
+    gains={
+        'clearance_most': Gain(0.04, 0.2, 'm', 'the most by which a foot is lifted in mid-swing'),
+        'clearance_rise': Gain(0.02, 0.2, 's',
+                               'time for which a foot has to stumble until all are lifted so far'),
+        'clearance_memory': Gain(10.0, 100.0, 's', 'time constant with which the lift fades')},
+    memory={
+        'clearance_share': StateVariable('share of the largest lift')})
+
+
+@jit
+def stumbles(contact, swinging, progress):
+    """Return whether a foot in swing, a share of which is over, has hit something."""
+    return contact and swinging and STUMBLE < progress < EARLY
+
+
+@jit
+def update(before, stumbling, gains, dt):
+    """Return the share of the largest lift, dt in s later.
+
+    Args:
+        before: the same, dt earlier.
+        stumbling: how many feet stumble.
+        gains: of the law.
+        dt: s.
+
+    """
+    faded = before * math.exp(-dt / gains.clearance_memory)
+    if stumbling == 0.0:
+        # Nor is 0 divided by a rise of 0.
+        return faded
+    return min(faded + stumbling * dt / gains.clearance_rise, 1.0)
+
+
+@jit
+def lift(fraction, progress, gains):
+    """Return how far to draw in a foot, a share of whose swing is over, m."""
+    return fraction * gains.clearance_most * 4.0 * progress * (1.0 - progress)

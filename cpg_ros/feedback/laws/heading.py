@@ -1,0 +1,46 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Heading: a robot that has been turned away from its heading turns back."""
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.efference_copy import between_speeds
+from cpg_ros.feedback.kinematics import wrapped
+from cpg_ros.feedback.laws.law import Gain, Law
+
+LAW = Law(
+    'heading', 'hold the heading, by strides that differ between left and right', True,
+    gains={
+        'turn': Gain(1.0, 10.0, '1/s', 'yaw rate asked for per rad of heading error'),
+        'turn_most': Gain(0.6, 6.0, 'rad/s', 'the largest yaw rate asked for')})
+
+
+@jit
+def yaw_rate(wanted, yaw, gains):
+    """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
+    return min(max(gains.turn * wrapped(wanted - yaw), -gains.turn_most), gains.turn_most)
+
+
+@jit
+def response(speeds, yaw_rates, speed):
+    """Return the yaw rate for each unit by which right strides exceed left ones, rad/s.
+
+    Args:
+        speeds: of the steering table, m/s, rising, shape (rows,).
+        yaw_rates: at these, rad/s, shape (rows,).
+        speed: forward, m/s.
+
+    """
+    low, high, up = between_speeds(speeds, speed)
+    return yaw_rates[low] + up * (yaw_rates[high] - yaw_rates[low])

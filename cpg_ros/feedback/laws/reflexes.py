@@ -1,0 +1,88 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Reflexes: lift a foot over obstacles, reach for missing ground, stop where it lands early."""
+
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+
+LAW = Law(
+    'reflexes', 'lift feet over obstacles, and reach for ground that is missing', True,
+    gains={
+        'lift': Gain(0.06, 0.6, 'm',
+                     'how far a foot is lifted when it hits something in swing'),
+        'reach_rate': Gain(0.3, 3.0, 'm/s',
+                           'speed at which a foot that finds no ground in stance reaches for '
+                           'it'),
+        'reach_most': Gain(0.05, 0.5, 'm',
+                           'the most that a foot without ground reaches for it'),
+        'reflex_rate': Gain(8.0, 80.0, '1/s',
+                            'rate at which the lift, the reach and the height held after an '
+                            'early landing decay')},
+    memory={
+        'reflex_state': StateVariable('of each leg, see LIFT to LANDED', ('legs', 5))})
+
+#: Shares of the swing in which a foot may stumble, and from which on it may land early; before,
+#: it may still be on its way off the ground.
+STUMBLE, EARLY = 0.2, 0.65
+#: Share of the stance from which on a foot that has no ground reaches for it.
+MISSED = 0.1
+#: A foot that a lean lifts by more has its ground where it was, m.
+LEANS = 0.005
+#: Time in which a foot is lifted over what it hits, s.
+LIFTING = 0.01
+#: State of a foot's reflexes: the lift over an obstacle, the reach for the ground and the height
+#: held after an early landing, m; the height at which it landed early, m; whether it has.
+LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
+
+
+@jit
+def advance(state, contact, swinging, progress, height, lifted, gains, dt):
+    """Return how far to draw a foot in, m.
+
+    Args:
+        state: of its reflexes, shape (5,), changed in place.
+        contact: whether the foot is on the ground.
+        swinging: whether it is meant to be in the air.
+        progress: share of that swing, or else of its stance, that is over.
+        height: of the foot that is planned, base's frame, m.
+        lifted: by an unexpected lean, m.
+        gains: of the law.
+        dt: s.
+
+    """
+    fade = math.exp(-gains.reflex_rate * dt)
+    late = swinging and progress >= EARLY
+    if swinging and contact and STUMBLE < progress < EARLY:
+        state[LIFT] = min(state[LIFT] + gains.lift * dt / LIFTING, gains.lift)
+    elif late:
+        # Back to where the gait lands, or the leg were too short for the body's weight.
+        state[LIFT] = min(state[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
+    elif not swinging:
+        state[LIFT] *= fade
+    if not (swinging or contact) and progress > MISSED and lifted < LEANS:
+        state[REACH] = min(state[REACH] + gains.reach_rate * dt, gains.reach_most)
+    elif swinging:
+        state[REACH] *= fade
+    if late and contact and not state[LANDED]:
+        state[HEIGHT], state[LANDED] = height + max(state[LIFT], state[HELD]), 1.0
+    elif not late:
+        state[LANDED] = 0.0
+    if state[LANDED]:
+        state[HELD] = min(max(state[HEIGHT] - height, 0.0), gains.lift)
+    else:
+        state[HELD] *= fade
+    return max(state[LIFT], state[HELD]) - state[REACH]

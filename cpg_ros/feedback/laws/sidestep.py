@@ -1,0 +1,112 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sidestep: feet carry the body sideways while they stand, and step back while they swing.
+
+How fast that is depends on how the gait rocks the body, so the speed is corrected by an integral.
+A gait that turns drifts to the side, too, so that the same integral acts as far as a turn is
+commanded.
+"""
+
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.laws import placement
+from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+
+LAW = Law(
+    'sidestep', 'follow the sideways speed of cmd_vel', True,
+    gains={
+        'sidestep_share': Gain(1.1, 11.0, '',
+                               'share of the commanded sideways motion that feet carry out'),
+        'sidestep_most': Gain(0.08, 0.8, 'm', 'the most that a foot is carried sideways'),
+        'sidestep_rate': Gain(0.5, 5.0, '1/s',
+                              'how fast the sideways speed that feet are asked for is '
+                              'corrected by what is missing of it'),
+        'sidestep_more': Gain(1.0, 10.0, '',
+                              'largest such correction, as a share of the commanded sideways '
+                              'speed'),
+        'sidestep_turning': Gain(0.5, 5.0, 'm',
+                                 'and, while a turn is commanded, this times its rad/s'),
+        'sidestep_filter': Gain(0.5, 5.0, 's', 'time constant of the filter on that turn')},
+    memory={
+        'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
+        'sidestep_correction': StateVariable('added to the commanded sideways speed [m/s]'),
+        'commanded_turn': StateVariable('low-passed [rad/s]')})
+
+
+@jit
+def landing(wanted, stance, gains):
+    """Return the touchdown target of a foot, m to the left of the gait's own.
+
+    That is half of the distance that the body moves over the foot.
+
+    Args:
+        wanted: speed to the left, m/s.
+        stance: how long the foot will stand, s.
+        gains: of the law.
+
+    """
+    far = 0.5 * stance * gains.sidestep_share * wanted
+    return min(max(far, -gains.sidestep_most), gains.sidestep_most)
+
+
+@jit
+def carry(displacement, wanted, gains, dt):
+    """Return the displacement to the left of a foot on the ground, m, dt in s later."""
+    displacement -= dt * gains.sidestep_share * wanted
+    return min(max(displacement, -gains.sidestep_most), gains.sidestep_most)
+
+
+@jit
+def advance(displacement, swinging, wanted, stance, gains, dt):
+    """Return the displacement of a foot to the left, m, dt in s later.
+
+    Args:
+        displacement: now, m.
+        swinging: whether the foot is meant to be in the air.
+        wanted: speed to the left, m/s.
+        stance: how long the foot will stand, s.
+        gains: of the law.
+        dt: s.
+
+    """
+    if swinging:
+        return placement.in_swing(displacement, landing(wanted, stance, gains), gains, dt)
+    return carry(displacement, wanted, gains, dt)
+
+
+@jit
+def smooth_turn(turn, commanded, gains, dt):
+    """Return the low-passed turn, rad/s, dt in s later."""
+    return turn + (1.0 - math.exp(-dt / gains.sidestep_filter)) * (commanded - turn)
+
+
+@jit
+def correct_speed(correction, missing, wanted, turn, gains, dt):
+    """Return what to add to the commanded speed to the left, m/s, dt in s later.
+
+    0 where none is commanded, and no turn.
+
+    Args:
+        correction: so far, m/s.
+        missing: speed to the left, m/s.
+        wanted: commanded speed to the left, m/s.
+        turn: commanded, low-passed, rad/s.
+        gains: of the law.
+        dt: s.
+
+    """
+    most = gains.sidestep_more * abs(wanted) + gains.sidestep_turning * abs(turn)
+    return min(max(correction + dt * gains.sidestep_rate * missing, -most), most)

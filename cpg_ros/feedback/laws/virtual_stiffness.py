@@ -1,0 +1,92 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Virtual stiffness: servos that take positions only are stiff by targets that go too far.
+
+A servo turns its joint by kp (target - angle): with a target that is s times as far from the
+measured angle as the wanted one, its gain is s kp, and its damping stays. The angle is measured
+late, which destabilises a loop that is stiff by it, unlike a servo's own: it is left alone where
+measurements are too old, and acts for a limited time, after which it rests.
+"""
+
+from typing import Any
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+import numpy as np
+
+LAW = Law(
+    'virtual_stiffness', 'make servos that take no gains stiff, while stiffen would, by targets '
+    'that go too far', False,
+    gains={
+        'stiffen_distance': Gain(5.0 / 3.0, 3.0, '',
+                                 "factor of a target's distance from the measured angle while "
+                                 'servos are to be stiff', low=1.0),
+        'stiffen_longest': Gain(1.0, 10.0, 's', 'longest time for which this lasts'),
+        'stiffen_rest': Gain(1.0, 10.0, 's', 'time for which it rests after that'),
+        'stiffen_delay': Gain(0.01, 0.05, 's',
+                              'age of the measured angles above which it does not act')},
+    memory={
+        'virtual_spent': StateVariable('time for which it has acted; below 0, what is left of its '
+                                       'rest [s]')})
+
+
+@jit
+def acts(spent, stiff, delay, gains):
+    """Return whether targets go too far.
+
+    Args:
+        spent: see spend.
+        stiff: whether the law stiffen wants servos to be stiff.
+        delay: age of the measured angles, s.
+        gains: of the law.
+
+    """
+    return stiff and spent >= 0.0 and delay <= gains.stiffen_delay
+
+
+@jit
+def spend(spent, acting, gains, dt):
+    """Return for how long it has acted, s; below 0, what is left of its rest.
+
+    Args:
+        spent: the same, dt in s earlier.
+        acting: see acts.
+        gains: of the law.
+        dt: s.
+
+    """
+    if spent < 0.0:
+        return min(spent + dt, 0.0)
+    if not acting:
+        return max(spent - dt, 0.0)
+    return spent + dt if spent + dt < gains.stiffen_longest else -gains.stiffen_rest
+
+
+def targets(wanted: np.ndarray, measured: np.ndarray, acting: np.ndarray, gains: Any,
+            limits: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """Return what to send to joints, rad: targets that go too far where the law acts.
+
+    Limits of speed do not hold for them, as no joint is meant to get there.
+
+    Args:
+        wanted: angles within all limits, rad, shape (runs, joints).
+        measured: the same.
+        acting: whether the law acts, shape (runs,).
+        gains: of the law.
+        limits: lowest and highest angles, rad, shape (joints,) each.
+
+    """
+    far = np.clip(measured + gains.stiffen_distance * (wanted - measured), *limits)
+    return np.where(acting[:, None], far, wanted)

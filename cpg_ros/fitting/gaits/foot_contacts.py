@@ -1,0 +1,194 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stance and swing from the loads on the feet, and what they say of walk and run.
+
+A stride is from touchdown to touchdown; duty is the share of it in stance. In a walk a foot is on
+the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
+"""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError
+from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike
+import numpy as np
+
+#: A foot is on the ground where its load is more than this share of the way from its least to its
+#: largest load. If the least is more than this share of the largest, it is never lifted.
+LOADED, ALWAYS = 0.15, 0.5
+#: What counts as least and largest, percentiles.
+LEAST, LARGEST = 5.0, 95.0
+#: Contacts and lifts shorter than this share of a stride are those of a foot that bounces.
+BOUNCE = 0.08
+#: Touchdowns are at one phase if there are so many strides, and if single strides differ from most
+#: of them in no more than this share of the cycle; points of a cycle, and which samples are near.
+STRIDES, DISAGREE, POINTS, NEAR = 3.0, 0.15, 200, 0.02
+#: Fewest samples of a stride that tell stance from swing.
+FEWEST = 12
+#: Flight, as a share of the time, up to which legs walk, and from which on they run: a foot that
+#: is about to be lifted bears little.
+WALK, RUN = 0.1, 0.15
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FootContacts(ShortRepr):
+    """Which feet are on the ground.
+
+    Attributes:
+        legs: their names.
+        times: s, rising, shape (n,).
+        down: whether each foot bears a load, bool, shape (n, legs).
+
+    """
+
+    legs: tuple[str, ...]
+    times: np.ndarray
+    down: np.ndarray
+
+    def __str__(self) -> str:
+        duty = ', '.join(f'{leg} {fraction:.0%}' for leg, fraction in self.duty.items())
+        return f'{duty} of the time in stance, {self.flight:.0%} in flight'
+
+    def _summary(self) -> str:
+        return str(self)
+
+    @property
+    def duty(self) -> dict[str, float]:
+        """Share of the time in stance, for each leg."""
+        return dict(zip(self.legs, self.down.mean(axis=0).tolist(), strict=True))
+
+    @property
+    def flight(self) -> float:
+        """Share of the time without a foot on the ground."""
+        return float(1.0 - self.down.any(axis=1).mean())
+
+    @property
+    def gait(self) -> str | None:
+        """Walk or run, None where the flight is between theirs."""
+        return 'walk' if self.flight <= WALK else 'run' if self.flight >= RUN else None
+
+    def leads(self, phase: Callable[[np.ndarray], np.ndarray], legs: Sequence[str]
+              ) -> dict[str, float] | None:
+        """Return by how much each leg touches down before the first, cycles.
+
+        A leg touches down where it begins to stand in most strides: a stumble in one of them, or
+        a foot that bounces, moves nothing.
+
+        Args:
+            phase: of the stride, cycles, at times, s.
+            legs: names, in the order of the network.
+
+        Returns:
+            None for too few strides, and where a leg does not stand at one part of them.
+
+        """
+        cycles = phase(self.times)
+        if np.ptp(cycles) < STRIDES:
+            return None
+        point = (cycles % 1.0 * POINTS).astype(np.int64) % POINTS
+        grid = np.arange(POINTS) / POINTS
+        near = np.exp((np.cos(2.0 * np.pi * (grid[:, None] - grid)) - 1.0)
+                      / (2.0 * np.pi * NEAR)**2)
+        samples = near @ np.bincount(point, minlength=POINTS)
+        down = {}
+        for leg in legs:
+            stood = near @ np.bincount(point, self.down[:, self.legs.index(leg)], POINTS)
+            at = _touchdown(stood / samples)
+            if at is not None:
+                down[leg] = at
+        if len(down) < len(legs):
+            return None
+        return {leg: (down[legs[0]] - one) % 1.0 for leg, one in down.items()}
+
+    def strides(self, leg: str) -> np.ndarray:
+        """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
+        down = self.down[:, self.legs.index(leg)]
+        touched = self.times[1:][down[1:] & ~down[:-1]]
+        lifted = self.times[1:][~down[1:] & down[:-1]]
+        ends = touched[1:]
+        stance = lifted[np.searchsorted(lifted, touched[:-1])] if len(ends) else ends
+        return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
+
+
+def _touchdown(stands: np.ndarray) -> float | None:
+    """Return where the longest stance begins, cycles, given the share of strides that stand.
+
+    None where it is not clear when the leg stands: at most points strides have to agree.
+    """
+    most = stands > 0.5
+    if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
+        return None
+    begins = np.flatnonzero(most & ~np.roll(most, 1))
+    ends = np.flatnonzero(~most & np.roll(most, 1))
+    long = (ends[np.searchsorted(ends, begins) % len(ends)] - begins) % len(most)
+    k = int(begins[np.argmax(long)])
+    # Where the share passes a half.
+    before, after = stands[k - 1], stands[k]
+    return float((k - (after - 0.5) / (after - before)) / len(most))
+
+
+def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end: float,
+                  period: float) -> FootContacts | None:
+    """Find which feet are on the ground between two times.
+
+    None for too few samples, or if it does not follow from their names whose feet they are.
+
+    Args:
+        loads: on the feet, which are called as the legs or as joints of them, such as FR_force.
+        legs: names.
+        begin: s.
+        end: s.
+        period: of a stride, s.
+
+    """
+    named = _legs_named(loads.legs, legs)
+    if named is None:
+        return None
+    inside = (loads.times >= begin) & (loads.times <= end)
+    times, rows = loads.times[inside], loads.loads[inside]
+    if len(times) < FEWEST * (end - begin) / period or not np.isfinite(rows).all():
+        return None
+    least, largest = np.percentile(rows, [LEAST, LARGEST], axis=0)
+    level = np.where(least > ALWAYS * largest, -np.inf, least + LOADED * (largest - least))
+    down = rows > level
+    # A foot that bounces touches down once.
+    for state in (False, True):
+        for column in down.T:
+            for first, last in _short(column == state, times, BOUNCE * period):
+                column[first:last] = not state
+    return FootContacts(named, times, down)
+
+
+def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] | None:
+    """Return the leg of each foot by its name; None if there is not one foot for each leg."""
+    if set(legs) <= set(names):
+        return tuple(names)
+    try:
+        found = legs_of(names)
+    except LegsError:
+        return None
+    if set(found) != set(legs) or any(len(found[leg]) != 1 for leg in legs) or found.unassigned:
+        return None
+    return tuple(next(leg for leg in legs if name in found[leg]) for name in names)
+
+
+def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:
+    """Yield from where to where something is there for a short time, within the rest."""
+    edges = np.flatnonzero(np.diff(there)) + 1
+    for first, last in pairwise(edges.tolist()):
+        if there[first] and times[last] - times[first] < shortest:
+            yield first, last

@@ -1,0 +1,252 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which joint is of which leg, guessed from the usual names.
+
+Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
+BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
+in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Hexapods:
+besides LM or ML and RM or MR, or middle or mid for front: LMCoxa, left_middle_femur. Three pairs
+or more may be counted from the head on: L1_coxa ... R3_tibia. Bipeds: left, right, LT, RT, L or R
+alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll: LLEG_HIP_R.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+import re
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.networks.leg_numbers import leg_names
+
+#: Letters and words of left and right, fore and hind.
+SIDES = {'left': 'l', 'l': 'l', 'lt': 'l', 'right': 'r', 'r': 'r', 'rt': 'r'}
+ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h', 'middle': 'm',
+        'mid': 'm'}
+#: Codes of legs; in RL and RR the first letter is that of the rear.
+CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
+         'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
+         'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh',
+         'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
+#: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
+OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
+         'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
+UPPER = {'shoulder', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
+#: Names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
+JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
+          'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
+#: In the networks' order.
+HEXAPOD, QUADRUPED, BIPED = leg_names(6), leg_names(4), leg_names(2)
+
+_WORD = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
+#: A leg counted from the head on.
+_COUNTED = re.compile(r'(?<![a-z])([lr])([1-9])(?!\d)', re.IGNORECASE)
+_STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))',
+                    re.IGNORECASE)
+
+
+class LegsError(CpgError):
+    """No legs can be identified from the names; the message lists those there or missing."""
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Joints by leg.
+
+    Attributes:
+        joints: leg -> its joints' names, in the order in which they were given; legs in the
+            order of the networks.
+        explanation: how they were read, one line.
+        unassigned: joints of no leg.
+
+    """
+
+    joints: Mapping[str, tuple[str, ...]]
+    explanation: str = ''
+    unassigned: tuple[str, ...] = ()
+
+    def __getitem__(self, leg: str) -> tuple[str, ...]:
+        """Names of a leg's joints."""
+        return self.joints[leg]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the legs."""
+        return iter(self.joints)
+
+    def __len__(self) -> int:
+        """How many legs."""
+        return len(self.joints)
+
+
+def words_of(name: str) -> list[str]:
+    """Split a name into lower-case words: at signs, digits and capitals, and after a code."""
+    words = [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
+    side = next((k for k, word in enumerate(words) if word in SIDES), len(words))
+    return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
+
+
+def _moved(words: Sequence[str]) -> Sequence[str]:
+    """Return the words of what a joint moves: torso_to_abduct is no joint of the torso."""
+    return words[words.index('to') + 1:] if 'to' in words else words
+
+
+def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
+    """Return leg of four or six, leg of two ('' for none), and the words that name it."""
+    codes = {CODES[word] for word in words if word in CODES}
+    sides = {SIDES[word] for word in words if word in SIDES}
+    ends = {ENDS[word] for word in words if word in ENDS}
+    if len(codes) == 1:
+        return codes.pop(), '', frozenset(word for word in words if word in CODES)
+    if codes or len(sides) != 1:
+        return '', '', frozenset()
+    side, words_used = sides.pop(), frozenset(word for word in words if word in SIDES)
+    two = BIPED[side == 'r']
+    if len(ends) == 1:
+        return side + ends.pop(), two, words_used | {word for word in words if word in ENDS}
+    return '', two, words_used
+
+
+def role_of(name: str) -> str:
+    """Return a joint's name without its leg: equal for the same joint of each leg."""
+    counted, rest = _COUNTED.findall(name), _COUNTED.sub('', name)
+    if len(counted) == 1 and any(sign.isalpha() for sign in rest):
+        return ' '.join(words_of(rest))
+    words = words_of(name)
+    words_used = _read(words)[2]
+    return ' '.join(word for word in words if word not in words_used)
+
+
+def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
+    """Guess the legs of joints from their names.
+
+    Args:
+        joints: names.
+        whole: these are all that the robot has, so that one with FL and FR alone is a biped.
+
+    Raises:
+        LegsError: no leg, or not all of two, four or six legs can be identified, or they are of
+            two robots.
+
+    """
+    counted = _counted(joints)
+    if counted:
+        words_used = {name: ('', '',
+                             frozenset(_COUNTED.findall(name)[0])) for names in counted.values()
+                      for name in names}
+        return Legs(counted, _explanation(counted, words_used, joints), _rest(counted, joints))
+    _refuse_two(joints)
+    words = {name: words_of(name) for name in joints}
+    read = {name: _read(words[name]) for name in joints}
+    # A code is a name's own, an L a hint: first four legs are looked for, or six.
+    more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
+    for known, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
+        found = {leg: tuple(name for name in joints if read[name][column] == leg
+                            and not others & set(_moved(words[name]))) for leg in known}
+        there = [leg for leg in known if found[leg]]
+        if len(there) == len(known):
+            break
+        if whole and column == 0 and [leg[0] for leg in sorted(there)] == ['l', 'r']:
+            found = dict(zip(BIPED, (found[leg] for leg in sorted(there)), strict=True))
+            break
+        # Two codes may be left and right of a biped by chance, three are a quadruped's.
+        if column == 0 and len(there) >= 2 and not _directions(there, read, joints):
+            raise LegsError(_missing(there, known, read, joints))
+    else:
+        if there:
+            raise LegsError(_missing(there, known, read, joints))
+        raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
+                        'usually contain LF, RF, LH, RH, front_left ... or left, right')
+    return Legs(found, _explanation(found, read, joints), _rest(found, joints))
+
+
+def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the joints of legs that are counted, L1 R1 L2 ...; nothing if they are not.
+
+    Of joints that are counted each number is there once; of legs it has the same joints as others.
+    """
+    found: dict[tuple[str, int], list[str]] = {}
+    for name in joints:
+        words_used = _COUNTED.findall(name)
+        if len(words_used) == 1:
+            found.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
+    pairs = len(found) // 2
+    roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in found.values()}
+    wanted = {(side, k + 1) for side in 'lr' for k in range(pairs)}
+    if pairs < 3 or set(found) != wanted or len(roles) > 1 or len(next(iter(roles))) < 2:
+        return {}
+    order = [(side, k) for k in range(pairs, 0, -1) for side in 'lr']
+    return {leg: tuple(found[one]) for leg, one in zip(leg_names(2 * pairs), order, strict=True)}
+
+
+def _refuse_two(joints: Sequence[str]) -> None:
+    """Refuse names that differ by what is before the leg's, and are the same otherwise."""
+    robots: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
+    for name in joints:
+        words = words_of(name)
+        words_used = _read(words)[2]
+        place = next((k for k, word in enumerate(words) if word in words_used), 0)
+        if place and not set(words[:place]) & set(JOINTS):
+            robots.setdefault(tuple(words[:place]), {})[tuple(words[place:])] = name
+    for first, own in robots.items():
+        # Of a single joint a leg the word before may tell which joint it is.
+        roles = {tuple(word for word in rest if word not in _read(rest)[2]) for rest in own}
+        other = next((one for key, one in robots.items() if key != first
+                      and set(one) == set(own)), None)
+        if other is not None and len(roles) > 1:
+            raise LegsError('joints of two robots are there, such as '
+                            f"'{next(iter(own.values()))}' and '{next(iter(other.values()))}'; "
+                            'name those of one (--joints)')
+
+
+def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
+    """Tell whether the front of right_hip_front is a direction, as beside right_knee.
+
+    It is where joints of no end have names that those of the only end do not have.
+    """
+    ended = [name for name in joints if read[name][0] in there]
+    plain = {role_of(name) for name in joints if read[name][1] and not read[name][0]
+             and not (OTHER | UPPER) & set(words_of(name))}
+    return (len({leg[1] for leg in there}) == 1 and all(read[name][1] for name in ended)
+            and bool(plain) and plain.isdisjoint(map(role_of, ended)))
+
+
+def _rest(found: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in joints if not any(name in listed for listed in found.values()))
+
+
+def _listed(names: list[str]) -> str:
+    shown = ', '.join(names[:6])
+    return f'{shown} and {len(names) - 6} more' if len(names) > 6 else shown or '(none)'
+
+
+def _missing(there: list[str], known: tuple[str, ...], read: Mapping, joints: Sequence[str]
+             ) -> str:
+    lacking = ', '.join(leg for leg in known if leg not in there)
+    column = 1 if known == BIPED else 0
+    example = next(name for name in joints if read[name][column] in there)
+    return (f"joints of the legs {', '.join(there)} are there (such as '{example}'), but none of "
+            f'{lacking}')
+
+
+def _explanation(found: Mapping[str, tuple[str, ...]], read: Mapping,
+                 joints: Sequence[str]) -> str:
+    parts = []
+    for leg, names in found.items():
+        words_used = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
+                             for name in names})
+        shown = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
+        parts.append(f"{leg} by '{' or '.join(words_used)}' ({len(names)} joint"
+                     f"{'s' if len(names) > 1 else ''}: {shown})")
+    rest = _rest(found, joints)
+    return ('legs read from the names: ' + '; '.join(parts)
+            + (f'; of no leg: {_listed(list(rest))}' if rest else ''))

@@ -1,0 +1,442 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Phases between legs from their mean cycles, and the gait that they make.
+
+A leg is ahead of another by the shift at which the same joints of both are most alike (circular
+cross-correlation of all of them). An angle may be counted in the opposite sense in another leg,
+as abduction is; the mean angles, or the sense that makes the waveforms more alike, decide.
+Legs with other joints, such as an animal's fore and hind ones, are compared by the first
+harmonic of the joint that moves most: half a cycle is then uncertain, as it is unknown which sense
+of an elbow corresponds to that of a knee. Insects' legs are compared by their feet (insect_legs).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cpg_ros.fitting.gaits.foot_contacts import FootContacts
+from cpg_ros.fitting.gaits.leg_names import HEXAPOD, role_of
+from cpg_ros.fitting.gaits.mean_cycle import blocks, PhaseAverage
+from cpg_ros.fitting.gaits.recognition import best_shift, recognise
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
+import numpy as np
+from scipy.special import stdtrit
+
+# How steadily legs keep their phases: by how much each is early or late in every stride.
+
+#: Share of a whole stride's slope that a stride must have for its phase to be estimated.
+ENOUGH = 0.5
+#: Fewest strides from which a scatter is estimated.
+STRIDES = 3
+
+
+@dataclass(frozen=True)
+class PhaseScatter:
+    """How well the phase of a leg against the first one is known, and kept.
+
+    Attributes:
+        spread: standard deviation of single strides, cycles; nan if there are too few.
+        error: standard error of the mean, cycles; nan as well.
+        half_width: of its 95 % interval (Student), cycles; nan as well.
+        strides: how many were used.
+
+    """
+
+    spread: float
+    error: float
+    half_width: float
+    strides: int
+
+
+def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
+                  legs: Mapping[str, Sequence[str]], names: Sequence[str]
+                  ) -> dict[str, PhaseScatter]:
+    """Find how the phases of the legs against the first one scatter from stride to stride.
+
+    Args:
+        phases: of the samples, cycles, rising, shape (n,).
+        x: rad, nan where missing, shape (n, joints).
+        found: the mean cycles of these samples.
+        legs: leg -> its joints, the first leg first.
+        names: of the joints, in the order of x.
+
+    Returns:
+        Leg -> scatter; zeros for the first leg, the reference of all.
+
+    """
+    theta = phases - found.zero
+    stride = np.floor(theta - theta[0]).astype(int)
+    count = int(stride[-1]) + 1
+    order = np.arange(len(found.coefficients))[:, None]
+    turned = replace(found, coefficients=2j * np.pi * order * found.coefficients)
+    along, power = np.zeros((2, len(legs), count))
+    for part in blocks(phases):
+        there = np.isfinite(x[part])
+        slopes = np.where(there, turned.mean(theta[part]).T, 0.0)
+        left = np.where(there, x[part] - found.mean(theta[part]).T, 0.0)
+        for row, joints in enumerate(legs.values()):
+            columns = [names.index(name) for name in joints]
+            for sums, one in ((along, left), (power, slopes)):
+                sums[row] += np.bincount(
+                    stride[part], np.sum(one[:, columns] * slopes[:, columns], axis=1), count)
+    reliable = power > ENOUGH * np.median(power, axis=1, keepdims=True)
+    early = np.full_like(along, np.nan)
+    early[reliable] = along[reliable] / power[reliable]
+    return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
+
+
+def _scatter(early: np.ndarray) -> PhaseScatter:
+    reliable = early[np.isfinite(early)]
+    if reliable.size < STRIDES:
+        return PhaseScatter(np.nan, np.nan, np.nan, reliable.size)
+    spread = float(reliable.std(ddof=1))
+    error = spread / np.sqrt(reliable.size)
+    return PhaseScatter(spread, error, float(stdtrit(reliable.size - 1, 0.975)) * error,
+                        reliable.size)
+
+
+# The feet of insects from the angles of their joints: which leg steps when.
+
+#: What joints are called there, or as in DeepFly3D, in the order in which they turn a leg.
+JOINTS = (('coxayaw', 'thcyaw'), ('coxa', 'coxapitch', 'thcpitch'), ('coxaroll', 'thcroll'),
+          ('femur', 'femurpitch', 'ctrpitch'), ('femurroll', 'ctrroll'),
+          ('tibia', 'tibiapitch', 'ftipitch'))
+AXES = 'xyzyzy'
+#: Coxa, femur, and tibia with tarsus of a fruit fly's fore, middle and hind legs, mm; joint after
+#: which each begins.
+LENGTHS = {'f': (0.40, 0.69, 1.17), 'm': (0.18, 0.78, 1.24), 'h': (0.20, 0.83, 1.39)}
+BEGINS = (2, 4, 5)
+#: Points of a cycle.
+POINTS = 128
+
+
+def _roles(joints: Sequence[str]) -> list[str]:
+    """Return a leg's joints in the order of JOINTS; nothing if one is missing."""
+    known = {role_of(name).replace(' ', '').removeprefix('joint'): name for name in joints}
+    found = [next((known[one] for one in names if one in known), '') for names in JOINTS]
+    return found if all(found) else []
+
+
+def _turn(axis: str, angle: np.ndarray) -> np.ndarray:
+    """Matrices of turns about an axis, shape (n, 3, 3)."""
+    i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
+    found = np.tile(np.eye(3), (angle.size, 1, 1))
+    found[:, i, i] = found[:, j, j] = np.cos(angle)
+    found[:, j, i], found[:, i, j] = np.sin(angle), -np.sin(angle)
+    return found
+
+
+def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
+    """Return where a foot is, from the thorax, mm, shape (n, 3).
+
+    Args:
+        angles: rad, of each joint in the order of JOINTS, shape (n,).
+        pair: f, m or h.
+
+    """
+    turned, place = np.tile(np.eye(3), (angles[0].size, 1, 1)), np.zeros((angles[0].size, 3))
+    for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
+        turned = turned @ _turn(axis, angle)
+        if k in BEGINS:
+            place = place - LENGTHS[pair][BEGINS.index(k)] * turned[:, :, 2]
+    return place
+
+
+def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
+                ) -> dict[str, float] | None:
+    """Find by how much each foot is ahead of the first one on its way along the body.
+
+    Args:
+        legs: leg -> its joints.
+        c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
+
+    Returns:
+        Leg -> phase in cycles, [0, 1), by the first harmonic; None if these are not six legs with
+        all the joints.
+
+    """
+    roles = {leg: _roles(joints) for leg, joints in legs.items()}
+    if set(legs) != set(HEXAPOD) or not all(roles.values()):
+        return None
+    turns = np.exp(2j * np.pi * np.outer(np.arange(POINTS) / POINTS,
+                                         np.arange(next(iter(c.values())).size)))
+    turns[:, 1:] *= 2.0
+    forward = {leg: np.fft.rfft(foot([(turns @ c[name]).real for name in names], leg[1])[:, 0])[1]
+               for leg, names in roles.items()}
+    first = next(iter(forward.values()))
+    return {leg: round(float(np.angle(one / first)) / (2.0 * np.pi) % 1.0, 9) % 1.0
+            for leg, one in forward.items()}
+
+
+#: Joints whose mean angles are this much larger than what they move by RMS have a sign.
+SIGNED = 1.0
+#: Correlations that differ by more decide the sense of a joint.
+CLEARER = 0.2
+#: A joint that moves by less than this share of the variance of another decides no leg's phase.
+TELLING = 0.05
+#: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
+SCATTER = 0.06
+#: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
+BY_CELLS, SAMPLES = 0.2, 128
+
+
+@dataclass(frozen=True)
+class GaitMatch:
+    """Which gait it is.
+
+    Attributes:
+        gait: None if no gait is near enough.
+        nearest: the nearest one.
+        distance: of that, in cycles: RMS over the legs after the best common shift.
+        margin: how much further the next distinct gait is, cycles.
+        alike: gaits that cannot be distinguished from the nearest, itself among them.
+        sure: probability that it is the nearest and no other, by the scatter of legs' phases.
+        notes: one line each.
+
+    """
+
+    gait: str | None
+    nearest: str
+    distance: float
+    margin: float
+    alike: tuple[str, ...]
+    sure: float
+    notes: tuple[str, ...]
+
+
+def _cross(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
+    """Return the terms of the cross-correlation of two joints, shape (n + 1,)."""
+    terms = ahead * behind.conj()
+    terms[0] = 0.0
+    return terms
+
+
+def _power(c: np.ndarray) -> float:
+    return float(np.sum(np.abs(c[1:])**2))
+
+
+def _sense(a: np.ndarray, b: np.ndarray) -> float:
+    """Return 1 if two joints count angles in the same sense, -1 if not, 0 if unknown."""
+    levels, sizes = (a[0].real, b[0].real), np.sqrt([2.0 * _power(a), 2.0 * _power(b)])
+    if all(abs(level) > SIGNED * size for level, size in zip(levels, sizes, strict=True)):
+        return float(np.sign(levels[0] * levels[1]))
+    terms = _cross(a, b)
+    gain = best_shift(terms)[1] - best_shift(-terms)[1]
+    gain /= max(np.sqrt(_power(a) * _power(b)), 1e-300)
+    return float(np.sign(gain)) if abs(gain) > CLEARER else 0.0
+
+
+def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
+    """Pair joints of two legs: by what they are called but for the leg, or by number."""
+    roles = {role_of(name): name for name in first}
+    found = [(roles[role_of(name)], name) for name in other if role_of(name) in roles]
+    bare = {''.join(sign for sign in role_of(name) if sign.isalpha() or sign == ' ').strip()
+            for name in (*first, *other)}
+    if not found and len(bare) == 1 and len(first) == len(other):
+        return list(zip(first, other, strict=True))
+    return found
+
+
+def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
+               ) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
+    """Find by how much each leg is ahead of the first one.
+
+    Args:
+        legs: leg -> its joints, the first leg first.
+        c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
+
+    Returns:
+        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; legs whose
+        phase may be half a cycle off, as the sense of their angles is unknown; and joints
+        that count angles in the opposite sense of the first leg's.
+
+    """
+    feet = foot_phases(legs, c)
+    if feet is not None:
+        return feet, ('phases between legs are those of their feet along the body, by the joints '
+                      'of a fly',), (), ()
+    phases: dict[str, float] = {}
+    notes: list[str] = []
+    opposite: list[str] = []
+    vague: list[str] = []
+    for leg, joints in legs.items():
+        if not phases:
+            phases[leg] = 0.0
+            continue
+        # The first leg that has the same joints; or else the first one.
+        base, pairs = next(((known, found) for known in phases
+                            if (found := _pairs(legs[known], joints))), ('', []))
+        if pairs:
+            ahead, mirrored, sense_known = _shift(pairs, c)
+            opposite += mirrored
+            vague += [] if sense_known else [leg]
+        else:
+            base = next(iter(phases))
+            most = [max(names, key=lambda name: np.abs(c[name][1]))
+                    for names in (legs[base], joints)]
+            ahead = float(np.angle(c[most[1]][1] / c[most[0]][1])) / (2.0 * np.pi)
+            notes.append(f'{leg} has no joint named like one of {base}: its phase is that of '
+                         f'{most[1]} against {most[0]}, half a cycle off if their senses differ')
+            vague.append(leg)
+        # What is hardly below a whole cycle is none.
+        phases[leg] = round((phases[base] + ahead) % 1.0, 9) % 1.0
+    if opposite:
+        notes.append(f'taken to count angles in the opposite sense of {next(iter(legs))}: '
+                     f'{", ".join(opposite)}')
+    return phases, tuple(notes), tuple(vague), tuple(opposite)
+
+
+def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
+           ) -> tuple[float, list[str], bool]:
+    """Return by how much the second of each pair is ahead of the first, all together.
+
+    And the joints that count angles in the opposite sense, and whether any joint's sense is known.
+    """
+    power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
+    least = TELLING**2 * max(power.values())
+    senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
+    # Those whose sense is known come first: the others have to agree with them.
+    pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
+                                            -power[pair]))
+    sense_known = bool(senses[pairs[0]])
+    total: np.ndarray | None = None
+    mirrored = []
+    for first, other in pairs:
+        terms = _cross(c[other], c[first])
+        sense = senses[first, other]
+        if total is None:
+            sense = sense or 1.0
+            total = np.zeros_like(terms)
+        elif not sense:
+            # As agrees with those that move more.
+            turn = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
+            sense = 1.0 if np.sum(terms * turn).real >= 0.0 else -1.0
+        if sense < 0.0:
+            mirrored.append(other)
+        total = total + sense * terms
+    assert total is not None
+    return best_shift(total)[0], mirrored, sense_known
+
+
+def _symmetry(network: type[Network], gait: str) -> Any:
+    return network.presets()[gait].network.symmetry(gait)
+
+
+def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
+    """Tell whether the gait with all shifts turned round is another one of the network's."""
+    turned = {name: -shift % 1 for name, shift in symmetry.shifts}
+    others = [_symmetry(network, other) for other in network.gaits() if other != gait]
+    # Of another group it has names of its own for what shifts: by the phases, then.
+    return any(dict(other.shifts) == turned if other.group == symmetry.group
+               else np.allclose(other.phases, -symmetry.phases % 1.0) for other in others)
+
+
+def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
+    """Distance of leg phases; between different waveforms any phase will do."""
+    squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
+               * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
+    return float(np.sqrt(sum(squares) / phases.size))
+
+
+def _odds(nearest: float, other: float, legs: int) -> float:
+    """Odds of a gait against the nearest one, from the distances of both."""
+    return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / SCATTER**2))
+
+
+def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch:
+    """Name the gait of leg phases.
+
+    Of several gaits within the tolerance the most symmetric is meant: every walk is a skip, too.
+
+    Args:
+        phases: leg -> cycles, in the order of the network's legs.
+        network: whose gaits.
+
+    """
+    own = np.array(list(phases.values()))
+    cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
+    apart, size = {}, {}
+    for gait in (one for one in network.gaits() if one != network.unnamed):
+        symmetry = _symmetry(network, gait)
+        wanted, waves = symmetry.phases[cells], symmetry.waves[cells]
+        if symmetry.leads:
+            # Stated, in either sense, between whatever waveforms.
+            apart[gait], size[gait] = _apart(own, wanted, np.zeros_like(waves)), 0
+            continue
+        apart[gait] = _apart(own, wanted, waves)
+        # A wave that runs round may do so in both senses, where these are not two gaits.
+        if not _reversed(network, gait, symmetry):
+            apart[gait] = min(apart[gait], _apart(own, -wanted, waves))
+        size[gait] = -symmetry.waves.max()
+    fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
+    nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
+    # Others with the same phases of the legs; less constrained ones never fit worse.
+    same = [gait for gait in fits if size[gait] == size[nearest]
+            and abs(apart[gait] - apart[nearest]) < 1e-9]
+    margin = min((apart[gait] for gait in apart if gait not in same
+                  and size[gait] >= size[nearest]), default=np.inf) - apart[nearest]
+    rivals = [gait for gait in apart if gait != nearest and size[gait] >= size[nearest]]
+    odds = [_odds(apart[nearest], apart[gait], own.size) for gait in rivals]
+    notes = []
+    if len(same) > 1:
+        notes.append(f"the legs move alike in {', '.join(same)}: only which of a leg's cells "
+                     'drives which joint tells them apart')
+    order = [leg for leg, _ in sorted(phases.items(), key=lambda item: -item[1] % 1.0)]
+    if nearest == 'walk' and len(order) == len(network.girdles) == 4:
+        # After a hind leg comes the fore one of its side, or the other; after a fore one not.
+        beside = network.sides[order[1]] == network.sides[order[0]]
+        kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
+        notes.append(f'{kind} sequence: {", ".join(order).upper()}')
+    return GaitMatch(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
+                     margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
+
+
+def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
+    """Name the gait of the signals of all cells, by their symmetry.
+
+    Args:
+        c: Fourier coefficients of the cells' mean cycles, complex, shape (n + 1, cells).
+        network: whose gaits.
+
+    """
+    table = {gait: _symmetry(network, gait) for gait in network.gaits()}
+    places = np.arange(2 * SAMPLES + 1) / SAMPLES
+    turned = np.exp(2j * np.pi * np.outer(places, np.arange(len(c))))
+    turned[:, 1:] *= 2.0
+    group = next(iter(table.values())).group
+    found = recognise(places, (turned @ c).real, group, table, 1.0, BY_CELLS)
+    # What a wave is off from itself that is early by the distance.
+    distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
+                        for size in (found.distance, found.distance + found.margin))
+    return GaitMatch(found.name, found.nearest, distance, second - distance, (found.nearest,),
+                     1.0 / (1.0 + _odds(distance, second, network.cells)), ())
+
+
+def match_gait_by_contacts(match: GaitMatch, contacts: FootContacts) -> GaitMatch:
+    """Tell walk from run by the feet's contacts, where the legs move alike in both.
+
+    Args:
+        match: by the legs' phases.
+        contacts: of the feet.
+
+    """
+    gait = contacts.gait
+    if set(match.alike) != {'walk', 'run'} or gait is None:
+        return match
+    # The other one was a rival with even odds.
+    return replace(match, gait=match.gait and gait, nearest=gait, alike=(gait,),
+                   sure=1.0 / (1.0 / match.sure - 1.0),
+                   notes=(f'{gait}, by the loads on the feet: {contacts}',))

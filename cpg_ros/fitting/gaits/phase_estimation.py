@@ -1,0 +1,337 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Time to stride phase: where in its cycle a motion is that is never quite as fast as before.
+
+Roughly from the first harmonic of all signals together: their complex amplitudes in a sliding
+window of one period have, in a steady gait, one direction, and how far they have turned along it
+is the phase. Then finely, with all harmonics: the phase is linear between knots, one a cycle, and
+fitted with the mean cycle in turn (Gauss-Newton). With few cycles it is linear throughout.
+"""
+
+from dataclasses import dataclass
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.fitting.gaits.mean_cycle import (
+    blocks,
+    evaluate_series,
+    fit_series,
+    mean_weights,
+    rows_of,
+)
+from cpg_ros.fitting.gaits.steady_stretch import longest_run, resample_evenly, Stretch
+import numpy as np
+from scipy.linalg import solveh_banded
+
+#: Blocks in a period, a window begins at each of them, and points in a block.
+BLOCKS, POINTS = 8, 4
+#: Steady is what has at least this share of the typical amplitude,
+WEAKEST = 0.4
+#: at most this many times it,
+STRONGEST = 2.5
+#: a stride duration within this share of the median,
+TOLERANCE = 0.15
+#: and this share of the motion in the typical direction, 1/4 for a walk against a trot.
+ALIKE = 0.5
+#: At its ends a stretch has no stride that leaves more than this many times the median RMS that
+#: strides leave of the mean one, if it is this share of the motion at all.
+ODD, MARKED = 3.0, 0.05
+#: or whose rate is this many times the median deviation off the median, if it is this share of it.
+ODD_RATE, MARKED_RATE = 4.5, 0.03
+#: Harmonics that fix the phase, and most of its cycles without own knots.
+HARMONICS, FEW = 8, 4.0
+#: Variance of the phase at an end, over that of strides' lengths (found by simulation: strides of
+#: 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
+HASTE = 0.08
+#: Fewest rates in which a drift is separated from wander.
+DRIFTS = 12
+#: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
+STEPS, FARTHEST = 6, 0.1
+#: Weight of a knot's neighbours where there are no data around it.
+STIFFNESS = 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhaseEstimate(ShortRepr):
+    """The phase of a motion, linear between knots.
+
+    Attributes:
+        knots: s, rising, shape (k,); the first and last are where the motion begins and ends.
+        phases: in cycles, shape (k,).
+        frequency: mean, Hz.
+        frequency_error: its standard error, Hz.
+
+    """
+
+    knots: np.ndarray
+    phases: np.ndarray
+    frequency: float
+    frequency_error: float
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """Return the phases in cycles at times within."""
+        return np.interp(times, self.knots, self.phases)
+
+    @property
+    def cycles(self) -> float:
+        """How many cycles it holds."""
+        return float(self.phases[-1] - self.phases[0])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RoughPhase(ShortRepr):
+    """The rough phase of a stretch: at times (c,), s, in cycles (c,)."""
+
+    begin: float
+    end: float
+    times: np.ndarray
+    phases: np.ndarray
+
+
+def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> RoughPhase:
+    """Follow the phase from a stretch onwards, both ways, as long as the motion stays alike.
+
+    Args:
+        times: rising, s, shape (n,).
+        positions: shape (n, joints), nan where missing.
+        seed: where the motion repeats.
+
+    """
+    step = seed.period / (BLOCKS * POINTS)
+    grid, y = resample_evenly(times, positions, 1.0 / step)
+    step = grid[1] - grid[0]
+    period = BLOCKS * POINTS * step
+    blocks = len(y) // POINTS
+    parts = y[:blocks * POINTS].reshape(blocks, POINTS, -1)
+    turn = np.exp(-2j * np.pi * np.arange(blocks * POINTS).reshape(blocks, POINTS)
+                  / (BLOCKS * POINTS))
+    sums = np.concatenate([np.zeros((1, y.shape[1])),
+                           np.cumsum(np.einsum('bp,bpj->bj', turn, parts), axis=0)])
+    z = sums[BLOCKS:] - sums[:-BLOCKS]
+    middles = grid[0] + (np.arange(len(z)) + 0.5 * BLOCKS) * POINTS * step - 0.5 * step
+    inside = ((middles >= seed.begin + 0.499 * period) & (middles <= seed.end - 0.499 * period))
+    if not inside.any():
+        inside = np.abs(middles - 0.5 * (seed.begin + seed.end)) <= period
+    # The first principal direction.
+    direction = np.linalg.eigh(z[inside].T @ z[inside].conj())[1][:, -1]
+    along = z @ direction.conj()
+    sizes = np.abs(along)
+    phases = (middles - grid[0]) / period + np.unwrap(np.angle(along)) / (2.0 * np.pi)
+    half = BLOCKS // 2
+    ahead = np.minimum(np.arange(len(z)) + half, len(z) - 1)
+    behind = np.maximum(np.arange(len(z)) - half, 0)
+    rates = (phases[ahead] - phases[behind]) / np.maximum(middles[ahead] - middles[behind],
+                                                          1e-300)
+    typical, rate = np.median(sizes[inside]), np.median(rates[inside])
+    steady = ((sizes >= WEAKEST * typical) & (sizes <= STRONGEST * typical)
+              & (sizes**2 >= ALIKE * np.einsum('bj,bj->b', z, z.conj()).real))
+    if len(z) > BLOCKS:
+        steady &= np.abs(rates / rate - 1.0) <= TOLERANCE
+    first, last = longest_run(steady & _joined(steady, inside)) or (0, len(z) - 1)
+    # What is left of a block at the end of the recording is no reason to stop there.
+    end = times[-1] if last == len(z) - 1 else middles[last] + 0.5 * period
+    return RoughPhase(max(middles[first] - 0.5 * period, times[0]), min(end, times[-1]),
+                      middles[first:last + 1], phases[first:last + 1])
+
+
+def _joined(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Mark the runs of steady places that hold one of those inside."""
+    number = np.cumsum(np.diff(steady, prepend=False))
+    return np.isin(number, number[steady & inside])
+
+
+def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) -> PhaseEstimate:
+    """Fit the phase to all harmonics of a stretch.
+
+    Args:
+        times: rising, s, shape (n,).
+        positions: shape (n, joints), nan where missing.
+        rough: the stretch.
+
+    """
+    slope, level = (np.polyfit(rough.times - rough.begin, rough.phases, 1)
+                    if rough.times.size > 1 else (1.0, 0.0))
+    # Plain numbers: what is fitted is written to files that know no others.
+    span = float(rough.end - rough.begin)
+    within = index_range(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
+    grid, y = resample_evenly(times[within], positions[within], BLOCKS * POINTS * slope)
+    inside = index_range(grid, rough.begin, rough.end)
+    grid, x = grid[inside] - rough.begin, y.T[:, inside]
+    if span * slope < FEW:
+        phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
+        return PhaseEstimate(np.array([rough.begin, rough.end]), phases,
+                             float(phases[1] - phases[0]) / span, error)
+    knots = np.linspace(0.0, span, round(span * slope) + 1)
+    phases = _extended(knots + rough.begin, rough.times, rough.phases, slope)
+    while True:
+        phases = _bent(grid, x, knots, phases)
+        first, last = _steady(grid, x, knots, phases)
+        if last - first == knots.size - 2 or phases[last + 1] - phases[first] < FEW:
+            break
+        knots, phases = knots[first:last + 2], phases[first:last + 2]
+        inside = index_range(grid, knots[0], knots[-1])
+        grid, x = grid[inside], x[:, inside]
+    frequency, error = _mean_rate(knots, phases)
+    return PhaseEstimate(knots + rough.begin, phases, frequency, error)
+
+
+def index_range(times: np.ndarray, begin: float, end: float) -> slice:
+    """Return where rising times are from one to another, both included."""
+    return slice(int(np.searchsorted(times, begin)),
+                 int(np.searchsorted(times, end, side='right')))
+
+
+def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
+    """Return the mean rate of the stretch and its standard error.
+
+    Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
+    between knots vary by 2 q/3 + 2 s and with their neighbours by q/6 - s: s is the variance of
+    the errors, q that of strides, as knots lie anywhere in these. A drift is set apart. The mean
+    of least variance gives all rates the same weight where they only wander, and is the slope of
+    a straight line where they do not.
+
+    What is meant is the mean over this very stretch, strides that happened to be quick and all:
+    in error are the phases at the knots, the weights where they are not those of that mean, and
+    the phases at the ends, since a straight piece of phase does not follow a stride's own haste.
+    """
+    rates = np.diff(phases) / np.diff(knots)
+    n = rates.size
+    off, free = rates - rates.mean(), n - 1
+    if n >= DRIFTS:
+        place = np.arange(n) - 0.5 * (n - 1)
+        off, free = off - place * (place @ rates) / (place @ place), n - 2
+    own = float(off @ off) / max(free, 1)
+    next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
+    errors = min(max((0.25 * own - next_) / 1.5, 0.0), 0.499 * own)
+    wander = 1.5 * (own - 2.0 * errors)
+    if own <= 0.0:
+        return float(rates.mean()), 0.0
+    bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, own)])
+    weights = solveh_banded(bands, np.ones(n))
+    weights /= weights.sum()
+    uneven, steps = weights - 1.0 / n, np.diff(weights, prepend=0.0, append=0.0)
+    variance = (errors * (steps @ steps)
+                + wander * (2.0 * (uneven @ uneven) + uneven[1:] @ uneven[:-1]) / 3.0
+                + 2.0 * HASTE * wander / n**2)
+    return float(weights @ rates), float(np.sqrt(max(variance, 0.0)))
+
+
+def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:
+    """Interpolate phases, and continue them with a slope."""
+    inner = np.interp(at, times, phases)
+    return inner + slope * (np.minimum(at - times[0], 0.0) + np.maximum(at - times[-1], 0.0))
+
+
+def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit the mean cycle; return what it leaves, and its slope by phase."""
+    weights = mean_weights(x, phases, HARMONICS)
+    n = 2.0 * np.pi * np.arange(1, HARMONICS + 1)[:, None]
+    turned = np.vstack([0.0 * weights[:1], n * weights[1 + HARMONICS:],
+                        -n * weights[1:1 + HARMONICS]])
+    left, slope = np.empty_like(x), np.empty_like(x)
+    for part in blocks(phases):
+        rows = rows_of(phases[part], HARMONICS)
+        left[:, part] = x[:, part] - evaluate_series(weights, rows)
+        slope[:, part] = evaluate_series(turned, rows)
+    return left, slope
+
+
+def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
+              ) -> tuple[np.ndarray, float]:
+    """Fit a constant rate with the mean cycle projected out; return phases and error."""
+    centred = grid - 0.5 * span
+    for _ in range(2 * STEPS):
+        at = np.interp(grid, [0.0, span], phases)
+        left, slope = _model(x, at)
+        by_rate, rows = centred * slope, rows_of(at, HARMONICS)
+        by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
+        power = float(np.sum(by_rate * by_rate))
+        step = float(np.sum(by_rate * left)) / max(power, 1e-300)
+        step = float(np.clip(step, -FARTHEST / span, FARTHEST / span))
+        phases = phases + step * span * np.array([-0.5, 0.5])
+        if abs(step) * span < 1e-6:
+            break
+    # Blocks of an eighth of a cycle, all joints together, vary independently; the few harmonics
+    # have taken their share of what is left.
+    scores = np.einsum('jn,jn->n', by_rate, left)
+    block = (np.interp(grid, [0.0, span], phases - phases[0]) * BLOCKS).astype(int)
+    sums = np.bincount(block, scores)
+    free = max(1.0 - (2 * HARMONICS + 1) / grid.size, 0.1)
+    own = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
+    # Strides wander besides, slowly: what blocks and their neighbours are early or late together
+    # is that, and counts once a cycle. The mean cycle takes one cycle's share of it.
+    early = (np.bincount(block, np.einsum('jn,jn->n', slope, left))
+             / np.maximum(np.bincount(block, np.einsum('jn,jn->n', slope, slope)), 1e-300))
+    cycles = float(phases[1] - phases[0])
+    together = float(np.sum(early[1:] * early[:-1])) / max(early.size - 1, 1)
+    wander = max(together, 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
+    return phases, float(np.hypot(own, np.sqrt(12.0 * wander / cycles) / span))
+
+
+def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
+            ) -> tuple[int, int]:
+    """Return first and last stride between knots of the longest run that are like the mean."""
+    left, _ = _model(x, np.interp(grid, knots, phases))
+    starts = np.searchsorted(grid, knots[:-1])
+    counts = np.diff(np.append(starts, grid.size))
+
+    def sums(values: np.ndarray) -> np.ndarray:
+        return np.add.reduceat(values, starts, axis=1)
+
+    # About the means of each stride: how a body leans is no gait.
+    def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return (sums(a * b) - sums(a) * sums(b) / counts).sum(axis=0)
+
+    mean = x - left
+    alike, power, typical = products(x, mean), products(x, x), products(mean, mean)
+    rates = np.diff(phases) / np.diff(knots)
+    first, last = longest_run((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
+                              & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
+                              & (alike * np.abs(alike) >= ALIKE * power * typical)
+                              ) or (0, rates.size - 1)
+    apart = products(left, left)
+    off = np.abs(rates - np.median(rates))
+    odd = ((apart > np.maximum(ODD**2 * np.median(apart), MARKED**2 * typical))
+           | (off > max(ODD_RATE * np.median(off), MARKED_RATE * np.median(rates))))
+    while last - first > 2 and odd[first]:
+        first += 1
+    while last - first > 2 and odd[last]:
+        last -= 1
+    return first, last
+
+
+def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:
+    """Fit the phase at the knots and the mean cycle in turn."""
+    place = np.clip(np.searchsorted(knots, grid, side='right') - 1, 0, knots.size - 2)
+    after = (grid - knots[place]) / (knots[place + 1] - knots[place])
+    before = 1.0 - after
+
+    def gathered(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        return (np.bincount(place, low, knots.size)
+                + np.bincount(place + 1, high, knots.size))
+
+    for _ in range(STEPS):
+        left, slope = _model(x, np.interp(grid, knots, phases))
+        stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
+        bands = np.zeros((2, knots.size))
+        bands[1] = gathered(stiff * before**2, stiff * after**2)
+        bands[0, 1:] = np.bincount(place, stiff * before * after, knots.size)[:-1]
+        tie = STIFFNESS * bands[1].mean() + 1e-300
+        bands[1] += 2.0 * tie
+        bands[0, 1:] -= tie
+        step = solveh_banded(bands, gathered(pull * before, pull * after))
+        phases = phases + np.clip(step, -FARTHEST, FARTHEST)
+        if np.abs(step).max() < 1e-5:
+            break
+    return phases

@@ -1,0 +1,339 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which gait is this? The spatio-temporal symmetry of a recorded or simulated rhythm.
+
+A symmetry g with shift theta means ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono &
+Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
+mean cycle; H and K are what is violated by less than the tolerance and forms a homomorphism.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.fitting.gaits.mean_cycle import find_period, HarmonicCycle, holds_two, mean_cycle
+from cpg_ros.networks.symmetry import Group, Permutation, symmetries, Symmetry
+import numpy as np
+
+# Comparing waveforms: how far one lags another, how much they differ, how steadily they turn.
+
+TURN = 2.0 * np.pi
+#: Places of a cycle at which shifts are tried; a mean cycle has far fewer harmonics.
+GRID = 1024
+#: Centres that are tried in each direction, over the middle part of a closed curve's extent.
+CENTRES = np.linspace(-0.6, 0.6, 13)
+
+
+def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
+
+    The largest circular cross-correlation, refined by Newton's method on its Fourier series: no
+    single harmonic or extreme decides.
+
+    Args:
+        a: waveforms on even points of a cycle, shape (..., m).
+        b: others, of the same shape.
+
+    Returns:
+        The shifts, shape (...).
+
+    """
+    m = a.shape[-1]
+    cross = np.fft.rfft(a) * np.fft.rfft(b).conj()
+    cross[..., 0] = 0.0
+    k = np.arange(cross.shape[-1])
+    theta = -np.fft.irfft(cross, m).argmax(axis=-1) / m
+    for _ in range(4):
+        turned = cross * np.exp(-TURN * 1j * k * theta[..., None])
+        slope, bend = turned.imag @ k, -TURN * (turned.real @ (k * k))
+        peak = bend < 0.0
+        step = np.clip(slope / np.where(peak, bend, 1.0), -0.5 / m, 0.5 / m)
+        theta = theta - np.where(peak, step, 0.0)
+    return (theta + 0.5) % 1.0 - 0.5
+
+
+def best_shift(terms: np.ndarray) -> tuple[float, float]:
+    """Return the shift of the largest cross-correlation, in cycles, and the correlation there.
+
+    Refined by Newton's method from the best place of an even grid.
+
+    Args:
+        terms: of the cross-correlation by order, complex, shape (n + 1,): those of the first
+            signal times the conjugate ones of the second, the constant 0. The first is ahead by
+            the shift.
+
+    """
+    turn = 2j * np.pi * np.arange(terms.size)
+    theta = float(np.argmax(np.fft.fft(terms, GRID).real)) / GRID
+    at = theta
+    for _ in range(8):
+        there = terms * np.exp(-turn * theta)
+        slope, bend = -np.sum(turn * there).real, np.sum(turn * turn * there).real
+        if bend < 0.0:
+            theta = float(np.clip(theta - slope / bend, at - 1.0 / GRID, at + 1.0 / GRID))
+    return theta, float(np.sum(terms * np.exp(-turn * theta)).real)
+
+
+def shifted(a: np.ndarray, theta: float) -> np.ndarray:
+    """a(t + theta), theta in cycles, by its Fourier series."""
+    terms = np.fft.rfft(a)
+    return np.fft.irfft(terms * np.exp(TURN * 1j * np.arange(terms.size) * theta), a.size)
+
+
+def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float:
+    """How much two waveforms differ, whatever their shift: the smallest RMS over all shifts.
+
+    Args:
+        a: a waveform on even points of a cycle, shape (m,).
+        b: another one.
+        plain: compare them as they are, over the RMS of the stronger one about its mean; by
+            default both are first given mean 0 and RMS 1, so that only shape counts.
+
+    """
+    sizes = a.std(), b.std()
+    if min(sizes) == 0.0:
+        return 0.0 if max(sizes) == 0.0 else 1.0
+    if plain:
+        return float(np.sqrt(np.mean((a - shifted(b, float(lag(a, b))))**2)) / max(sizes))
+    a, b = (a - a.mean()) / sizes[0], (b - b.mean()) / sizes[1]
+    return float(np.sqrt(np.mean((a - shifted(b, float(lag(a, b))))**2)))
+
+
+def steadiness(v: np.ndarray, w: np.ndarray) -> float:
+    """Smallest angular speed, over its mean, at which a closed curve turns about a centre.
+
+    The best of the centres tried; both variables are scaled to run from -1 to 1. At most 1; not
+    positive where the curve turns back somewhere or turns twice, so that the angle does not tell
+    the phase.
+
+    Args:
+        v: a cell's first variable on even points of a cycle, shape (m,).
+        w: its second one.
+
+    """
+    if min(np.ptp(v), np.ptp(w)) == 0.0:
+        return 0.0
+    v, w = ((2.0 * q - q.max() - q.min()) / np.ptp(q) for q in (v, w))
+    x, y = v - CENTRES[:, None, None], w - CENTRES[:, None]
+    speed = (x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)) / (x * x + y * y)
+    # About a centre outside the curve the sum is 0, and where it turns twice in a cycle 4 pi.
+    once = np.abs(speed.sum(-1) - TURN) < np.pi
+    return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TURN
+
+
+#: Fewest samples of a rhythm.
+FEWEST = 8
+#: Largest distance of a symmetry that holds in whatever noise; the distance, in what noise and
+#: tolerance explain, at which a gait is as likely as none; and the largest distance of several in
+#: noise, over the usual.
+MOST, NONE, LARGER = 0.3, 3.0, 1.25
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recognition(ShortRepr):
+    """What a rhythm is.
+
+    Distances are the RMS violation of a symmetry over cells and cycle, in units of the
+    signals' RMS about their means: 0 where it holds, 1.4 where nothing does.
+
+    Attributes:
+        name: the gait, or None if no named one is within the tolerance.
+        nearest: the gait; if there is none, the one with the smallest distance, or one that
+            includes its symmetry at a distance larger by no more than the tolerance.
+        distance: of the nearest gait, the largest over the elements of its H.
+        margin: how much larger the distance of the second is; inf if there is none, negative
+            if it fits better with a smaller H.
+        second: the best of the named gaits whose symmetry is not part of the nearest one's, or
+            None if there is none.
+        noise: what noise alone makes of a distance, by what the mean cycle leaves.
+        confidence: probability that it is the nearest gait, not another nor none of them.
+        period: in the unit of the times.
+        phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
+            correlation; between different waveforms it is no more than that. Cells to which H
+            gives one waveform are compared with the first of them.
+        h: names of the elements of H, the largest consistent set within the tolerance.
+        k: those among them with shift 0.
+        distances: element name -> (its best shift in cycles, its distance there). An element
+            below the tolerance that h lacks fits no homomorphism with the others.
+
+    """
+
+    name: str | None
+    nearest: str
+    distance: float
+    margin: float
+    second: str | None
+    noise: float
+    confidence: float
+    period: float
+    phases: np.ndarray
+    h: tuple[str, ...]
+    k: tuple[str, ...]
+    distances: dict[str, tuple[float, float]]
+
+
+def _best_shift(ahead: np.ndarray, behind: np.ndarray) -> float:
+    """Return theta in cycles with ahead(t) most like behind(t + theta T), [0, 1).
+
+    Both are Fourier coefficients, shape (harmonics + 1, channels).
+    """
+    cross = np.sum(ahead * behind.conj(), axis=1)
+    cross[0] = 0.0
+    # A rounding error below 0 is 0, not 1.
+    return round(best_shift(cross)[0] % 1.0, 12) % 1.0
+
+
+class _Violations:
+    """Distances of a mean cycle from the symmetries of a group."""
+
+    def __init__(self, coefficients: np.ndarray, group: Group) -> None:
+        self.coefficients, self.elements = coefficients, group.elements
+        self._n = np.arange(len(coefficients))
+        # Of a real series: every coefficient but the mean counts twice.
+        self._weights = np.where(self._n > 0, 2.0, 1.0)[:, None]
+        self._power = np.sum(2.0 * np.abs(coefficients[1:]) ** 2)
+        self._known: dict[tuple[str, Fraction], float] = {}
+
+    def at(self, element: Permutation, shift: float) -> float:
+        turned = self.coefficients * np.exp(2j * np.pi * self._n * shift)[:, None]
+        apart = np.abs(self.coefficients[:, list(element)] - turned)
+        return float(np.sqrt(np.sum(self._weights * apart * apart) / self._power))
+
+    def best(self, element: Permutation) -> tuple[float, float]:
+        shift = _best_shift(self.coefficients[:, list(element)], self.coefficients)
+        return shift, self.at(element, shift)
+
+    def of(self, symmetry: Symmetry) -> float:
+        """Return the largest distance over the elements of H."""
+        for name, shift in symmetry.shifts:
+            if (name, shift) not in self._known:
+                self._known[name, shift] = self.at(self.elements[name], float(shift))
+        return max(self._known[one] for one in symmetry.shifts)
+
+
+def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
+             period: float | None, tolerance: float) -> None:
+    if t.ndim != 1 or signals.shape != (t.size, group.cells):
+        raise ValueError(f'signals have the shape {signals.shape}, times {t.shape}; '
+                         f'{group.cells} cells need (m, {group.cells}) and (m,)')
+    if t.size < FEWEST:
+        raise InputError(f'{t.size} samples are not enough, at least {FEWEST} are needed')
+    for name, values in (('t', t), ('signals', signals)):
+        if not np.isfinite(values).all():
+            raise InputError(f'{name} holds {np.count_nonzero(~np.isfinite(values))} values '
+                             f'that are not finite')
+    if not (np.diff(t) > 0.0).all():
+        late = int(np.argmin(np.diff(t) > 0.0))
+        raise InputError(f't does not increase: {t[late]:g} is followed by {t[late + 1]:g}')
+    spread = signals.std(axis=0)
+    still = np.flatnonzero(spread <= np.maximum(1e-6 * spread.max(),
+                                                1e-12 * np.abs(signals).max()))
+    if still.size:
+        raise ValueError(f'channel {still[0] + 1} is constant')
+    if not gaits:
+        raise ValueError('gaits is empty')
+    for name, gait in gaits.items():
+        if gait.group != group:
+            raise ValueError(f'the gait {name!r} belongs to another group')
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f'tolerance is {tolerance}, it must be positive')
+    if period is not None and not (np.isfinite(period) and period > 0.0):
+        raise InputError(f'period is {period}, it must be positive')
+    if period is not None and not holds_two(t, period):
+        raise InputError(f'the recording lasts {t[-1] - t[0]:g}, less than two periods of '
+                         f'{period:g}')
+
+
+def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
+              period: float | None = None, tolerance: float = 0.05) -> Recognition:
+    """Find the symmetry of a rhythm, and the named gait that has it.
+
+    Of several gaits within the tolerance the one with the largest H is meant, and among those
+    the one that fits best: every walk is also a skip, which has fewer symmetries.
+
+    Args:
+        t: increasing times, evenly or unevenly spaced, shape (m,).
+        signals: the first variable of each cell, shape (m, cells).
+        group: of the network.
+        gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
+            two gaits.
+        period: in the unit of t; found if not given.
+        tolerance: largest distance of a symmetry that holds; see Recognition. What noise makes
+            of a distance comes on top.
+
+    Raises:
+        InputError: a value is not finite, t does not increase, a channel is constant, or there
+            are fewer than two periods or too few samples.
+        ValueError: shapes do not fit, or gaits do not belong to the group.
+
+    """
+    t, signals = np.asarray(t, dtype=float), np.asarray(signals, dtype=float)
+    _checked(t, signals, group, gaits, period, tolerance)
+    if period is None:
+        period = find_period(t, signals)
+    whole = mean_cycle(t, signals, period)
+    cycle = whole.coefficients
+    violations, noise = _Violations(cycle, group), _noise(whole, t.size)
+    alone = tolerance
+    tolerance = min(float(np.hypot(alone, LARGER * noise)), max(MOST, alone))
+    # Out of all homomorphisms, so that what is found is a group and its shifts are consistent.
+    found = max((one for one in symmetries(group) if violations.of(one) <= tolerance),
+                key=lambda one: (len(one.h), -violations.of(one)))
+    apart = {name: violations.of(gait) for name, gait in gaits.items()}
+    best = min(gaits, key=apart.__getitem__)
+    known = apart[best] <= tolerance
+    # A gait that includes another has more constraints and fits no better; that is no demerit.
+    fitting = [name for name, gait in gaits.items()
+               if (apart[name] <= tolerance if known else apart[name] <= apart[best] + tolerance
+                   and set(gait.shifts) >= set(gaits[best].shifts))]
+    nearest = min(fitting, key=lambda name: (-len(gaits[name].h), apart[name],
+                                             -len(gaits[name].k)))
+    others = [name for name, gait in gaits.items()
+              if not set(gait.shifts) <= set(gaits[nearest].shifts)]
+    second = min(others, key=apart.__getitem__, default=None)
+    sure = _sure(apart[nearest], [apart[name] for name in others], float(np.hypot(alone, noise)))
+    return Recognition(nearest if known else None, nearest, apart[nearest],
+                       apart[second] - apart[nearest] if second is not None else np.inf, second,
+                       noise, sure, period, _phases(cycle, found), found.h, found.k,
+                       {name: violations.best(element)
+                        for name, element in group.elements.items()})
+
+
+def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
+    """Return the phases of the cells against cell 1 in cycles, [0, 1).
+
+    Two waveforms may correlate equally well at several shifts, among which noise would choose
+    anew for each cell.
+    """
+    first = [int(np.argmax(symmetry.waves == wave)) for wave in symmetry.waves]
+    ahead = {cell: _best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in set(first)}
+    phases = [ahead[head] + _best_shift(cycle[:, [cell]], cycle[:, [head]])
+              for cell, head in enumerate(first)]
+    # As in _best_shift: a rounding error below 1 is 0.
+    return np.round(phases, 12) % 1.0
+
+
+def _noise(cycle: HarmonicCycle, samples: int) -> float:
+    """Distance that noise makes where a symmetry holds: two cells have it, in every term."""
+    terms, left = 2 * len(cycle.coefficients) - 1, min(cycle.residual, 0.999)**2
+    return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))
+
+
+def _sure(nearest: float, others: Sequence[float], scatter: float) -> float:
+    """Probability of the nearest gait, from distances and their scatter; none is one of them."""
+    odds = [np.exp(-0.5 * (other**2 - nearest**2) / scatter**2) for other in others]
+    none = np.exp(min(0.5 * ((nearest / scatter)**2 - NONE**2), 30.0))
+    return float(1.0 / (1.0 + sum(odds) + none))

@@ -1,0 +1,263 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where a recording repeats, and how fast: stretches of steady motion among starts and stops.
+
+Signals repeat with a lag L around a place if they differ there from themselves L later by much
+less than unrelated signals would: the square difference over the local variance (that of
+McLeod & Wyvill 2005, "A smarter way to find pitch", in windows of one lag). Lags of 12 to 23
+points are tried on grids that are each half as fine as the last one, so that all octaves cost
+little more than the first.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+# What the analysis of gaits needs of a recording, wherever it comes from.
+
+class RecordingLike(Protocol):
+    """What is needed of a recording; see Recording."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """Rising, s, shape (n,)."""
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Angles in rad, nan where missing, shape (n, joints)."""
+
+    @property
+    def source(self) -> str:
+        """What to call it."""
+
+
+class FootLoadsLike(Protocol):
+    """What is needed of loads on the feet; see FootLoads."""
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """Rising, s, shape (n,)."""
+
+    @property
+    def loads(self) -> np.ndarray:
+        """In any unit, shape (n, legs)."""
+
+
+#: Fastest stride that is looked for (Hz).
+FASTEST = 12.5
+#: Points of a lag on its grid: from this many to twice as many.
+FEWEST = 12
+#: Points of the even grid per sample where those are few.
+FINER = 4.0
+#: Most points of the finest grid.
+GRID = 1 << 18
+#: Mean square difference over twice the variance: 0 if it repeats exactly, 1 if unrelated.
+REPEATS = 0.25
+#: Fewest cycles in which a repetition shows.
+CYCLES = 1.4
+#: A multiple of the lag is the period if it repeats so much better: less than this share of the
+#: difference, and so much less.
+BETTER, LESS = 0.5, 0.02
+#: and for at least this share of the time.
+LASTING = 0.7
+#: Lags this near to one another, as a share, are of one gait.
+NEAR = 0.1
+#: Lags tried on a grid, and windows of the local variance, in points.
+LAGS = range(FEWEST - 1, 27)
+WIDTHS = (11, 14, 18, 22)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Where signals repeat.
+
+    Attributes:
+        begin, end: s.
+        period: the lag, s, to about 2 %.
+        difference: mean square difference after one lag over twice the variance.
+        size: RMS of the signals there about their means, rad.
+
+    """
+
+    begin: float
+    end: float
+    period: float
+    difference: float
+    size: float
+
+    @property
+    def cycles(self) -> float:
+        """How many periods it holds."""
+        return (self.end - self.begin) / self.period
+
+    def outside(self, begin: float, end: float) -> bool:
+        """Tell whether most of it is not between two times."""
+        return min(self.end, end) - max(self.begin, begin) < 0.5 * (self.end - self.begin)
+
+
+def resample_evenly(times: np.ndarray, positions: np.ndarray, rate: float
+                    ) -> tuple[np.ndarray, np.ndarray]:
+    """Put signals on an even grid, linearly, each over its own finite samples.
+
+    Args:
+        times: rising, s, shape (n,).
+        positions: shape (n, joints), nan where missing; no column all nan.
+        rate: of the grid, Hz; lower if it had too many points.
+
+    Returns:
+        Times (m,) and signals (m, joints).
+
+    """
+    span = times[-1] - times[0]
+    grid = times[0] + np.arange(int(min(span * rate, GRID)) + 1) / min(rate, GRID / span)
+    signals = np.empty((positions.shape[1], grid.size)).T
+    for signal, column in zip(signals.T, positions.T, strict=True):
+        have = np.isfinite(column)
+        signal[:] = np.interp(grid, times[have], column[have])
+    return grid, signals
+
+
+def _summed(values: np.ndarray) -> np.ndarray:
+    """Return the sums of the first 0, 1, ... values."""
+    return np.concatenate([[0.0], np.cumsum(values)])
+
+
+def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measure how much signals differ after a lag, for the lags of one grid.
+
+    Returns:
+        Lags in points, shape (lags,); the difference about every point, (lags, n), inf where
+        the recording does not reach; and the variance about every point.
+
+    """
+    n = len(y)
+    # Joint by joint: all at once take several times the memory.
+    columns = (y - y.mean(axis=0)).T
+    squares = _summed(sum(column * column for column in columns))
+    # What rounding leaves of a constant is no motion.
+    least = 1e-12 * squares[-1] / n + 1e-300
+    lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
+    variances: dict[int, np.ndarray] = {}
+    found = np.full((lags.size, n), np.inf)
+    for row, lag in zip(found, lags, strict=True):
+        window = min(lag, n - lag)
+        width = min(max(k for k in WIDTHS if k <= lag), window)
+        if width not in variances:
+            means = ((sums[width:] - sums[:-width]) / width for sums in map(_summed, columns))
+            variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
+                                          - sum(mean * mean for mean in means), least)
+        total = _summed(sum((column[lag:] - column[:-lag])**2 for column in columns))
+        places = total.size - window
+        inside = np.arange(places) + (window - width) // 2
+        # The smaller of both: standing before a step is not like the step.
+        both = np.minimum(variances[width][inside], variances[width][inside + lag])
+        middle = (lag + window) // 2
+        row[middle:middle + places] = (total[window:] - total[:-window]) / window / (2.0 * both)
+    variance = np.zeros(n)
+    if lags.size:
+        width = max(variances)
+        offset = width // 2
+        variance[offset:offset + variances[width].size] = variances[width]
+    return lags, found, variance
+
+
+def true_runs(mask: np.ndarray) -> np.ndarray:
+    """Return first and last index of every run of true values, shape (runs, 2)."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return np.stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1], axis=1)
+
+
+def longest_run(mask: np.ndarray) -> tuple[int, int] | None:
+    """Return first and last index of the longest run of true values, None without any."""
+    runs = true_runs(mask)
+    if not runs.size:
+        return None
+    first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+    return int(first), int(last)
+
+
+def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
+              ) -> tuple[float, float] | None:
+    """Return the lag among the near ones with the least mean difference, and that difference.
+
+    Between lags, by a parabola; None if a lag that is not near has less still.
+    """
+    known = np.isfinite(differences)
+    means = np.where(known, differences, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    means[~known.any(axis=1)] = np.inf
+    k = near[np.argmin(means[near])]
+    if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
+        return float(lags[k]), float(means[k])
+    both = known[k - 1:k + 2].all(axis=0)
+    before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
+        k - 1:k + 2]
+    if min(before, after) < here:
+        return None
+    bend = max(before - 2.0 * here + after, 1e-300)
+    return (lags[k] + 0.5 * (before - after) / bend,
+            max(here - 0.125 * (before - after)**2 / bend, 0.0))
+
+
+def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
+    """Find all stretches that repeat, for all lags; those of near lags overlap.
+
+    Args:
+        times: even, s, shape (n,).
+        y: signals, shape (n, joints).
+
+    """
+    step, start = times[1] - times[0], times[0]
+    found = []
+    while len(y) >= CYCLES * FEWEST:
+        lags, differences, variance = _differences(y)
+        for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
+            near = np.flatnonzero(np.abs(lags - lag) <= NEAR * lag)
+            for first, last in true_runs(differences[near].min(axis=0) < REPEATS):
+                found_lag = _best_lag(lags, differences[:, first:last + 1], near)
+                half = 0.5 * min(2 * lag, len(y))
+                begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
+                if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
+                    found.append(Stretch(start + begin * step, start + end * step,
+                                         found_lag[0] * step, found_lag[1],
+                                         float(np.sqrt(variance[first:last + 1].mean()))))
+        half = len(y) // 2
+        y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])
+        start, step = start + 0.5 * step, 2.0 * step
+    return found
+
+
+def best_stretch(found: list[Stretch]) -> Stretch:
+    """Choose the stretch with most cycles of most motion, at its true period.
+
+    Of half a period cycles are more, but they differ; the multiple is then taken.
+    """
+    args = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
+    for times in (2, 3):
+        for one in found:
+            if (abs(one.period / args.period / times - 1.0) < NEAR / 2
+                    and not one.outside(args.begin, args.end)
+                    and one.end - one.begin >= LASTING * (args.end - args.begin)
+                    and one.difference < BETTER * (args.difference - LESS)):
+                return one
+    return args

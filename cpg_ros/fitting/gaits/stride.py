@@ -1,0 +1,403 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The stride of a recording: its steady stretch, frequency, mean cycle, leg phases and gait.
+
+Found where the joints repeat themselves (steady), followed from there with its own phase, as no
+real stride is quite as long as the last (warp), and averaged over that phase (warped).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from cpg_ros.common.errors import CpgError, InputError, ShortRepr
+from cpg_ros.fitting.gaits.foot_contacts import foot_contacts, FootContacts
+from cpg_ros.fitting.gaits.leg_names import Legs
+from cpg_ros.fitting.gaits.leg_phases import (
+    leg_phases,
+    match_gait,
+    match_gait_by_cells,
+    match_gait_by_contacts,
+    phase_scatter,
+    PhaseScatter,
+)
+from cpg_ros.fitting.gaits.mean_cycle import average_cycles
+from cpg_ros.fitting.gaits.phase_estimation import (
+    estimate_phase,
+    grow_stretch,
+    index_range,
+    PhaseEstimate,
+    RoughPhase,
+)
+from cpg_ros.fitting.gaits.quality_checks import (
+    check_angles,
+    check_change,
+    check_legs,
+    check_rhythm,
+    check_sway,
+    check_travel,
+    limping,
+    quality_notes,
+    QualityIssue,
+    SURE,
+)
+from cpg_ros.fitting.gaits.steady_stretch import (
+    best_stretch,
+    CYCLES,
+    FASTEST,
+    FEWEST,
+    find_stretches,
+    FINER,
+    FootLoadsLike,
+    RecordingLike,
+    resample_evenly,
+)
+from cpg_ros.networks.network import Network
+import numpy as np
+
+# The joints of a recording that have angles enough, without samples that are no motion.
+
+#: Fewest samples of a joint.
+SAMPLES = 8
+#: A sample is no motion if it is off both neighbours by this many standard deviations and times
+#: as much as they differ.
+SPIKE = 3.0
+
+
+class NoSteadyGait(CpgError):
+    """A recording has no steady gait; the message describes what it has instead."""
+
+    exit_code = 1
+
+
+def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
+            ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
+    """Return the legs' joints that have angles, their positions without spikes, and notes.
+
+    Args:
+        recording: of the joints.
+        legs: leg -> its joints.
+
+    Raises:
+        NoSteadyGait: there are too few samples, or a leg has no joint with angles.
+
+    """
+    listed = [name for name in recording.joints if any(name in one for one in legs.values())]
+    # Joint by joint in memory, as they are averaged.
+    x = np.empty((len(listed), len(recording.times))).T
+    for column, name in zip(x.T, listed, strict=True):
+        column[:] = recording.positions[:, recording.joints.index(name)]
+        column[np.isinf(column)] = np.nan
+    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
+    spikes = 0
+    for k in np.flatnonzero(enough):
+        column = x[:, k]
+        before, here, after = column[:-2], column[1:-1], column[2:]
+        off = np.abs(here - 0.5 * (before + after))
+        with np.errstate(invalid='ignore'):
+            wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
+        here[wild] = np.nan
+        spikes += int(np.count_nonzero(wild))
+    # Of spikes alone nothing is left.
+    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
+    names = [name for name, good in zip(listed, enough, strict=True) if good]
+    lost = [name for name in listed if name not in names]
+    notes = [f'left out, without angles: {", ".join(lost)}'] if lost and names else []
+    if len(recording.times) < SAMPLES:
+        raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
+                           f'for a gait, at least {SAMPLES} are needed')
+    kept = _kept(legs, names, recording.source)
+    x = x if enough.all() else x[:, enough]
+    if spikes:
+        notes.append(f'left out, far off both neighbours: {spikes} samples')
+    return kept, x, notes
+
+
+def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarray, source: str,
+                notes: list[str]) -> tuple[list[str], dict[str, tuple[str, ...]], np.ndarray]:
+    """Leave out joints with hardly any angles; return names, legs, and which have enough.
+
+    Args:
+        names: of the joints.
+        legs: leg -> its joints.
+        x: angles, rad, nan where missing, shape (n, joints).
+        source: of the recording, for messages.
+        notes: what is left out is added to.
+
+    Raises:
+        NoSteadyGait: a leg has no joint left.
+
+    """
+    full = np.isfinite(x).sum(axis=0) >= SAMPLES
+    if full.all():
+        return names, legs, full
+    lost = [name for name, good in zip(names, full, strict=True) if not good]
+    notes.append(f'left out, without angles in the stretch: {", ".join(lost)}')
+    names = [name for name in names if name not in lost]
+    return names, _kept(legs, names, source), full
+
+
+def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
+          ) -> dict[str, tuple[str, ...]]:
+    """Keep the legs' joints that are among names, at least one of each leg."""
+    kept = {leg: tuple(name for name in listed if name in names) for leg, listed in legs.items()}
+    for leg, listed in kept.items():
+        if not listed:
+            raise NoSteadyGait(f'{source}: none of the joints of {leg} '
+                               f'({", ".join(legs[leg])}) has angles')
+    return kept
+
+
+#: Points of a mean cycle.
+POINTS = 64
+#: Joints that all move by less stand (rad).
+STILL = 0.01
+#: In stretches of fewer cycles than SURE strides must be more alike: the mean square difference
+#: over twice the variance.
+ALIKE = 0.1
+#: Most of the variance that the mean cycle may leave of the joints together.
+LEFT = 0.5
+#: Stretches that are followed, and how much other motion, in cycles, is worth a note.
+SEEDS, OTHERS = 4, 3.0
+#: What fewer cycles leave of the confidence.
+FEW_CYCLES = 0.9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stride(ShortRepr):
+    """The mean stride of a steady stretch.
+
+    Phase 0 is where the joint of the first leg with the largest first harmonic has the maximum
+    of that harmonic.
+
+    Attributes:
+        begin: of the stretch, s.
+        end: of the stretch, s.
+        frequency: mean, strides per second (Hz).
+        frequency_error: its standard error (Hz).
+        cycles: whole strides in the stretch.
+        joints: those of the legs that have angles, in the order of the recording.
+        theta: phases, cycles, even, shape (m,).
+        mean: mean cycle, rad, shape (joints, m).
+        spread: standard deviation of a cycle about it, rad, (joints, m).
+        error: standard error of the mean, rad, (joints, m).
+        counts: samples used, (joints,).
+        phases: leg -> cycles in [0, 1) by which it is ahead of the first leg, in the order of
+            the network's legs: x_leg(t) = x_first(t + phase T).
+        scatter: leg -> how well its phase is known, and kept from stride to stride.
+        gait: name, None if none is near enough.
+        nearest: the nearest gait.
+        alike: gaits that the recording cannot tell from the nearest, that one among them.
+        distance: of the leg phases from the nearest, RMS over legs, cycles.
+        margin: how much further the next gait is, cycles.
+        confidence: probability that gait and frequency are those named, given the recording.
+        issues: what speaks against them, one line each.
+        notes: one line each.
+        warp: stride phase of the recording's times within the stretch.
+        contacts: which feet were on the ground in the stretch, if the recording has loads.
+
+    """
+
+    begin: float
+    end: float
+    frequency: float
+    frequency_error: float
+    cycles: int
+    joints: tuple[str, ...]
+    theta: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    error: np.ndarray
+    counts: np.ndarray
+    phases: dict[str, float]
+    scatter: dict[str, PhaseScatter]
+    gait: str | None
+    nearest: str
+    alike: tuple[str, ...]
+    distance: float
+    margin: float
+    confidence: float
+    issues: tuple[str, ...]
+    notes: tuple[str, ...]
+    warp: PhaseEstimate
+    contacts: FootContacts | None = None
+
+    @property
+    def verdict(self) -> str:
+        """Which gait it is: its name, 'walk or run: cannot tell', or which one is nearest."""
+        if self.gait is None:
+            return f'none of the gaits; nearest {self.nearest}'
+        return self.gait if len(self.alike) < 2 else f'{" or ".join(self.alike)}: cannot tell'
+
+    def _summary(self) -> str:
+        return (f'{self.verdict}: {self.cycles} cycles of '
+                f'{self.frequency:.6g} +- {self.frequency_error:.2g} Hz, {self.begin:.6g} to '
+                f'{self.end:.6g} s, {len(self.joints)} joints')
+
+
+def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str]],
+                network: type[Network] | Network, cells: Mapping[str, int] | None = None,
+                gains: Mapping[str, complex] | None = None,
+                loads: FootLoadsLike | None = None) -> Stride:
+    """Find the steady gait of a recording.
+
+    Args:
+        recording: of the joints.
+        legs: leg -> its joints; the legs must be those of the network.
+        network: whose gaits it may be.
+        cells: joint -> the cell that drives it, from 1. A leg's phase is then that of its first
+            cell.
+        gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
+            that move the legs alike (walk and run of the biped) are distinguished, if every cell
+            has a joint.
+        loads: on the feet, at the recording's times or others. The legs' phases are then those
+            of touchdown, and they tell walk from run where legs move alike in both.
+
+    Raises:
+        NoSteadyGait: there is none, or none of a leg's joints has angles.
+        InputError: the legs are not the network's.
+
+    """
+    kind = network if isinstance(network, type) else type(network)
+    source = recording.source
+    own = next(iter(kind.legs.values()))
+    if set(legs) != set(own):
+        raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
+                         f'{", ".join(own)}')
+    args, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
+    times = recording.times
+    names = [name for name in recording.joints if any(name in one for one in args.values())]
+    rough, others = _regions(times, positions, source)
+    notes += others
+    within = index_range(times, rough.begin, rough.end)
+    names, args, full = with_angles(names, args, positions[within], source, notes)
+    positions = positions[:, full]
+    warp = estimate_phase(times, positions, rough)
+    if warp.cycles < CYCLES:
+        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
+                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
+    inside = index_range(times, warp.knots[0], warp.knots[-1])
+    phases, x = warp(times[inside]), positions[inside]
+    theta = np.arange(POINTS) / POINTS
+    # Of the rough stretch, strides that differ at its ends were left out.
+    names, args, full = with_angles(names, args, x, source, notes)
+    x = x[:, full]
+    try:
+        found = average_cycles(phases, x, theta,
+                               [names.index(name) for name in args[next(iter(own))]])
+    except InputError as error:
+        raise NoSteadyGait(f'{source}: {error}') from error
+    power = np.array([np.nanvar(column) for column in x.T])
+    left = float(np.sum(found.left * power) / np.sum(power))
+    if left > LEFT:
+        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
+                           f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
+                           'variance')
+    notes += quality_notes(warp, found, names)
+    c = dict(zip(names, found.coefficients.T, strict=True))
+    # A leg's phase is that of its first cell.
+    leading = {leg: tuple(name for name in listed
+                          if cells is None or cells.get(name) == own[leg][0]) or listed
+               for leg, listed in args.items()}
+    ahead, by_legs, vague, opposite = leg_phases(leading, c)
+    contacts = None if loads is None else foot_contacts(
+        loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
+    leads = None if contacts is None else contacts.leads(warp, tuple(own))
+    if leads is not None:
+        # Joints of legs that are built alike move alike, others need not.
+        ahead, vague = leads, ()
+        by_legs = (*by_legs, "the legs' phases are those of touchdown, by the loads on the feet")
+    gait, mean = match_gait(ahead, kind), found.mean(theta)
+    issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
+              *check_angles(names, mean), *check_legs(vague),
+              *check_sway(ahead, mean),
+              *check_change(phases, x, leading, names),
+              *check_travel(args, c, kind.girdles, opposite)]
+    if warp.cycles < SURE:
+        issues.append(QualityIssue('', FEW_CYCLES))
+    if cells is not None and gains is not None and len(gait.alike) > 1:
+        by_cells = _cell_signals(c, cells, gains, kind)
+        if by_cells is not None:
+            gait = match_gait_by_cells(by_cells, kind)
+    if contacts is not None:
+        gait = match_gait_by_contacts(gait, contacts)
+    if len(gait.alike) > 1:
+        # The odds of the gait have this already.
+        issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
+                                   'same phases; name the gait it is (--gait)', 1.0))
+    return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
+                  warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
+                  mean, found.spread, found.error, found.counts, ahead,
+                  phase_scatter(phases, x, found, leading, names), gait.gait,
+                  gait.nearest, gait.alike, gait.distance, gait.margin,
+                  gait.sure * float(np.prod([one.left for one in issues])),
+                  tuple(one.message for one in issues if one.message),
+                  (*notes, *by_legs, *limping(args, c), *gait.notes),
+                  replace(warp, phases=warp.phases - found.zero), contacts)
+
+
+def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
+    """Find the longest stretch of steady motion; return it, and notes on the others."""
+    reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
+    if reach.max() < STILL:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '
+                           f'{reach.max():.2g} rad')
+    rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
+    found = find_stretches(*resample_evenly(times, x, rate))
+    if not found:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
+                           f'{reach.max():.2g} rad, but nowhere do they repeat that over '
+                           f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s')
+    regions: list[tuple[RoughPhase, float]] = []
+    largest = max(one.size for one in found)
+    for _ in range(SEEDS):
+        if not found:
+            break
+        seed = best_stretch(found)
+        # Two strides may be alike by chance, if not in all joints.
+        if seed.cycles >= SURE or seed.difference <= ALIKE:
+            regions.append((grow_stretch(times, x, seed), seed.period))
+            found = [one for one in found if one.outside(regions[-1][0].begin,
+                                                         regions[-1][0].end)]
+        found = [one for one in found if one.outside(seed.begin, seed.end)
+                 and one.cycles >= OTHERS and one.size >= 0.5 * largest]
+    if not regions:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
+                           f'only roughly, and for {seed.cycles:.1f} cycles')
+    regions.sort(key=lambda one: one[0].begin - one[0].end)
+    rough = regions[0][0]
+    notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {one.begin:.2f} to '
+             f'{one.end:.2f} s, is shorter and left out'
+             for one, period in regions[1:]
+             if min(one.end, rough.end) - max(one.begin, rough.begin) < 0.5 * (one.end - one.begin)
+             and one.end - one.begin >= OTHERS * period]
+    return rough, notes
+
+
+def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
+                  gains: Mapping[str, complex], network: type[Network]) -> np.ndarray | None:
+    """Return the coefficients of every cell's signal, None unless every cell has a joint."""
+    known = {name: cell for name, cell in cells.items()
+             if name in c and abs(gains.get(name, 0.0)) > 0.0}
+    signals = []
+    for cell in range(1, network.cells + 1):
+        names = [name for name, one in known.items() if one == cell]
+        if not names:
+            return None
+        # The joint that moves most stands for the cell.
+        name = max(names, key=lambda one: float(np.abs(c[one][1])))
+        gain, n = complex(gains[name]), np.arange(c[name].size)
+        signals.append(np.where(n > 0, c[name], 0.0)
+                       / np.where(n > 0, gain.real + 1j * n * gain.imag, 1.0))
+    return np.stack(signals, axis=1)

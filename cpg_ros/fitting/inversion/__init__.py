@@ -1,0 +1,19 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Fit of a network to a recorded gait: parameters, readouts and their uncertainty."""
+
+__all__ = ['fit', 'fit_data', 'fit_report', 'fit_starts', 'free_parameters', 'gait_schedule',
+           'inversion', 'invert', 'leg_duty', 'many_recordings', 'model_choice', 'paper_fit',
+           'parameter_files', 'recording_fit', 'results', 'stride_report']

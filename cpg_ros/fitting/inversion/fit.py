@@ -1,0 +1,440 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How well a fit determines its free numbers: standard errors, intervals, and undetermined ones.
+
+The residual of a model that is not the truth is no noise: it is larger than the standard errors
+of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
+leaves where that is more, and variances are inflated by how far the residual is correlated along
+the cycle. Intervals are quadratic where the cost is, and those of the profile likelihood where it
+is not.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from cpg_ros.common.errors import short, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.stability import GaitAssessment
+from cpg_ros.fitting.inversion.fit_starts import distinct
+from cpg_ros.fitting.inversion.free_parameters import Evaluate, Free, Minimisation
+from cpg_ros.networks.network import Network
+import numpy as np
+
+#: Half the width of a 95 % interval, in standard errors.
+QUANTILE = 1.959964
+#: Singular values of the scaled derivative below this share of the largest are exact zeros, and
+#: numbers with this share in such a direction are not determined.
+ZERO, SHARE = 1e-7, 1e-3
+#: The root of the rise of the cost is that of the quadratic, within these factors, or its
+#: profile is followed; steps that may mend the rest.
+REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
+#: Steps of a profile on either side, and its tolerance in standard errors.
+STEPS, CLOSE = 10, 0.03
+#: Closer to a bound than this share of a step is at the bound.
+NEGLIGIBLE = 1e-6
+#: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
+TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
+
+#: Goes down: problem, start, tolerance, evaluations at most.
+Descend = Callable[[Evaluate, np.ndarray, float, int], Minimisation]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted number.
+
+    Attributes:
+        value: where the cost is least.
+        stderr: standard error; infinite where the data do not separate it from others.
+        low, high: 95 % interval, within the bounds.
+        bounded: whether the data bound it on both sides; where not, an end of the interval is
+            that of the bounds, or the edge of where there is an orbit.
+
+    """
+
+    value: float
+    stderr: float
+    low: float
+    high: float
+    bounded: bool
+
+
+def correlation_length(residual: np.ndarray) -> float:
+    """Instants that share one independent residual, at least 1.
+
+    The integrated autocorrelation along the cycle, up to where it falls to zero.
+
+    Args:
+        residual: on even instants, over its size, shape (m, joints).
+
+    """
+    power = np.sum(np.abs(np.fft.rfft(residual, axis=0))**2, axis=1)
+    together = np.fft.irfft(power, len(residual))[:len(residual) // 2 + 1]
+    if together[0] <= 0.0:
+        return 1.0
+    together /= together[0]
+    end = int(np.argmax(together <= 0.0)) if (together <= 0.0).any() else together.size
+    return float(1.0 + 2.0 * together[1:end].sum())
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Spread(ShortRepr):
+    """Covariance of the numbers of a fit.
+
+    Attributes:
+        covariance: shape (n, n), in the directions that are determined.
+        blind: directions that change nothing, one a row, each number in units of what it takes
+            to change the cost by itself, shape (directions, n).
+        scale: those units, shape (n,).
+
+    """
+
+    covariance: np.ndarray
+    blind: np.ndarray
+    scale: np.ndarray
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Standard errors, shape (n,), infinite for what is not determined."""
+        errors = np.sqrt(np.diag(self.covariance))
+        if len(self.blind):
+            errors[np.abs(self.blind).max(axis=0) > SHARE] = np.inf
+        return errors
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Correlations, shape (n, n); not a number for what is not determined."""
+        errors = self.errors
+        with np.errstate(invalid='ignore', divide='ignore'):
+            found = self.covariance / np.outer(errors, errors)
+        found[~np.isfinite(errors)] = found[:, ~np.isfinite(errors)] = np.nan
+        np.fill_diagonal(found, 1.0)
+        return found
+
+
+def spread(jacobian: np.ndarray, inflation: float) -> Spread:
+    """Return the covariance that a weighted derivative gives.
+
+    Args:
+        jacobian: of the residual over its standard errors, shape (residuals, n).
+        inflation: factor on all variances.
+
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    scale = 1.0 / np.where(size > 0.0, size, 1.0)
+    values, rows = np.linalg.svd(jacobian * scale, full_matrices=False)[1:]
+    seen = values > ZERO * max(values[0], 1e-300)
+    half = rows[seen] / values[seen, None]
+    return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimum(ShortRepr):
+    """A least cost, and what intervals about it are made from.
+
+    Attributes:
+        evaluate: the problem.
+        values: where the cost is least, shape (n,).
+        free: the free numbers, which the values begin with.
+        cost: half the sum of squares.
+        inflation: factor on variances.
+        spread: covariance.
+        descend: goes down from values that have an orbit.
+        moved: values after a step, along lines that follow the valleys of the cost.
+        rephased: values with a better phase, if there is one.
+        elsewhere: other values where the cost is least nearby.
+
+    """
+
+    evaluate: Evaluate
+    values: np.ndarray
+    free: Sequence[Free]
+    cost: float
+    inflation: float
+    spread: Spread
+    descend: Descend
+    moved: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    rephased: Callable[[np.ndarray], np.ndarray]
+    elsewhere: Sequence[np.ndarray] = ()
+
+    def estimate(self, k: int, profiles: bool = True) -> Estimate:
+        """Estimate number k with its interval, by its profile where the cost is not quadratic."""
+        value, error = float(self.values[k]), float(self.spread.errors[k])
+        low, high = self.free[k].low, self.free[k].high
+        if not np.isfinite(error):
+            return Estimate(value, error, low, high, False)
+        ends = value - QUANTILE * error, value + QUANTILE * error
+        if profiles and error > 0.0:
+            (low, below), (high, above) = (self._end(k, error, side) for side in (-1.0, 1.0))
+            as_good = [at for at in self.elsewhere if self._rise(at) < QUANTILE]
+            for at in sorted(as_good, key=lambda at: float(at[k]))[:1]:
+                if at[k] < low:
+                    low, below = self._profile(k, 0.5 * abs(at[k] - value), -1.0, at)
+            for at in sorted(as_good, key=lambda at: float(at[k]))[-1:]:
+                if at[k] > high:
+                    high, above = self._profile(k, 0.5 * abs(at[k] - value), 1.0, at)
+            return Estimate(value, error, low, high, below and above)
+        return Estimate(value, error, max(low, ends[0]), min(high, ends[1]),
+                        low <= ends[0] and ends[1] <= high)
+
+    def _rise(self, values: np.ndarray) -> float:
+        """Distance in standard errors that the cost at values stands for."""
+        left = self.evaluate(values)[0]
+        rise = 0.5 * float(left @ left) - self.cost
+        return float(np.sqrt(max(0.0, 2.0 * rise / self.inflation)))
+
+    def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
+        """One end of the interval, and whether the data set it."""
+        bound = self.free[k].high if side > 0.0 else self.free[k].low
+        if abs(bound - self.values[k]) <= NEGLIGIBLE * error:
+            return bound, False
+        end = self._nearby(k, error, side)
+        if end is not None:
+            return end, True
+        try:
+            return self._profile(k, QUANTILE * error, side, self.values)
+        except NoOrbit:
+            # Not even the way back is found: the quadratic has to do, and bounds nothing.
+            end = float(self.values[k]) + side * QUANTILE * error
+            return min(max(end, self.free[k].low), self.free[k].high), False
+
+    def regular(self, k: int) -> bool:
+        """Whether the cost rises about number k, as far as its interval goes, as it should."""
+        error = float(self.spread.errors[k])
+        return not np.isfinite(error) or all(self._nearby(k, error, side) is not None
+                                             for side in (-1.0, 1.0))
+
+    def _nearby(self, k: int, error: float, side: float) -> float | None:
+        """Return the interval's end where the cost is about quadratic as far as there, or None."""
+        step = QUANTILE
+        for _ in range(STEPS_NEARBY):
+            try:
+                there = self._along(k, self.values, side * step * error)
+                rise = self._rise(there)
+            except NoOrbit:
+                return None
+            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+                return float(there[k])
+            if not REGULAR[0] <= rise / QUANTILE <= REGULAR[1]:
+                return None
+            step *= QUANTILE / rise
+        return None
+
+    def _along(self, k: int, values: np.ndarray, step: float) -> np.ndarray:
+        """Move number k by a step, and the others as they go with it."""
+        return self.moved(values, step * self.spread.covariance[:, k]
+                          / self.spread.covariance[k, k])
+
+    def _profile(self, k: int, step: float, side: float, at: np.ndarray) -> tuple[float, bool]:
+        """Follow the least cost for given values of number k to where it has risen enough.
+
+        From values where it has not, by a step to begin with.
+        """
+        limit = self.free[k].low if side < 0.0 else self.free[k].high
+        best = inside = float(at[k])
+        inside_rise = self._rise(at)
+        outside, outside_rise = None, np.inf
+        place = best + side * step
+        for _ in range(STEPS):
+            place = limit if side * (place - limit) >= 0.0 else place
+            if abs(place - inside) <= NEGLIGIBLE * step:
+                # At its bound already.
+                return inside, False
+            found = self._least(k, place, at, CLOSE * min(step, abs(place - inside)))
+            rise, reached = self._rise(found), float(found[k])
+            short = abs(reached - place) > CLOSE * abs(place - inside)
+            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+                return reached, True
+            if rise < QUANTILE:
+                inside, inside_rise, at = reached, rise, found
+                if short or place == limit:
+                    # A bound, or the edge of where there is an orbit.
+                    return reached, False
+            else:
+                outside, outside_rise = reached, rise
+            if outside is None:
+                place = best + (place - best) * min(3.0, 1.02 * QUANTILE / max(rise, 0.1))
+            else:
+                fraction = (QUANTILE - inside_rise) / (outside_rise - inside_rise)
+                place = inside + float(np.clip(fraction, 0.1, 0.9)) * (outside - inside)
+        return (inside, False) if outside is None else (outside, True)
+
+    def _least(self, k: int, place: float, at: np.ndarray, size: float) -> np.ndarray:
+        """Values of least cost with number k at a place, up to a share of size; from values.
+
+        Number k is drawn there by a residual of its own, so that no step need start from where
+        there is no orbit.
+        """
+        row = (np.arange(at.size) == k) / (DRAWN * size)
+
+        def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            left, slopes = self.evaluate(values)
+            return np.append(left, row @ values - row[k] * place), np.vstack([slopes, row])
+
+        try:
+            begin = self.rephased(self._along(k, at, place - at[k]))
+        except NoOrbit:
+            begin = at
+        return self.descend(evaluate, begin, TOLERANCE, MOST).values
+
+
+# A gait fitted to a recording: parameters, readouts, errors and uncertainties.
+
+#: A joint whose mean cycle has a smaller range stands (rad).
+STANDS = 0.01
+
+
+def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
+    """Return the mean of RMS error over range over the joints that move; 0 if none does.
+
+    Args:
+        recorded: rad, shape (joints, m).
+        errors: fitted minus recorded, rad, the same.
+
+    """
+    spans = np.ptp(recorded, axis=1)
+    moving = spans > STANDS
+    fractions = np.sqrt(np.mean(errors[moving]**2, axis=1)) / spans[moving]
+    return float(fractions.sum() / max(fractions.size, 1))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(ShortRepr):
+    """A gait fitted to a mean cycle.
+
+    Attributes:
+        network: the fitted parameters.
+        gait: one of its gaits.
+        orbit: the gait's.
+        order: of the readouts.
+        fractions: order of the readout -> mean RMS error over range with that order, the
+            parameters kept.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        duty: share of the stride that legs are to stand; None for what the network's cells do.
+        stance: phase at which legs begin to stand by themselves, and for which share, as in a
+            robot file; None if they stand while their cells fall.
+        parameters: free number -> estimate; then those that were read off the legs' phases.
+        correlation: of the free numbers, in their order; nan where the data do not separate one
+            from others.
+        cells: joint -> the cell behind it, from 1.
+        readouts: joint -> offset and weights, rad, as a robot file takes them.
+        theta: cycles, shape (m,).
+        recorded: mean cycle of each joint, rad, shape (joints, m).
+        errors: fitted minus recorded, rad, shape (joints, m).
+        phase: of the orbit where theta is 0, cycles.
+        cost: half the sum of squares of the errors over their sizes.
+        sizes: joint -> standard error of its mean cycle as far as it counts: the stated one,
+            or what the readout leaves if that is more, rad.
+        misfit: joint -> what the readout leaves, over the stated standard error of the mean.
+        sharing: instants that share one independent error.
+        starts: what came of every start.
+        warnings: one line each.
+
+    """
+
+    network: Network
+    gait: str
+    orbit: Orbit
+    order: int
+    fractions: dict[int, float]
+    harmonics: int
+    duty: float | None
+    stance: tuple[float, float] | None
+    parameters: dict[str, Estimate]
+    correlation: np.ndarray
+    cells: dict[str, int]
+    readouts: dict[str, tuple[float, tuple[float, ...]]]
+    theta: np.ndarray
+    recorded: np.ndarray
+    errors: np.ndarray
+    phase: float
+    cost: float
+    sizes: dict[str, float]
+    misfit: dict[str, float]
+    sharing: float
+    starts: tuple[Minimisation, ...]
+    warnings: tuple[str, ...]
+
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name} to {len(self.joints)} joints: RMS error '
+                f'{100.0 * self.mean_rms_share:.3g} % of range, '
+                f'{short({name: one.value for name, one in self.parameters.items()})}')
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(self.readouts)
+
+    @property
+    def fitted(self) -> np.ndarray:
+        """The fitted joints at theta, rad, shape (joints, m)."""
+        return self.recorded + self.errors
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that the starts began and ended with."""
+        return tuple(self.parameters)[:len(self.correlation)]
+
+    @property
+    def minima(self) -> list[Minimisation]:
+        """Where the starts ended, each place once, the least cost first."""
+        found: list[Minimisation] = []
+        for trial in sorted(self.starts, key=lambda one: one.cost):
+            if not trial.why and all(distinct(trial.values[:-1], one.values[:-1])
+                                     for one in found):
+                found.append(trial)
+        return found
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square error of each joint, rad."""
+        return dict(zip(self.readouts, np.sqrt(np.mean(self.errors**2, axis=1)).tolist(),
+                        strict=True))
+
+    @property
+    def rms_share(self) -> dict[str, float]:
+        """That over the joint's range; 0 for a joint that stands."""
+        spans = np.ptp(self.recorded, axis=1)
+        return {name: rms / span if span > STANDS else 0.0
+                for (name, rms), span in zip(self.rms.items(), spans.tolist(), strict=True)}
+
+    @property
+    def mean_rms_share(self) -> float:
+        """Mean over the joints that move; 0 if none does."""
+        return mean_share(self.recorded, self.errors)
+
+    def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
+        """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.
+
+        Returns:
+            Cycles, shape (points,), and errors, rad, shape (joints, points).
+
+        """
+        theta = np.arange(points) / points
+        return theta, np.array([np.interp(theta, self.theta, row, period=1.0)
+                                for row in self.errors])
+
+    @cached_property
+    def hopf(self) -> HopfPoint | None:
+        """Where the gait is born as the delay grows; None for networks without delay."""
+        return first_hopf(self.network, self.gait)
+
+    @cached_property
+    def verdict(self) -> GaitAssessment:
+        """How stable the gait is."""
+        return GaitAssessment(self.gait, self.orbit)

@@ -1,0 +1,354 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An inverted recording in words, and as a page that needs no other file."""
+
+import base64
+from html import escape
+import io
+from typing import Any
+
+from cpg_ros.common.command_line import table
+from cpg_ros.common.report_page import STYLE
+from cpg_ros.fitting.inversion import stride_report
+from cpg_ros.fitting.inversion.paper_fit import PaperFit
+from cpg_ros.fitting.inversion.recording_fit import POOR, RecordingFit
+import matplotlib
+from matplotlib.figure import Figure
+import numpy as np
+
+# The pictures of an inverted recording.
+
+#: Of what is fitted, and of bands and zero lines, on light and on dark grounds; what is recorded
+#: has the colour of text.
+FITTED, BAND = '#e04040', '#90a0b080'
+LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
+COLUMNS = 3
+#: Columns of the picture of a recording, and how far phases are shown beyond the seam (cycles).
+COLUMN, SEAM = 1200, 0.12
+#: Points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
+POINTS = 20
+
+
+def _text() -> str:
+    return str(matplotlib.rcParams['text.color'])
+
+
+def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
+    """Return a figure of panels in columns, those beyond the count left empty."""
+    rows = -(-count // COLUMNS)
+    figure = Figure((10.5, 0.5 + height * rows), layout='constrained')
+    grid = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False)
+    for axes in grid.flat[count:]:
+        axes.axis('off')
+    for axes in grid.flat[:count]:
+        axes.tick_params(labelsize=8)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+    for column in range(COLUMNS):
+        below = [axes for axes in grid[:, column] if axes.axison]
+        if below:
+            below[-1].set_xlabel('phase [cycles]', fontsize=8)
+            below[-1].tick_params(labelbottom=True)
+    return figure, grid.flat[:count]
+
+
+def joint_figure(found: RecordingFit) -> Figure:
+    """Draw the recorded mean cycle with its spread, and the fitted one, joint by joint."""
+    fit, stride = found.fit, found.stride
+    figure, grid = _grid(len(fit.joints), 1.9)
+    fraction = fit.rms_share
+    for axes, name, recorded, fitted in zip(grid, fit.joints, fit.recorded, fit.fitted,
+                                            strict=True):
+        spread = stride.spread[stride.joints.index(name)]
+        axes.fill_between(fit.theta, recorded - spread, recorded + spread, color=BAND,
+                          linewidth=0.0, label='spread of cycles')
+        axes.plot(fit.theta, recorded, color=_text(), linewidth=1.4, label='recorded')
+        axes.plot(fit.theta, fitted, color=FITTED, linewidth=1.4, linestyle='--', label='fitted')
+        poor = fraction[name] > POOR[fit.order]
+        axes.set_title(f'{name}: {100 * fraction[name]:.1f} % of range{", poor" if poor else ""}',
+                       fontsize=8, loc='left', color=FITTED if poor else _text())
+        axes.set_ylabel('angle [rad]', fontsize=8)
+    grid[0].legend(fontsize=7, frameon=False)
+    strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
+    figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
+                    f'{fit.gait} of the {fit.network.name} network, readout of order '
+                    f'{fit.order}{": a poor fit" if found.poor else ""}', fontsize=10,
+                    color=FITTED if found.poor else _text())
+    return figure
+
+
+def errors(found: RecordingFit) -> Figure:
+    """Fitted minus recorded at even instants of the cycle, joint by joint."""
+    theta, values = found.fit.synchronisation(POINTS)
+    figure, grid = _grid(len(found.fit.joints), 1.5)
+    for axes, name, row in zip(grid, found.fit.joints, values, strict=True):
+        axes.axhline(0.0, color=BAND, linewidth=1.0)
+        axes.plot(theta, row, 'o-', color=FITTED, markersize=3, linewidth=0.9)
+        axes.set_title(f'{name}: {row.min():.3f} to {row.max():.3f} rad', fontsize=8, loc='left')
+        axes.set_ylabel('error [rad]', fontsize=8)
+    figure.suptitle('Synchronisation error: fitted minus recorded', fontsize=10)
+    return figure
+
+
+def phases(found: RecordingFit) -> Figure:
+    """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
+    figure = Figure((6.0, 0.9 + 0.45 * len(found.stride.phases)), layout='constrained')
+    axes = figure.subplots()
+    orbit = found.fit.orbit
+    cells = next(iter(orbit.network.legs.values()))
+    wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
+    for row, (leg, phase) in enumerate(found.stride.phases.items()):
+        height = len(found.stride.phases) - 1 - row
+        marks: list[tuple[float | None, dict[str, Any]]] = [
+            (phase, {'marker': 'o', 'markersize': 8, 'color': _text(), 'label': 'recorded'}),
+            (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
+                               'markerfacecolor': 'none', 'label': found.fit.gait})]
+        for value, style in marks:
+            # What is near the seam stands on both sides of it.
+            places = [] if value is None else [
+                at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)
+                if -SEAM <= at <= 1.0 + SEAM]
+            for at in places:
+                axes.plot(at, height, linestyle='none', **style)
+    for seam in (0.0, 1.0):
+        axes.axvline(seam, color=BAND, linewidth=1.0)
+    axes.set_yticks(range(len(found.stride.phases)), list(found.stride.phases)[::-1])
+    axes.set_ylim(-0.6, len(found.stride.phases) - 0.4)
+    axes.set_xlim(-SEAM, 1.0 + SEAM)
+    axes.set_xticks(np.arange(5) / 4)
+    axes.set_xlabel('phase [cycles], 1 is 0 again')
+    axes.grid(axis='y', color=BAND)
+    known = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    axes.legend(known.values(), known.keys(), fontsize=8, frameon=False, loc='lower center',
+                ncols=2, bbox_to_anchor=(0.5, 1.0))
+    return figure
+
+
+def stretch(found: RecordingFit) -> Figure:
+    """Draw the whole recording of the joint that moves most, and the stretch in it."""
+    recording, stride = found.recording, found.stride
+    name = stride.joints[int(np.argmax(np.ptp(stride.mean, axis=1)))]
+    angles = recording.positions[:, recording.joints.index(name)]
+    figure = Figure((10.5, 2.4), layout='constrained')
+    axes = figure.subplots()
+    # Lowest and highest of each column of the picture: all there is to see of a long recording.
+    edges = np.linspace(0, len(angles), min(COLUMN, len(angles)) + 1).astype(int)[:-1]
+    low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
+                 for extreme, none in ((np.minimum, np.inf), (np.maximum, -np.inf)))
+    there = low <= high
+    axes.fill_between(recording.times[edges][there], low[there], high[there], color=_text(),
+                      linewidth=0.6)
+    axes.axvspan(stride.begin, stride.end, color=FITTED, alpha=0.15, linewidth=0.0)
+    axes.set_title(f'{name}; shaded: the steady stretch, {stride.begin:.2f} to {stride.end:.2f} s '
+                   f'of {recording.times[-1]:.2f} s', fontsize=9, loc='left')
+    axes.set_xlim(0.0, recording.times[-1])
+    axes.set_xlabel('time [s]', fontsize=8)
+    axes.set_ylabel('angle [rad]', fontsize=8)
+    axes.tick_params(labelsize=8)
+    return figure
+
+
+def convergence(found: RecordingFit) -> Figure:
+    """Objective and parameters over the iterations of each start."""
+    names = found.fit.free
+    trials = [trial for trial in found.fit.starts if len(trial.path)]
+    figure = Figure((3.4 * (1 + len(names)), 2.6), layout='constrained')
+    grid = figure.subplots(1, 1 + len(names), squeeze=False)
+    for number, trial in enumerate(trials):
+        steps = np.arange(len(trial.path))
+        for k, axes in enumerate(grid.flat):
+            axes.plot(steps, trial.path[:, k], 'o-', markersize=3, linewidth=1.0,
+                      color=LINES[number % len(LINES)])
+    grid.flat[0].set_yscale('log')
+    for axes, label in zip(grid.flat, ('half the sum of squares [1]', *names), strict=True):
+        axes.set_xlabel('iteration')
+        axes.set_ylabel(label)
+    figure.suptitle('Convergence of each start', fontsize=10)
+    return figure
+
+
+FIGURES = (('The recording', stretch),
+           ('Recorded and fitted', joint_figure),
+           ('Error over the cycle', errors),
+           ('Phases', phases),
+           ('Convergence', convergence))
+
+
+def _stride(found: RecordingFit) -> list[str]:
+    stride, fit = found.stride, found.fit
+    return [
+        f'{found.recording.source}: {len(found.recording.times)} samples, '
+        f'{found.recording.times[-1]:.2f} s; {found.read}.',
+        f'Steady from {stride.begin:.2f} to {stride.end:.2f} s, whole strides: {stride.cycles}, '
+        f'at {stride.frequency:.4f} +- {stride.frequency_error:.1g} Hz.',
+        'Phases [cycles]: ' + ', '.join(f'{leg} {phase:.3f}'
+                                        for leg, phase in stride.phases.items())
+        + f': {stride.verdict} ({stride.distance:.3f} of a cycle off, the next one '
+        f'{stride.margin:.3f} further).',
+        f'Confidence in {stride.nearest} and this frequency: {found.confidence:.0%}.',
+        f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}, '
+        f'{100.0 * fit.mean_rms_share:.1f} % of the range left on average'
+        f'{": a poor fit" if found.poor else ""}.']
+
+
+def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
+    """Rows of the fitted parameters, with a head."""
+    rows: list[tuple[str, ...]] = [('parameter', 'value', 'standard error', '95 % interval')]
+    for name, one in found.fit.parameters.items():
+        rows.append((name, f'{one.value:.6g}', f'{one.stderr:.2g}',
+                     f'{one.low:.6g} to {one.high:.6g}'
+                     + ('' if one.bounded else ' (not bounded by the data)')))
+    return rows
+
+
+def joints(found: RecordingFit) -> list[tuple[str, ...]]:
+    """Rows of the joints' errors, with a head."""
+    fit = found.fit
+    rms, fraction = fit.rms, fit.rms_share
+    rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'share of range')]
+    return rows + [(name, str(fit.cells[name]), f'{rms[name]:.4f}',
+                    f'{100 * fraction[name]:.2f} %')
+                   for name in fit.joints]
+
+
+def starts(found: RecordingFit) -> list[tuple[str, ...]]:
+    """Rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
+    names = found.fit.free
+    rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
+    for trial in found.fit.starts:
+        begin, end = (', '.join(f'{name} {value:.4f}' for name, value
+                                in zip(names, values, strict=False))
+                      for values in (trial.start, trial.values))
+        rows.append((begin, str(trial.iterations), f'{trial.cost:.6g}', trial.why or end))
+    return rows
+
+
+def _minima(found: RecordingFit) -> str:
+    fit = found.fit
+    return 'Distinct minima of the starts: ' + '; '.join(
+        ', '.join(f'{name} {value:.4g}' for name, value in
+                  zip(fit.free, trial.values, strict=False)) + f' ({trial.cost:.6g})'
+        for trial in fit.minima) + '.'
+
+
+def _judged(found: RecordingFit) -> list[str]:
+    fit = found.fit
+    lines = []
+    if fit.hopf is not None:
+        lines.append(f'The {fit.gait} is born at the critical delay {fit.hopf.value:.4f}; '
+                     f'{fit.network.delay_parameter} is {fit.network.delay:.4f}.')
+    verdict = fit.verdict
+    lines.append(
+        f'It attracts by itself (largest multiplier {verdict.multipliers.leading:.3g} a stride).'
+        if verdict.stable else
+        f'It attracts with the symmetry lock (gain above {verdict.smallest_gain:.3g} per model '
+        f'time; the generator takes {verdict.default_gain:.3g}).'
+        if verdict.stable_with_default_gain else
+        'It does not attract, with or without the symmetry lock.')
+    return lines
+
+
+def _shares(found: RecordingFit) -> str:
+    return 'Mean RMS error over range by order of the readout: ' + ', '.join(
+        f'{order}: {100 * fraction:.2f} %' for order, fraction in found.fractions.items()) + '.'
+
+
+def as_text(found: RecordingFit) -> str:
+    """Return the report for a terminal."""
+    notes = [*found.recording.notes, *found.stride.notes]
+    lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
+             *table(joints(found), '<>>>'), _shares(found), '']
+    if len(found.fit.starts) > 1:
+        lines += [*table(starts(found), '<>>'), _minima(found), '']
+    lines += [*_judged(found), *(f'note: {note}' for note in notes),
+              *(f'warning: {warning}' for warning in found.warnings)]
+    return '\n'.join(lines)
+
+
+def as_table(fits: list[PaperFit]) -> list[str]:
+    """Return the paper's fits as its Tables 1 and 2, and error ranges as its Figures 5 to 9."""
+    if not fits:
+        return []
+
+    def values(parameters: dict[str, float]) -> str:
+        return ', '.join(f'{name} {value:.4f}' for name, value in parameters.items())
+
+    rows: list[tuple[str, ...]] = [('initial value', 'iterations', 'error f [rad^2]',
+                                    'numerical solution')]
+    rows += [(values(one.start), str(one.fit.trial.iterations), f'{one.fit.cost:.4f}',
+              values(one.end)) for one in fits]
+    best = min(fits, key=lambda one: one.fit.cost)
+    ranges = ', '.join(f'{name} [{low:.3f}, {high:.3f}]'
+                       for name, (low, high) in best.errors.items())
+    return ['', 'As Liu & Zhang (2024) fit, eight joints taken for the eight cells:',
+            *table(rows, '<>><'), f'synchronisation errors [rad]: {ranges}']
+
+
+def _html_table(rows: list[tuple[str, ...]]) -> str:
+    head, *body = rows
+    lines = ['<table><thead><tr>' + ''.join(f'<th>{escape(cell)}</th>' for cell in head)
+             + '</tr></thead><tbody>']
+    lines += ['<tr>' + ''.join(f'<td class="value">{escape(cell)}</td>' for cell in row) + '</tr>'
+              for row in body]
+    return '\n'.join([*lines, '</tbody></table>'])
+
+
+def _image(figure: Figure, name: str) -> str:
+    out = io.BytesIO()
+    figure.savefig(out, format='png', dpi=110)
+    return (f'<figure><img alt="{escape(name)}" src="data:image/png;base64,'
+            f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
+
+
+def _warned(found: RecordingFit) -> str:
+    """Return the warnings, before anything else; red where the fit is poor."""
+    if not found.warnings:
+        return ''
+    rows = '\n'.join(f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}'
+                     '</td></tr>' for text in found.warnings)
+    return f'<table><thead><tr><th>Warnings</th></tr></thead><tbody>{rows}</tbody></table>'
+
+
+def _strides(found: RecordingFit) -> list[str]:
+    """Return the sections on single strides, that of each stride folded."""
+    legs = stride_report.strides_of(found)
+    parts = ['<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
+             _html_table(stride_report.by_leg(legs))]
+    if len(pairs := stride_report.symmetry(legs)) > 1:
+        parts += ['<p>Symmetry index, 0 where both sides are alike:</p>', _html_table(pairs)]
+    return [*parts, '<details><summary>Every stride</summary>',
+            _html_table(stride_report.every_stride(legs)), '</details>']
+
+
+def as_html(found: RecordingFit) -> str:
+    """Return the report as one page with its figures in it."""
+    def paragraphs(lines: list[str]) -> str:
+        return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
+
+    title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
+    parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
+             f'<title>{escape(title)}</title><style>{STYLE}</style></head><body>',
+             f'<h1>{escape(title)}</h1>', _warned(found), paragraphs(_stride(found)),
+             '<h2>Parameters</h2>',
+             _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
+             paragraphs([_shares(found)]), _html_table(joints(found))]
+    parts += _strides(found)
+    for name, draw in FIGURES:
+        parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
+    parts += ['<h2>Starts</h2>', _html_table(starts(found)), paragraphs([_minima(found)])]
+    notes = [*found.recording.notes, *found.stride.notes]
+    if notes:
+        parts += ['<h2>Notes</h2>', paragraphs(notes)]
+    return '\n'.join([*parts, '</body></html>', ''])

@@ -1,0 +1,126 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where a fit starts if nothing else is asked for: a few of many values that cover the ranges.
+
+A cost may have several minima: other parameters make much the same waveform of a free readout.
+Every candidate is judged by what its best readouts leave of the recording, which takes an orbit
+and a linear fit; the least costs on their grid are starts of the trust region, beside the
+network's own values.
+"""
+
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.fitting.inversion.free_parameters import Free
+from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
+import numpy as np
+
+if TYPE_CHECKING:
+    from cpg_ros.fitting.inversion.invert import CycleProblem
+
+#: Free numbers that are the stance's share of a stride.
+SHARES = (GAIT_DUTY, 'duty')
+#: Duties of a gait that are tried.
+DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)
+#: Delays that are, over the critical one; factors of a number that has no narrow range; and even
+#: places within one that has: whose ends are of one sign and differ by no more than NARROW.
+LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.5) / 9, 10.0
+#: A number of 0 is this far from others (in its unit).
+TINY = 1e-3
+#: Fewest and most starts beside the network's own values; and how far apart two minima are, each
+#: number over its size.
+LEAST, MOST, APART = 2, 3, 0.03
+
+
+def distinct(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether values of the free numbers, shape (numbers,), are not about the same."""
+    return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
+
+
+def _tried(problem: 'CycleProblem', k: int, one: Free, here: float) -> tuple[float, ...]:
+    """Return the coordinates of a free number that are tried besides its own."""
+    if one.name == GAIT_DUTY:
+        return DUTIES
+    if k == problem.coordinates.delay:
+        return LATE
+    low, high = one.low, one.high
+    if 0.0 < low < high <= NARROW * low:
+        return tuple(low + place * (high - low) for place in PLACES)
+    return tuple(factor * here for factor in FACTORS)
+
+
+def best_starts(problem: 'CycleProblem', begin: np.ndarray) -> list[np.ndarray]:
+    """Return the network's own values and the least costs on a grid over the ranges.
+
+    Args:
+        problem: the fit.
+        begin: the network's own values and a phase; without an orbit they are the only start.
+
+    Returns:
+        Values, the least cost first, each of shape (values,).
+
+    """
+    try:
+        problem.begin(begin)
+        here = problem.coordinates.of(begin)[:-1]
+    except NoOrbit:
+        return [begin]
+    axes = [np.unique([value, *_tried(problem, k, one, float(value))])
+            for k, (one, value) in enumerate(zip(problem.free, here, strict=True))]
+    grid = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1)
+    explained, starts = np.full(grid.shape[:-1], -np.inf), {}
+    own = [int(np.abs(axis - value).argmin()) for axis, value in zip(axes, here, strict=True)]
+    # The nearest ones first, an orbit leads to the next; one of the network's numbers is moved at
+    # a time, as an orbit takes far longer than a readout.
+    far = np.sum(np.abs(grid - here) / (np.abs(here) + TINY), axis=-1)
+    for place in sorted(np.ndindex(far.shape), key=lambda one: float(far[one])):
+        if sum(k != at for k, at, one in zip(place, own, problem.free, strict=True)
+               if one.members) > 1:
+            continue
+        with suppress(NoOrbit):
+            values = problem.coordinates.values(np.append(grid[place], 0.0))
+            if all(one.low <= value <= one.high
+                   for one, value in zip(problem.free, values, strict=False)):
+                values[-1], explained[place] = problem.explained(values)
+                problem.hold(values)
+                starts[place] = values
+    if not starts:
+        return [begin]
+    ranked = sorted(starts, key=lambda place: -explained[place])
+    best = [place for place in ranked if _highest(explained, place)][:MOST]
+    best += [place for place in ranked if place not in best][:max(LEAST - len(best), 0)]
+    return [starts[place] for place in ranked if place in (tuple(own), *best)]
+
+
+def upside_down(problem: 'CycleProblem', values: np.ndarray) -> np.ndarray | None:
+    """Return values near which the waveform may be the same upside down; None if none is known.
+
+    A free readout makes the same motion of it: stance takes the part of swing.
+    """
+    fractions = [k for k, one in enumerate(problem.free) if one.name in SHARES]
+    if not fractions:
+        return None
+    there = values.copy()
+    for k in fractions:
+        there[k] = np.clip(1.0 - values[k], problem.free[k].low, problem.free[k].high)
+    there[-1] = problem.explained(there)[0]
+    return there
+
+
+def _highest(explained: np.ndarray, place: tuple[int, ...]) -> bool:
+    """Whether no neighbour on the grid explains more."""
+    near = explained[tuple(slice(max(k - 1, 0), k + 2) for k in place)]
+    return bool(explained[place] >= near.max())

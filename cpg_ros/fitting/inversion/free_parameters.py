@@ -1,0 +1,355 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Coordinates in which a trust region moves: the delay is measured by the gait's critical one.
+
+Close to where a gait is born its shape is the same all along the Hopf set, which is curved. With
+the delay over its critical value for a coordinate that valley is straight, and the set's edge a
+bound.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
+from cpg_ros.networks.network import Network
+import numpy as np
+from scipy.optimize import least_squares
+
+# Which numbers of a network a fit may move, and within what bounds.
+
+N = TypeVar('N', bound=Network)
+#: Places at which the edge of the Hopf set is looked for between a value and a bound, and
+#: halvings that then find it.
+PLACES, HALVINGS = 64, 40
+
+
+@dataclass(frozen=True)
+class Free:
+    """A free number of a network in a gait.
+
+    Attributes:
+        name: of a parameter, or of a group of them.
+        members: parameters that take its value: those that the gait's symmetry needs equal; none
+            if it is not the network's.
+        low, high: bounds.
+
+    """
+
+    name: str
+    members: tuple[str, ...]
+    low: float
+    high: float
+
+    def value(self, network: Network) -> float:
+        """Its value in a network."""
+        return float(getattr(network, self.members[0]))
+
+
+def free_numbers(network: Network, gait: str, names: Sequence[str],
+                 bounds: Mapping[str, tuple[float, float]] | None = None) -> tuple[Free, ...]:
+    """Return the free numbers of a fit.
+
+    Args:
+        network: parameters.
+        gait: one of its gaits.
+        names: of parameters, or of groups that the network sets together.
+        bounds: name -> lower and upper bound, where narrower than the range.
+
+    Raises:
+        InputError: a name is unknown or given twice, or bounds cannot be used.
+
+    """
+    bounds = dict(bounds or {})
+    families = network.families(network.symmetry(gait))
+    known = (*network.parameters(), *network.groups)
+    found: list[Free] = []
+    if not names or isinstance(names, str):
+        raise InputError(f'no names of parameters to fit; there are {", ".join(known)}')
+    if len(set(names)) < len(names):
+        raise InputError(f"names are '{', '.join(names)}'; they must be different ones")
+    for name in names:
+        if name not in known:
+            raise InputError(f"'{name}' is not one of the parameters of {network.name}: "
+                             f'{", ".join(known)}')
+        members = network.groups.get(name, (name,))
+        members = tuple(dict.fromkeys(
+            member for family in families if set(family) & set(members) for member in family))
+        taken = [other.name for other in found if set(other.members) & set(members)]
+        if taken:
+            raise InputError(f'{name} is the same as {taken[0]}, which is free already')
+        low = max(network.ranges[member].low for member in members)
+        high = min(network.ranges[member].high for member in members)
+        if name in bounds:
+            least, most = bounds.pop(name)
+            if not low <= least < most <= high:
+                raise InputError(f'{name}: bounds {least:g} to {most:g} are not in order within '
+                                 f'{low:g} to {high:g}')
+            low, high = least, most
+        found.append(Free(name, members, low, high))
+    if bounds:
+        raise InputError(f"'{next(iter(bounds))}' has bounds but is not free")
+    return tuple(found)
+
+
+def with_values(network: N, free: Sequence[Free], values: Sequence[float] | np.ndarray) -> N:
+    """Return the network with values for its free numbers, in their order."""
+    return replace(network, **{  # type: ignore[type-var]
+        member: float(value) for one, value in zip(free, values, strict=True)
+        for member in one.members})
+
+
+def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
+    """Narrow the bounds of a single free number to where its gait is born before the delay.
+
+    The bounds of networks without a delay stay.
+    """
+    if not network.delay_parameter:
+        return one
+
+    def excess(value: float) -> float:
+        there = with_values(network, (one,), (value,))
+        if there.delay <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
+            return -1.0
+        point = first_hopf(there, gait)
+        return -1.0 if point is None or point.drifts else there.delay - point.value
+
+    here, ends = one.value(network), []
+    for end in (one.low, one.high):
+        inside = here
+        for outside in np.linspace(here, end, PLACES)[1:]:
+            if excess(float(outside)) <= 0.0:
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (inside + outside)
+                    inside, outside = ((middle, outside) if excess(middle) > 0.0
+                                       else (inside, middle))
+                break
+            inside = float(outside)
+        ends.append(inside)
+    return Free(one.name, one.members, *ends)
+
+
+# A trust region from one start, with a record of its path.
+
+#: Values -> residual (n,) and its derivative (n, values); NoOrbit where there is none.
+Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Minimisation(ShortRepr):
+    """What came of one start.
+
+    Attributes:
+        start: values it started from.
+        values: where it ended.
+        cost: half the sum of squares there; infinite where the start had no orbit.
+        path: cost and values at the start and after every accepted step, shape
+            (iterations + 1, 1 + values).
+        evaluations: orbits that were solved for.
+        converged: whether a tolerance was met.
+        why: the reason where there was nothing to start from, or ''.
+
+    """
+
+    start: np.ndarray
+    values: np.ndarray
+    cost: float
+    path: np.ndarray
+    evaluations: int
+    converged: bool
+    why: str = ''
+
+    @classmethod
+    def without_orbit(cls, start: np.ndarray, error: NoOrbit) -> 'Minimisation':
+        """Return what comes of a start that has no orbit."""
+        return cls(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False, str(error))
+
+    @property
+    def iterations(self) -> int:
+        """Accepted steps."""
+        return max(0, len(self.path) - 1)
+
+
+def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.ndarray,
+             tolerance: float, most: int = 100) -> Minimisation:
+    """Minimise half the sum of squares within bounds, by scipy's 'trf' and exact derivatives.
+
+    Args:
+        evaluate: the problem; called twice in a row with the same values.
+        start: values, shape (n,).
+        low: lower bounds, shape (n,).
+        high: upper bounds.
+        tolerance: relative change of values, and of the cost, at which to stop.
+        most: evaluations at most.
+
+    """
+    start = np.asarray(start, dtype=float)
+    path: list[np.ndarray] = []
+    evaluations = 0
+    try:
+        size = evaluate(start)[0].size
+    except NoOrbit as error:
+        return Minimisation.without_orbit(start, error)
+
+    def residual(values: np.ndarray) -> np.ndarray:
+        nonlocal evaluations
+        evaluations += 1
+        try:
+            return evaluate(values)[0]
+        except NoOrbit:
+            # The method answers what is not finite with a shorter step.
+            return np.full(size, np.nan)
+
+    def jacobian(values: np.ndarray) -> np.ndarray:
+        left, slopes = evaluate(values)
+        path.append(np.append(0.5 * left @ left, values))
+        return slopes
+
+    found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
+                          ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
+    return Minimisation(start, found.x, float(found.cost), np.array(path), evaluations,
+                        found.status > 0)
+
+
+#: Least share of the critical delay by which the delay is above it.
+ABOVE = 1e-7
+#: Where else to look: critical delays that are near it, or anywhere; factors of other numbers.
+NEAR, LATE, FACTORS = 1.03, (1.03, 1.3, 2.0, 4.0), (0.45, 0.7, 1.4, 2.0, 3.0)
+
+
+class Coordinates:
+    """Free numbers of a fit, and what the trust region moves instead.
+
+    The phase, which comes last, and all numbers but a free delay are their own coordinates. A
+    delay with bounds of its own is, too.
+
+    Attributes:
+        free: the free numbers.
+        delay: index of the one that is measured by its critical value, -1 for none.
+
+    """
+
+    def __init__(self, network: Network, gait: str, free: Sequence[Free]) -> None:
+        self._network, self._gait, self.free = network, gait, tuple(free)
+        whole = network.ranges.get(network.delay_parameter)
+        self.delay = next((k for k, one in enumerate(free) if whole
+                            and one.name == network.delay_parameter
+                            and (one.low, one.high) == (whole.low, whole.high)), -1)
+
+    @property
+    def straight(self) -> bool:
+        """Whether all numbers are their own coordinates."""
+        return self.delay < 0
+
+    def _onset(self, values: np.ndarray) -> HopfPoint:
+        there = with_values(self._network, self.free, values[:len(self.free)])
+        point = first_hopf(there, self._gait) if np.isfinite(values).all() else None
+        if point is None:
+            known = there.as_dict()
+            values_text = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
+            raise NoOrbit(f'{values_text} gives no {self._gait} at any delay')
+        return point
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Coordinates of values; NoOrbit where the gait is born at no delay."""
+        found = np.array(values, dtype=float)
+        if not self.straight:
+            found[self.delay] /= self._onset(found).value
+        return found
+
+    def values(self, coordinates: np.ndarray) -> np.ndarray:
+        """Values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
+        found = np.array(coordinates, dtype=float)
+        if not self.straight:
+            found[self.delay] *= self._onset(found).value
+            one = self.free[self.delay]
+            if not one.low <= found[self.delay] <= one.high:
+                raise NoOrbit(f'{one.name} {found[self.delay]:g} is not within {one.low:g} to '
+                              f'{one.high:g}')
+        return found
+
+    def slopes(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return the derivatives of the values by the coordinates, shape (n, n)."""
+        found = np.eye(coordinates.size)
+        if not self.straight:
+            point, k = self._onset(coordinates), self.delay
+            slopes = point.slopes
+            for j, one in enumerate(self.free):
+                found[k, j] = coordinates[k] * slopes.get(one.name, 0.0)
+            found[k, k] = point.value
+        return found
+
+    def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Move values by a step along straight lines of the coordinates, within the bounds."""
+        if self.straight:
+            low, high = self._bounds(values)
+            return np.clip(values + step, low, high)
+        begin = self.of(values)
+        low, high = self._bounds(values)
+        return self.values(np.clip(begin + np.linalg.solve(self.slopes(begin), step), low, high))
+
+    def valley(self, values: np.ndarray) -> list[np.ndarray]:
+        """List values along the Hopf set, where other least costs may lie; none without delay."""
+        if self.straight:
+            return []
+        here, found = self.of(values), []
+        low, high = self._bounds(values)
+        others = [j for j, one in enumerate(self.free) if j != self.delay and one.members]
+        for late in LATE if not others else (NEAR, here[self.delay]):
+            for j, factor in [(j, factor) for j in others for factor in FACTORS] or [(-1, 1.0)]:
+                there = here.copy()
+                there[self.delay] = late
+                there[j] *= factor
+                with suppress(NoOrbit):
+                    found.append(self.values(np.clip(there, low, high)))
+        return found
+
+    def _bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the coordinates; a single number's are those of its Hopf set, too."""
+        free = self.free
+        if len(free) == 1 and self.straight and free[0].members:
+            there = with_values(self._network, free, values[:1])
+            free = (within_hopf_set(there, self._gait, free[0]),)
+        low = np.array([*(one.low for one in free), -np.inf])
+        high = np.array([*(one.high for one in free), np.inf])
+        if not self.straight:
+            low[self.delay], high[self.delay] = 1.0 + ABOVE, np.inf
+        return low, high
+
+    def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100
+                ) -> Minimisation:
+        """Minimise from values that have an orbit; as trust_region.minimise, but in coordinates.
+
+        Args:
+            evaluate: the problem, in values.
+            start: values.
+            tolerance: relative change of coordinates, and of the cost, at which to stop.
+            most: evaluations at most.
+
+        """
+        def moved(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            left, slopes = evaluate(self.values(coordinates))
+            return left, slopes if self.straight else slopes @ self.slopes(coordinates)
+
+        low, high = self._bounds(start)
+        begin = np.clip(self.of(start), low, high)
+        trial = minimise(moved, begin, low, high, tolerance, most)
+        if self.straight or trial.why:
+            return replace(trial, start=start)
+        path = np.array([[row[0], *self.values(row[1:])] for row in trial.path])
+        return replace(trial, start=start, values=self.values(trial.values), path=path)

@@ -1,0 +1,395 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a generator is to be set to, and when, so that it changes gaits as a recording does."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+import itertools
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from cpg_ros.common.errors import CpgError, InputError, ShortRepr
+from cpg_ros.common.files import write_atomically
+from cpg_ros.common.yaml_reader import quoted, YamlReader
+from cpg_ros.fitting.gaits.quality_checks import CHANGE, SURE
+from cpg_ros.fitting.gaits.steady_stretch import RecordingLike
+from cpg_ros.fitting.gaits.stride import NoSteadyGait, Stride
+from cpg_ros.fitting.inversion.parameter_files import (
+    check_plan,
+    fitted_motion,
+    fitted_robot,
+    parameter_tree,
+    robot_file_of,
+    running_parameters,
+)
+from cpg_ros.fitting.inversion.recording_fit import (
+    fit_recording,
+    leg_joints,
+    network_of,
+    RecordingFit,
+    stride_of,
+)
+from cpg_ros.fitting.recordings.recording import Recording, RecordingError
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import write_robot
+from cpg_ros.networks.registry import find_network, NetworkError, reference, with_legs_of
+import numpy as np
+import yaml
+
+# Where within a stretch of one frequency legs change their phases: a walk that becomes a trot.
+
+#: Fewest strides on either side of a change.
+FEWEST = int(SURE)
+
+
+def phase_change(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+                 ) -> float | None:
+    """Return when the phases of the legs change within a stretch, s, to about one stride.
+
+    Args:
+        recording: of the joints.
+        legs: leg -> its joints.
+        stride: found in the recording, whose stretch is looked at.
+
+    Returns:
+        The recording's time, None if no leg changes its phase by more than a tenth of a cycle.
+
+    """
+    points = _points(recording, legs, stride)
+    count = len(points)
+    if count < 2 * FEWEST:
+        return None
+    sums = np.cumsum(points, axis=0)
+    ends = np.arange(FEWEST, count - FEWEST + 1)[:, None]
+    before = sums[ends[:, 0] - 1] / ends
+    after = (sums[-1] - sums[ends[:, 0] - 1]) / (count - ends)
+    ratio = ends * (count - ends) / count * np.abs(after - before)**2
+    best = int(np.argmax(ratio.sum(axis=1)))
+    turned = np.angle(after[best] * before[best].conj()) / (2.0 * np.pi)
+    if np.abs(turned).max() <= CHANGE:
+        return None
+    first = np.ceil(stride.warp.phases[0])
+    return float(np.interp(first + ends[best, 0], stride.warp.phases, stride.warp.knots))
+
+
+def _points(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+            ) -> np.ndarray:
+    """Return exp(2 pi i phase) of the legs against the first, shape (whole strides, legs - 1)."""
+    warp, joints = stride.warp, list(recording.joints)
+    inside = (recording.times >= warp.knots[0]) & (recording.times <= warp.knots[-1])
+    phases = warp(recording.times[inside])
+    first, last = int(np.ceil(phases[0])), int(np.floor(phases[-1]))
+    number = np.floor(phases).astype(int) - first
+    whole = (number >= 0) & (number < last - first)
+    turn = np.exp(-2j * np.pi * phases[whole])
+    sums = []
+    for leg in stride.phases:
+        name = max((one for one in legs[leg] if one in stride.joints),
+                   key=lambda one: float(np.ptp(stride.mean[stride.joints.index(one)])))
+        x = recording.positions[inside, joints.index(name)][whole]
+        x = np.where(np.isfinite(x), x - np.nanmean(x), 0.0) * turn
+        sums.append(np.bincount(number[whole], x.real, last - first)
+                    + 1j * np.bincount(number[whole], x.imag, last - first))
+    ahead = np.array(sums[1:]) * np.conj(sums[0])
+    return (ahead / np.maximum(np.abs(ahead), 1e-300)).T
+
+
+# A recording that changes its gait, cut into its steady stretches, each of them fitted.
+
+#: Shorter remains are not searched: three strides of the fastest that is looked for, s.
+SHORTEST = 0.24
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StretchFit(ShortRepr):
+    """A steady stretch of a recording.
+
+    Attributes:
+        begin, end: s from the recording's start.
+        stride: what was found there, on a clock of its own.
+        fit: the network's gait fitted to it; None if that failed.
+        why: why there is no fit.
+
+    """
+
+    begin: float
+    end: float
+    stride: Stride
+    fit: RecordingFit | None
+    why: str = ''
+
+    def _summary(self) -> str:
+        return (f'{self.begin:.2f} to {self.end:.2f} s: {self.stride.verdict}, '
+                f'{self.stride.frequency:.4g} Hz')
+
+    @property
+    def gait(self) -> str | None:
+        """Name of the gait, None if it is none or cannot be told."""
+        return None if len(self.stride.alike) > 1 else self.stride.gait
+
+
+    @property
+    def confidence(self) -> float:
+        """Probability that gait and frequency are those named, as of RecordingFit."""
+        return self.stride.confidence if self.fit is None else self.fit.confidence
+
+
+def cut(recording: Recording, robot: Robot | None = None, network: str = ''
+        ) -> list[tuple[float, float, Stride]]:
+    """Return begin and end, s, and stride of the steady stretches of a recording, in its order.
+
+    Args:
+        recording: joints over time.
+        robot: which joints belong to which legs; by default their names decide.
+        network: whose gaits they may be; by default as of fit_recording.
+
+    Raises:
+        NoSteadyGait: there is none.
+        CpgError: as of fit_recording.
+
+    """
+    legs, _ = leg_joints(recording, robot)
+    try:
+        kind = with_legs_of(find_network(_network(recording, robot, network)), legs)
+    except NetworkError as error:
+        raise InputError(f'network {error}') from error
+    found: list[tuple[float, float, Stride]] = []
+    remains = [(0.0, float(recording.times[-1]))]
+    why: NoSteadyGait | None = None
+    while remains:
+        begin, end = remains.pop()
+        try:
+            part = recording.between(begin, end)
+            _, stride = stride_of(part, legs, kind, robot)
+        except NoSteadyGait as error:
+            why = why or error
+            continue
+        except RecordingError:
+            # Fewer than two samples are no stretch.
+            continue
+        origin = part.start - recording.start
+        change = phase_change(part, legs, stride)
+        if change is not None:
+            # What changes, and one stride on either side, is of neither gait.
+            remains += _longer((begin, origin + change - 1.0 / stride.frequency),
+                               (origin + change + 1.0 / stride.frequency, end))
+            continue
+        first, last = origin + stride.begin, origin + stride.end
+        if stride.cycles >= SURE:
+            found.append((first, last, stride))
+        remains += _longer((begin, first), (last, end))
+    if not found:
+        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {SURE:g} strides')
+    return sorted(found, key=lambda one: one[0])
+
+
+def _network(recording: Recording, robot: Robot | None, network: str) -> str:
+    if network or robot is None:
+        return network or network_of(leg_joints(recording, robot)[0])
+    return robot.networks[0]
+
+
+def _longer(*parts: tuple[float, float]) -> list[tuple[float, float]]:
+    return [(begin, end) for begin, end in parts if end - begin >= SHORTEST]
+
+
+def fit_stretches(recording: Recording, robot: Robot | None = None, network: str = '', *,
+                  order: int = 3, done: Callable[[float], None] = lambda fraction: None
+                  ) -> list[StretchFit]:
+    """Fit a network's gaits to all steady stretches of a recording.
+
+    Args:
+        recording: joints over time.
+        robot: as of fit_recording.
+        network: one for all stretches; by default as of fit_recording.
+        order: of the readouts, 1 to 3.
+        done: called with the share of the fits that is done, 0 to 1.
+
+    Raises:
+        CpgError: as of cut.
+
+    """
+    name, found = _network(recording, robot, network), []
+    stretches = cut(recording, robot, network)
+    for k, (begin, end, stride) in enumerate(stretches):
+        part = replace(recording.between(begin, end),
+                       source=f'{recording.source}, {begin:.2f} to {end:.2f} s')
+
+        def so_far(fraction: float, before: int = k) -> None:
+            done((before + fraction) / len(stretches))
+        try:
+            fit = fit_recording(part, robot, name, order=order, done=so_far)
+            found.append(StretchFit(begin, end, fit.stride, fit))
+        except CpgError as error:
+            found.append(StretchFit(begin, end, stride, None, str(error)))
+    return found
+
+
+def stretch_rows(found: Sequence[StretchFit]) -> list[tuple[str, ...]]:
+    """Return stretches as a table, with its head."""
+    rows: list[tuple[str, ...]] = [('begin [s]', 'end [s]', 'gait', 'frequency [Hz]', 'strides',
+                                    'confidence', 'RMS error')]
+    return rows + [(f'{one.begin:.2f}', f'{one.end:.2f}', one.stride.verdict,
+                    f'{one.stride.frequency:.4f}', str(one.stride.cycles),
+                    f'{one.confidence:.3f}', 'not fitted' if one.fit is None else
+                    f'{100.0 * one.fit.fit.mean_rms_share:.1f} %') for one in found]
+
+
+#: Frequencies this near to one another, as a share, are one entry's.
+SAME = 0.02
+#: Latest time of an entry, s.
+LATEST = 1e6
+
+
+class ScheduleError(CpgError):
+    """A schedule cannot be used; one line with the file, the key and the reason."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Parameters of the generator, by name, and when to set them, s from the start."""
+
+    at: float
+    parameters: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class GaitSchedule:
+    """Changes of gait over time.
+
+    Attributes:
+        network: that the generator has to run, as its parameter names it.
+        robot: path of the robot file with the gaits' readouts, or a shipped robot's name.
+        entries: at rising times.
+
+    """
+
+    network: str
+    robot: str
+    entries: tuple[Entry, ...]
+
+
+def schedule_of(stretches: Sequence[StretchFit], robot: str) -> GaitSchedule:
+    """Return the changes of gait of a recording; each comes in the middle of its transition.
+
+    Args:
+        stretches: as of fit_stretches; those without a fit are passed over.
+        robot: path of the robot file.
+
+    Raises:
+        InputError: no stretch has a fit.
+
+    """
+    fitted = [(one, one.fit) for one in stretches if one.fit is not None]
+    if not fitted:
+        raise InputError('no stretch could be fitted: ' + '; '.join(
+            dict.fromkeys(one.why for one in stretches)))
+    entries = [Entry(0.0, running_parameters(fitted[0][1]))]
+    for (before, old), (after, new) in itertools.pairwise(fitted):
+        same = (old.fit.gait == new.fit.gait
+                and abs(new.stride.frequency / old.stride.frequency - 1.0) <= SAME)
+        if not same:
+            entries.append(Entry(round(0.5 * (before.end + after.begin), 3),
+                                 running_parameters(new)))
+    return GaitSchedule(reference(fitted[0][1].fit.network.name), robot, tuple(entries))
+
+
+def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
+    """Return a robot that moves in each gait as in the longest stretch of it.
+
+    Args:
+        stretches: as of fit_stretches.
+        robot: as of fitted_robot.
+
+    Raises:
+        InputError: as of fitted_robot.
+
+    """
+    longest: dict[str, RecordingFit] = {}
+    for one in sorted(stretches, key=lambda one: one.begin - one.end):
+        if one.fit is not None:
+            longest.setdefault(one.fit.fit.gait, one.fit)
+    made = [fitted_robot(fit, robot) for fit in longest.values()]
+    # Without a robot file each stretch gives limits of its own.
+    bounds = {joint.name: joint for joint in made[0].joints}
+    for joint in itertools.chain.from_iterable(other.joints for other in made[1:]):
+        known = bounds[joint.name]
+        bounds[joint.name] = replace(known, lower=min(known.lower, joint.lower),
+                                     upper=max(known.upper, joint.upper),
+                                     velocity=max(known.velocity, joint.velocity))
+    motions = made[0].motions | {
+        gait: fitted_motion(fit, None) if robot is None else one.motions[gait]
+        for (gait, fit), one in zip(longest.items(), made, strict=True)}
+    legs = {leg: tuple(bounds[joint.name] for joint in joints)
+            for leg, joints in made[0].legs.items()}
+    return replace(made[0], legs=legs, motions=motions)
+
+
+def write_schedule(path: Path, stretches: Sequence[StretchFit], robot: Robot | None) -> list[Path]:
+    """Write the schedule of a recording, and beside it the robot file that it names.
+
+    Files that the generator would reject are not kept.
+
+    Raises:
+        InputError: as of schedule_of and robot_of, or the robot cannot move in one of the gaits.
+        OSError: a file cannot be written.
+
+    """
+    beside = robot_file_of(path)
+    schedule, moved = schedule_of(stretches, str(beside.resolve())), robot_of(stretches, robot)
+    fits = [one.fit for one in stretches if one.fit is not None]
+    summary = f'gaits of {fits[0].recording.source.rpartition(", ")[0]}'
+    tree = {'network': schedule.network, 'robot': schedule.robot, 'schedule': [
+        {'at': one.at, 'parameters': one.parameters} for one in schedule.entries]}
+    with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
+        joints = Path(folder, beside.name)
+        write_robot(joints, moved, summary)
+        for fit in fits:
+            check_plan(parameter_tree(fit, joints), joints,
+                       f'{fit.recording.source}: robot {moved.name}')
+        write_atomically(path, f'# {summary}; play it with: cpg play-schedule {path.name}\n'
+                         + yaml.safe_dump(tree, sort_keys=False))
+        joints.replace(beside)
+    return [path, beside]
+
+
+def read_schedule(path: Path) -> GaitSchedule:
+    """Read and check a schedule.
+
+    Raises:
+        ScheduleError: it cannot be read, or a value in it cannot be used.
+
+    """
+    reader = YamlReader(path, 'schedule', ScheduleError, LATEST)
+    tree = reader.keys(reader.tree(), 'file', {'network', 'robot', 'schedule'})
+    entries: list[Entry] = []
+    for k, item in enumerate(reader.items(tree['schedule'], 'schedule')):
+        where = f'schedule[{k}]'
+        item = reader.keys(item, where, {'at', 'parameters'})
+        at, earliest = reader.number(item['at'], f'{where}.at'), entries[-1].at if entries else 0.0
+        if at < earliest or (entries and at == earliest):
+            raise reader.fail(f'{where}.at', f'{at:g} s is not after {earliest:g} s')
+        values = item['parameters']
+        if not isinstance(values, dict) or not values:
+            raise reader.fail(f'{where}.parameters', 'must be a mapping with at least one '
+                              f'parameter, not {quoted(values)}')
+        for name, value in values.items():
+            if not isinstance(value, str | int | float):
+                raise reader.fail(f'{where}.parameters.{name}', 'must be a number or a text, not '
+                                  f'{quoted(value)}')
+        entries.append(Entry(at, dict(values)))
+    return GaitSchedule(reader.text(tree['network'], 'network'),
+                        reader.text(tree['robot'], 'robot'), tuple(entries))

@@ -1,0 +1,674 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameters of a network, and joints' readouts, from the mean cycle of a recorded gait.
+
+Joints are read off the gait's exact orbit as the generator reads them; their readouts are
+eliminated, and a trust region moves the network's free numbers by exact derivatives. How fast the
+recording walks is no part of that, since the generator's frequency is free: the orbit's period
+counts only where a time scale is given.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from copy import copy
+from dataclasses import dataclass
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import solve_beside, solve_orbit
+from cpg_ros.fitting.inversion.fit import (
+    correlation_length,
+    Estimate,
+    Fit,
+    mean_share,
+    Optimum,
+    QUANTILE,
+    SHARE,
+    Spread,
+    spread,
+)
+from cpg_ros.fitting.inversion.fit_data import (
+    basis,
+    basis_moved,
+    Joints,
+    joints_of,
+    MeanCycle,
+    project,
+    Signals,
+    signals,
+    WEIGHTS,
+)
+from cpg_ros.fitting.inversion.fit_starts import best_starts, distinct, upside_down
+from cpg_ros.fitting.inversion.free_parameters import (
+    Coordinates,
+    Free,
+    free_numbers,
+    Minimisation,
+    with_values,
+)
+from cpg_ros.fitting.inversion.leg_duty import (
+    GAIT_DUTY,
+    GaitReadout,
+    own_stance,
+    OwnStance,
+    retimed,
+)
+from cpg_ros.motion.plan import refusal
+from cpg_ros.motion.readout import LEAST, MOST
+from cpg_ros.networks.network import Network
+import numpy as np
+
+# The caveats of a fit, in words.
+
+#: A 95 % interval wider than this share of the value on either side is named.
+WIDE = 0.1
+#: So are correlations beyond this, and ends this near a bound, over the bounds' distance.
+TOGETHER, AT_BOUND = 0.95, 1e-5
+
+
+def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
+             best: Minimisation
+             ) -> list[str]:
+    """List the caveats of a fit.
+
+    Args:
+        free: the free numbers.
+        estimates: of them.
+        known: their covariance, and that of the phase.
+        best: the start that led to the fit.
+
+    """
+    found = []
+    for row in known.blind:
+        blind = [one.name for one,
+                 fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]
+        if len(blind) == 1:
+            found.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
+        elif blind:
+            moves = row[:len(free)] * known.scale[:len(free)]
+            moves = moves / np.abs(moves).max()
+            ways = ', '.join(f'{one.name} by {move:+.3g}' for one, move
+                             in zip(free, moves, strict=True) if one.name in blind)
+            found.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
+                         'changes nothing that was recorded')
+    for k, (name, one) in enumerate(estimates.items()):
+        room = AT_BOUND * (free[k].high - free[k].low)
+        for end, bound in (('lower', free[k].low), ('upper', free[k].high)):
+            if abs(one.value - bound) <= room:
+                found.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
+                             'one-sided')
+        if np.isfinite(one.stderr) and (not one.bounded or max(
+                one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
+            found.append(
+                f'{name} is badly determined: any value from {one.low:.4g} to {one.high:.4g} fits '
+                'as well' + ('' if one.bounded else ', and the range ends there only because its '
+                             'bound is reached or the gait ceases to exist')
+                + '; with a free readout, it affects only the shape of the waveform')
+    errors = known.correlation
+    for k in range(len(free)):
+        for other in range(k):
+            if abs(errors[k, other]) > TOGETHER:
+                found.append(f'{free[other].name} and {free[k].name} are hard to tell apart: '
+                             f'their correlation is {errors[k, other]:.3f}')
+    if not best.converged:
+        found.append(f'the trust region was stopped after {best.evaluations} evaluations, '
+                     'before it had converged')
+    return found
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ' and '.join([', '.join(names[:-1]), names[-1]])
+
+
+# The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone.
+
+#: Phases among which the first guess of the one between recording and orbit is chosen.
+SHIFTS = 32
+#: Orbits kept of those solved last.
+KEPT = 64
+
+
+@dataclass(frozen=True)
+class Period:
+    """A measured period, in model time, and its standard error."""
+
+    value: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReadoutFit(ShortRepr):
+    """The best readouts for some values.
+
+    Attributes:
+        orbit: of the gait.
+        weights: offset and weights of each joint, rad, shape (1 + weights, joints).
+        residual: fitted minus recorded, rad, shape (m, joints).
+        jacobian: its derivative by the free numbers and the phase, shape (m, joints, free + 1).
+
+    """
+
+    orbit: Orbit
+    weights: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+
+class CycleProblem:
+    """Values are those of the free numbers, then the phase of the orbit where theta is 0.
+
+    The gait's duty, if it is free, is the last of the free numbers.
+
+    Attributes:
+        joints, network, gait, free, order, readout: what is fitted to what.
+        coordinates: in which a trust region moves.
+        sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
+
+    """
+
+    def __init__(self, joints: Joints, sizes: np.ndarray, network: Network, gait: str,
+                 free: Sequence[Free], order: int, readout: GaitReadout,
+                 period: Period | None = None) -> None:
+        self.joints, self.sizes, self.free = joints, sizes, tuple(free)
+        self.network, self.gait, self._period = network, gait, period
+        self._symmetry = network.symmetry(gait)
+        self.coordinates = Coordinates(network, gait, self.free)
+        self.order, self.readout = order, readout
+        names = network.parameters()
+        self._members = np.array([[float(name in one.members) for one in free]
+                                  for name in names])
+        self._of_duty = np.array([float(one.name == GAIT_DUTY) for one in free])
+        #: How many of the values are the network's.
+        self._own = len(free) - int(self._of_duty.sum())
+        leading = np.array([readout.leading.get(int(cell) + 1, int(cell) + 1) - 1
+                            for cell in joints.cells])
+        waves, phases = self._symmetry.waves, self._symmetry.phases
+        keys = [(int(waves[cell]), float(phases[cell]), int(waves[lead]), float(phases[lead]))
+                for cell, lead in zip(joints.cells, leading, strict=True)]
+        self._places = {(int(joints.cells[keys.index(key)]), int(leading[keys.index(key)])):
+                        [j for j, other in enumerate(keys) if other == key]
+                        for key in dict.fromkeys(keys)}
+        self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
+        self._held: dict[bytes, tuple[Orbit, Signals]] = {}
+        self._placed: tuple[bytes, ReadoutFit] | None = None
+
+    def duty(self, values: np.ndarray) -> float | None:
+        """Return the share of the stride that legs are to stand; None for what they do."""
+        return float(values[self._own]) if self._of_duty.any() else self.readout.duty
+
+    @property
+    def weights(self) -> int:
+        """Numbers that each joint's readout takes, with its offset."""
+        return 1 + WEIGHTS[self.order]
+
+    def begin(self, values: np.ndarray) -> None:
+        """Solve for an orbit from nothing, to start near, unless that has been done.
+
+        Raises:
+            NoOrbit: there is none, or none was found.
+
+        """
+        if values[:self._own].tobytes() not in self._solved:
+            self._keep(values, solve_orbit(self._network(values), self.gait))
+
+    def _network(self, values: np.ndarray) -> Network:
+        network = with_values(self.network, self.free[:self._own], values[:self._own])
+        if network.symmetry(self.gait) != self._symmetry:
+            raise NoOrbit(f'the wave of the {self.gait} would run the other way')
+        return network
+
+    def _keep(self, values: np.ndarray, orbit: Orbit) -> tuple[Orbit, Signals]:
+        while len(self._solved) >= KEPT:
+            del self._solved[next(iter(self._solved))]
+        numbers = np.array(values[:self._own])
+        self._solved[numbers.tobytes()] = orbit, signals(orbit, self.readout.harmonics)
+        return self._solved[numbers.tobytes()]
+
+    def hold(self, values: np.ndarray) -> None:
+        """Keep the orbit at values, whatever is solved for next: not every way leads back."""
+        self._held[values[:self._own].tobytes()] = self._solve(values)
+
+    def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
+        """Solve for an orbit, and what joints see of it, from the nearest one solved for.
+
+        Raises:
+            NoOrbit: there is none that Newton's method reaches from there.
+
+        """
+        key = values[:self._own].tobytes()
+        if key in self._held:
+            return self._held[key]
+        if key not in self._solved:
+            network = self._network(values)
+            near = self._nearest(values)
+            if near is None or network.delay_parameter:
+                # With a delay the way from the onset is as short as that from a neighbour.
+                return self._keep(values, solve_orbit(network, self.gait, near))
+            # A step too long for Newton's method is one too long for the trust region.
+            return self._keep(values, solve_beside(network, near))
+        return self._solved[key]
+
+    def _nearest(self, values: np.ndarray) -> Orbit | None:
+        if not self._solved:
+            return None
+        known = np.array([np.frombuffer(key) for key in self._solved])
+        size = np.abs(known).max(axis=0) + 1e-12
+        gaps = np.sum(((known - values[:self._own]) / size)**2, axis=1)
+        return list(self._solved.values())[int(gaps.argmin())][0]
+
+    def best_readouts(self, values: np.ndarray) -> ReadoutFit:
+        """Return the best readouts; raises NoOrbit as ``begin`` does."""
+        key = np.asarray(values).tobytes()
+        if self._placed is None or self._placed[0] != key:
+            orbit, seen = self._solve(values)
+            self._placed = key, ReadoutFit(orbit, *self._read(orbit, seen, values))
+        return self._placed[1]
+
+    def stance_share(self, values: np.ndarray) -> float:
+        """Return the share of the stride that the leg of the first joint stands."""
+        duty = self.duty(values)
+        if duty is not None:
+            return duty
+        (orbit, seen), (_, lead) = self._solve(values), next(iter(self._places))
+        return self._own_stance(orbit, seen, lead).fraction
+
+    def _own_stance(self, orbit: Orbit, seen: Signals, lead: int) -> OwnStance:
+        return own_stance(seen, int(orbit.waves[lead]), orbit.network.readout == 'waveform',
+                          self.readout.stance)
+
+    def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray
+                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """Return what the gait's duty makes of the phases of a cell, or None if there is none.
+
+        Phases at which joints are read on theta, cycles, and their derivatives as of
+        leg_duty.retimed.
+        """
+        duty, place = self.duty(values), float(orbit.phases[cell])
+        if duty is None:
+            return None
+        return retimed(self.joints.theta + place + values[-1], duty,
+                       self._own_stance(orbit, seen, lead), place - float(orbit.phases[lead]),
+                       self._members, self._of_duty)
+
+    def _read(self, orbit: Orbit, seen: Signals, values: np.ndarray
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        m, joints = self.joints.data.shape
+        weights = np.empty((self.weights, joints))
+        residual, jacobian = np.empty((m, joints)), np.empty((m, joints, len(self.free) + 1))
+        for (cell, lead), columns in self._places.items():
+            wave = int(orbit.waves[cell])
+            theta, shift = self.joints.theta, float(orbit.phases[cell] + values[-1])
+            mapped = self._retimed(orbit, seen, cell, lead, values)
+            if mapped is not None:
+                theta, shift = mapped[0], 0.0
+            x, y, z = seen.values(theta, shift, wave)
+            psi, by_phase = basis(self.order, x, y, z)
+            moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave,
+                                                                   self._members))
+            if mapped is not None:
+                moved += by_phase[..., None] * mapped[1][:, None]
+                by_phase *= mapped[2][:, None]
+            weights[:, columns], residual[:, columns], jacobian[:, columns] = project(
+                psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
+                self.joints.data[:, columns])
+        return weights, residual, jacobian
+
+    def at_order(self, order: int) -> 'CycleProblem':
+        """Return the same problem with readouts of another order."""
+        found = copy(self)
+        found.order, found._placed = order, None
+        return found
+
+    def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual over its standard errors, joint by joint within each instant, and derivative.
+
+        The last entry is that of the period, where it is data.
+        """
+        placed = self.best_readouts(values)
+        left = (placed.residual / self.sizes).ravel()
+        slopes = (placed.jacobian / self.sizes[:, None]).reshape(left.size, -1)
+        if self._period is None:
+            return left, slopes
+        by_period = np.append(placed.orbit.d_period @ self._members, 0.0) / self._period.error
+        off = (placed.orbit.period - self._period.value) / self._period.error
+        return np.append(left, off), np.vstack([slopes, by_period])
+
+    def cost(self, values: np.ndarray) -> float:
+        """Half the sum of squares; raises NoOrbit as ``begin`` does."""
+        left = self(values)[0]
+        return 0.5 * float(left @ left)
+
+    def first_phase(self, values: np.ndarray) -> float:
+        """Guess the phase: of an even grid, the one whose readouts explain most."""
+        return self.explained(values)[0]
+
+    def explained(self, values: np.ndarray) -> tuple[float, float]:
+        """Return the phase of an even grid whose readouts explain most, and how much they do.
+
+        As a sum of squares over the squares of the sizes, the mean of each joint included.
+        """
+        (orbit, seen), m = self._solve(values), self.joints.theta.size
+        # Shifts by whole instants: what a cell gives is worked out once for all of them.
+        steps = np.unique(np.arange(SHIFTS) * m // SHIFTS)
+        rows, found = (np.arange(m) + steps[:, None]) % m, np.zeros(steps.size)
+        values = np.append(values[:-1], 0.0)
+        for (cell, lead), columns in self._places.items():
+            theta, shift = self.joints.theta, float(orbit.phases[cell])
+            mapped = self._retimed(orbit, seen, cell, lead, values)
+            if mapped is not None:
+                theta, shift = mapped[0], 0.0
+            psi = basis(self.order, *seen.values(theta, shift, int(orbit.waves[cell])))[0]
+            sums = np.einsum('smn,mj->snj', psi[rows],
+                             (self.joints.data / self.sizes)[:, columns])
+            found += np.sum(sums * np.linalg.solve(psi.T @ psi, sums), axis=(1, 2))
+        best = int(found.argmax())
+        return float(steps[best] / m), float(found[best])
+
+    def rephased(self, values: np.ndarray) -> np.ndarray:
+        """Return values with the guessed phase if it leaves less than their own does.
+
+        Close to a cosine any phase does nearly as well, and none is the best one nearby for sure.
+        """
+        there = np.append(values[:-1], self.first_phase(values))
+        here_left, there_left = self(values)[0], self(there)[0]
+        return there if there_left @ there_left < here_left @ here_left else values
+
+
+#: Share of a stride that legs stand which stand as long as they swing.
+EVEN = 0.5
+#: A frequency is never known better than to this share.
+KNOWN_FREQUENCY = 1e-4
+#: Relative change at which a trust region stops, and at which the last one does.
+TOLERANCE, LAST = 1e-6, 1e-8
+#: Times that joints are weighted anew, and the relative change of a weight that is none.
+WEIGHINGS, SAME = 4, 0.02
+#: Halvings that find where the generator begins to reject the gait.
+HALVINGS = 6
+
+
+def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+           free: Sequence[str] = (), order: int = 3,
+           starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
+           bounds: Mapping[str, tuple[float, float]] | None = None,
+           time_scale: float = 0.0, profiles: bool = True,
+           done: Callable[[float], None] = lambda fraction: None) -> Fit:
+    """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
+
+    Args:
+        cycle: the recording's.
+        cells: joint -> the cell that drives it, from 1; other joints are left out.
+        network: parameters; those that are not free keep their values.
+        gait: one of its gaits.
+        free: names of parameters to fit, or of groups of them; the usual ones by default.
+            GAIT_DUTY is the share of the stride that legs stand.
+        order: of the readouts, 1 to 3.
+        starts: free number -> value to start from; {} starts from the network's own values. By
+            default from these, and from the best of many values all over the ranges.
+        readout: how the generator reads the gait; by default legs stand as the cells do.
+        bounds: free number -> lower and upper bound, where narrower than the range.
+        time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
+            as the generator's frequency does.
+        profiles: whether intervals are those of the profile likelihood where the cost is not
+            quadratic; they take most of the time.
+        done: called with the share of the work that is done, 0 to 1.
+
+    Raises:
+        InputError: names, bounds or starts cannot be used.
+        ValueError: shapes do not fit.
+        NoOrbit: no start has such a gait; the message is that of the first.
+
+    """
+    if order not in WEIGHTS:
+        raise ValueError(f'order {order} is not 1, 2 or 3')
+    joints = joints_of(cycle, cells, network)
+    readout = readout or GaitReadout.of(type(network), gait)
+    numbers = _numbers(network, gait, free or network.free, bounds)
+    taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
+    if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
+        raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
+                         f'determine readouts of order {order} and {len(numbers)} parameters')
+    period = None
+    if time_scale > 0.0:
+        value = 1.0 / (cycle.frequency * time_scale)
+        fraction = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
+        period = Period(value, value * fraction)
+    problem = CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period)
+    begins = [np.append(_begin(problem, start), 0.0) for start in starts or ({},)]
+    if not starts:
+        begins = best_starts(problem, begins[0])
+    trials: list[Minimisation] = []
+    for begin in begins:
+        done(0.5 * len(trials) / len(begins))
+        trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
+    done(0.5)
+    best = min(trials, key=lambda trial: trial.cost)
+    if best.why:
+        raise NoOrbit(trials[0].why)
+    with suppress(NoOrbit):
+        if not starts and (other := upside_down(problem, best.values)) is not None:
+            trials.append(_trial(problem, other, weigh=False))
+    values = _weighed(problem, best.values)
+    problem.hold(values)
+    values, others, turned = _preferred(problem, values, trials)
+    if profiles:
+        others += [trial.values for trial in _along_the_valley(problem, values)]
+    by_cost = sorted([values, *others], key=problem.cost)
+    if others and problem.cost(by_cost[0]) < problem.cost(values) - _as_good(problem, values):
+        by_cost[0] = _weighed(problem, by_cost[0])
+        problem.hold(by_cost[0])
+    else:
+        by_cost = [values, *(one for one in by_cost if one is not values)]
+    runs, flaw = _that_runs(problem, by_cost, best.path[:, 1:])
+    warnings = [] if problem.readout.weights else [
+        'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
+            f'{free.name} {value:.4g}' for free, value in zip(problem.free, one, strict=False))
+        + ' fits as well, all joints reversed' for one in turned]
+    if flaw:
+        warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
+            '' if runs is None else '; this is the best one on the way there that it runs')]
+    # The cost is not least there, so that there is no profile to follow.
+    return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
+                   profiles and not flaw, warnings, done)
+
+
+def _numbers(network: Network, gait: str, names: Sequence[str],
+             bounds: Mapping[str, tuple[float, float]] | None) -> tuple[Free, ...]:
+    """Return the free numbers, the gait's duty last."""
+    own = [name for name in names if name != GAIT_DUTY]
+    duty = (Free(GAIT_DUTY, (), LEAST, MOST),) if GAIT_DUTY in names else ()
+    return (free_numbers(network, gait, own, bounds) if own or not duty else ()) + duty
+
+
+def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
+    """Values of a start, checked."""
+    duty = problem.readout.duty or EVEN
+    known = {one.name: one.value(problem.network) if one.members else duty
+             for one in problem.free}
+    for name, value in start.items():
+        if name not in known:
+            raise InputError(f"start: '{name}' is not free")
+        known[name] = float(value)
+    for one in problem.free:
+        if not one.low <= known[one.name] <= one.high:
+            raise InputError(f'{one.name} {known[one.name]:g} to start from is not within '
+                             f'{one.low:g} to {one.high:g}')
+    return np.array(list(known.values()))
+
+
+def _left(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
+    """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
+    residual = problem.best_readouts(values).residual
+    return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
+
+
+def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisation:
+    """Go down from one start; the first one that has an orbit sets the joints' weights."""
+    values = values.copy()
+    try:
+        problem.begin(values)
+        values[-1] = problem.first_phase(values)
+    except NoOrbit as error:
+        return Minimisation.without_orbit(values, error)
+    if weigh:
+        problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
+    return problem.coordinates.descend(problem, values, TOLERANCE)
+
+
+def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
+    """Weigh the joints by what is left of each, and fit again."""
+    for last in range(WEIGHINGS):
+        sizes = np.maximum(problem.joints.stated, _left(problem, values))
+        if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
+            break
+        problem.sizes = sizes
+        values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
+    return values
+
+
+def _as_good(problem: CycleProblem, values: np.ndarray) -> float:
+    """Return by how much more a cost is as good as that at values."""
+    residual = problem.best_readouts(values).residual / problem.sizes
+    return 0.5 * QUANTILE**2 * correlation_length(residual)
+
+
+def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minimisation]
+               ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Return the values of the minimum that is meant, other minima, and those upside down.
+
+    With a free readout, the waveform of other parameters may be the same upside down. Of minima
+    that are as good as the best, it is the one whose joints move as in the robot file; without
+    one, legs stand for the larger part of the stride.
+    """
+    def readouts(there: np.ndarray) -> np.ndarray:
+        return problem.best_readouts(there).weights[1:3]
+
+    def meant(there: np.ndarray) -> float:
+        agrees = problem.readout.agreement(problem.joints.names, readouts(there))
+        return agrees or problem.stance_share(there)
+
+    found = [values]
+    for trial in trials:
+        if not trial.why and all(distinct(trial.values[:-1], one[:-1]) for one in found):
+            found.append(trial.values)
+    most = problem.cost(values) + _as_good(problem, values)
+    best = max((one for one in found if problem.cost(one) <= most), key=meant)
+    turned = [one for one in found if float(np.sum(readouts(one) * readouts(values))) < 0.0]
+    if any(one is best for one in turned):
+        turned, values = [values], _weighed(problem, best)
+        problem.hold(values)
+    others = [one for one in found if distinct(one[:-1], values[:-1])
+              and float(np.sum(readouts(one) * readouts(values))) >= 0.0]
+    return values, others, [one for one in turned if problem.cost(one) <= most]
+
+
+def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
+               ) -> tuple[np.ndarray | None, str]:
+    """Return the best values that the generator runs, and why it rejects the very best, or ''.
+
+    Stability takes longer to assess than an orbit to solve for: it is assessed where the fit has
+    ended, and if that is rejected, at as many places on the way there as a bisection takes.
+
+    Args:
+        problem: the fit.
+        by_cost: where it has ended, the best first.
+        way: the values from the start on, shape (steps, values).
+
+    """
+    def flaw_at(values: np.ndarray) -> str:
+        try:
+            return refusal(problem.best_readouts(values).orbit, problem.gait,
+                           problem.readout.harmonics)
+        except NoOrbit as error:
+            return str(error)
+
+    first = flaw_at(by_cost[0])
+    if not first:
+        return by_cost[0], ''
+    for values in by_cost[1:]:
+        if not flaw_at(values):
+            return values, first
+    places = [*way, by_cost[0]]
+    runs, refused = 0, len(places) - 1
+    if flaw_at(places[0]):
+        return None, first
+    while refused - runs > 1:
+        middle = (runs + refused) // 2
+        runs, refused = (runs, middle) if flaw_at(places[middle]) else (middle, refused)
+    here, beyond = places[runs], places[refused]
+    for _ in range(HALVINGS):
+        between = 0.5 * (here + beyond)
+        here, beyond = (here, between) if flaw_at(between) else (between, beyond)
+    here = problem.rephased(here)
+    problem.hold(here)
+    return here, first
+
+
+def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
+             ) -> Optimum:
+    left, slopes = problem(values)
+    sharing = correlation_length(problem.best_readouts(values).residual / problem.sizes)
+    return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
+                   spread(slopes, sharing), problem.coordinates.descend,
+                   problem.coordinates.moved, problem.rephased, elsewhere)
+
+
+def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
+    """Look for other least costs, if that at the values is not the whole story."""
+    optimum = _optimum(problem, values)
+    if all(optimum.regular(k) for k in range(len(problem.free))):
+        return []
+    found = []
+    for begin in problem.coordinates.valley(values):
+        with suppress(NoOrbit):
+            problem.begin(begin)
+            found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
+            problem.hold(found[-1].values)
+    return found
+
+
+def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Sequence[np.ndarray],
+            values: np.ndarray, profiles: bool, warnings: Sequence[str],
+            done: Callable[[float], None]) -> Fit:
+    """Return the fit at values, with its uncertainties."""
+    joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
+    placed = problem.best_readouts(values)
+    optimum = _optimum(problem, values, elsewhere)
+    known = optimum.spread
+    estimates = {}
+    for k, one in enumerate(problem.free):
+        done(0.6 + 0.4 * k / len(problem.free))
+        estimates[one.name] = optimum.estimate(k, profiles)
+    done(1.0)
+    fractions = {}
+    for order in WEIGHTS:
+        other = problem.at_order(order)
+        rest = other.best_readouts(other.rephased(values) if order != problem.order else values)
+        fractions[order] = mean_share(joints.data.T, rest.residual.T)
+    rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
+    misfit = _left(problem, values) / joints.stated
+    count = len(problem.free)
+    return Fit(
+        network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
+        order=problem.order, fractions=fractions, harmonics=problem.readout.harmonics,
+        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimates,
+        correlation=known.correlation[:count, :count],
+        cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
+        readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
+        recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
+        cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
+        starts=tuple(trials),
+        warnings=(*findings(problem.free, estimates, known, best), *warnings))

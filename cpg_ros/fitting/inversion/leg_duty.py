@@ -1,0 +1,164 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How long legs stand, in a fit: the generator's retiming of the legs, and its derivatives.
+
+The generator reads joints at the phase that the gait's duty makes of the cell's (motion.duty).
+That phase depends on the duty, and on when the cell's own signal peaks and is lowest, which the
+network's parameters move.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import NamedTuple
+
+from cpg_ros.fitting.inversion.fit_data import Signals, TURN
+from cpg_ros.motion.robot import HARMONICS, Robot
+from cpg_ros.networks.network import Network
+import numpy as np
+
+#: What the duty of the gait is called among the free numbers: networks may have a duty, too.
+GAIT_DUTY = 'gait_duty'
+#: Even phases among which a trough is looked for, and Newton's steps from there.
+GRID, STEPS = 1024, 4
+
+
+@dataclass(frozen=True)
+class GaitReadout:
+    """What the generator's readout of a gait has besides the weights of the joints.
+
+    Attributes:
+        leading: cell -> the cell that gives its leg's phase, both from 1; other cells lead
+            themselves.
+        duty: share of the stride that legs stand; None for what the network's cells do.
+        stance: phase of the leading cell at which a leg begins to stand by itself, after the
+            cell's peak, and for which share of the stride, cycles; None if it stands while the
+            cell falls.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        weights: joint -> its weights of x and y in the robot file; they say which half of a
+            stride is which, where the recording does not.
+
+    """
+
+    leading: Mapping[int, int] = field(default_factory=dict)
+    duty: float | None = None
+    stance: tuple[float, float] | None = None
+    harmonics: int = HARMONICS
+    weights: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, network: type[Network], gait: str, preset: str = '', robot: Robot | None = None
+           ) -> 'GaitReadout':
+        """Return that of a robot file's gait or preset, or of a robot without a file."""
+        assignment = next(iter(network.legs)) if robot is None else robot.assignment
+        leading = {cell: cells[0] for cells in network.legs[assignment].values()
+                   for cell in cells}
+        if robot is None:
+            return cls(leading)
+        motion = robot.motion(preset or gait, gait)
+        weights = {joint.name: row[:2] for joint, row in zip(robot.joints, robot.weights(motion),
+                                                             strict=True)}
+        return cls(leading, motion.duty, motion.stance, robot.harmonics, weights)
+
+    def agreement(self, names: Sequence[str], weights: np.ndarray) -> float:
+        """Return how far weights are those of the robot file, -1 to 1; 0 without a file.
+
+        Args:
+            names: of joints.
+            weights: of x and y, shape (2, joints).
+
+        """
+        stated = np.array([self.weights.get(name, np.zeros(2)) for name in names]).T
+        size = float(np.linalg.norm(stated) * np.linalg.norm(weights))
+        return float(np.sum(stated * weights)) / size if size > 0.0 else 0.0
+
+
+class OwnStance(NamedTuple):
+    """When a leg stands by its leading cell, and the derivatives by the network's parameters.
+
+    Attributes:
+        begin: phase of the cell, cycles.
+        fraction: of the stride.
+        d_begin, d_share: shape (parameters,).
+
+    """
+
+    begin: float
+    fraction: float
+    d_begin: np.ndarray
+    d_share: np.ndarray
+
+
+def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
+               ) -> OwnStance:
+    """Return when a leg stands by itself, as motion.joint_readout.standing does.
+
+    Args:
+        seen: the gait's signals.
+        wave: of the leading cell.
+        peaks_at_0: whether the cell peaks at phase 0 whatever the parameters.
+        stance: as of GaitReadout.
+
+    """
+    terms, slopes = seen.terms[wave], seen.slopes[wave]
+    values = np.fft.irfft(np.append(terms[:1] * 2.0, terms[1:]), GRID) * (0.5 * GRID)
+    crest, d_crest = 0.0, np.zeros(slopes.shape[1])
+    if not peaks_at_0:
+        crest, d_crest = _extremum(terms, slopes, int(values.argmax()) / GRID)
+    if stance is not None:
+        return OwnStance(crest + stance[0], stance[1], d_crest, np.zeros_like(d_crest))
+    trough, d_trough = _extremum(terms, slopes, int(values.argmin()) / GRID)
+    return OwnStance(crest, (trough - crest) % 1.0, d_crest, d_trough - d_crest)
+
+
+def _extremum(terms: np.ndarray, slopes: np.ndarray, place: float) -> tuple[float, np.ndarray]:
+    """Return the phase of an extremum near a place, cycles, and its derivatives."""
+    k = np.arange(terms.size)
+    bend, turns = 0.0, np.ones_like(terms)
+    for _ in range(STEPS):
+        turns = np.exp(TURN * 1j * place * k)
+        slope, bend = float((1j * k * terms @ turns).real), float((-k * k * terms @ turns).real)
+        place -= float(np.clip(slope / bend / TURN, -1.0 / GRID, 1.0 / GRID)) if bend else 0.0
+    return place % 1.0, -((1j * k * turns) @ slopes).real / (bend * TURN if bend else np.inf)
+
+
+def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: float, members: np.ndarray,
+            of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the phases at which the joints of a cell are read, and their derivatives.
+
+    Args:
+        theta: phases of the cell, cycles, shape (m,).
+        duty: share of the stride that the leg is to stand.
+        own: when it does by itself.
+        ahead: phase of the cell before that of its leg's leading cell, cycles.
+        members: how much each parameter moves with each free number, (parameters, numbers).
+        of_duty: how much the duty does, shape (numbers,).
+
+    Returns:
+        Phases, shape (m,), their derivatives by the free numbers, (m, numbers), and by theta.
+
+    """
+    d_begin, d_share = own.d_begin @ members, own.d_share @ members
+    k = math.tan(0.5 * math.pi * own.fraction) / math.tan(0.5 * math.pi * duty)
+    d_k = k * math.pi * (d_share / math.sin(math.pi * own.fraction)
+                         - of_duty / math.sin(math.pi * duty))
+    angle = math.pi * (theta - (own.begin + 0.5 * duty + ahead))
+    s, c = np.sin(angle), np.cos(angle)
+    size = c * c + k * k * s * s
+    steep = k / size
+    phases = own.begin + 0.5 * own.fraction + ahead + np.arctan2(k * s, c) / math.pi
+    moved = (np.multiply.outer(s * c / size / math.pi, d_k)
+             - np.multiply.outer(steep, d_begin + 0.5 * of_duty) + d_begin + 0.5 * d_share)
+    return phases, moved, steep

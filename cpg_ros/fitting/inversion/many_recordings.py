@@ -1,0 +1,301 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Folders of recordings inverted: a row for each, whatever is wrong with it."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, field, fields
+import hashlib
+from pathlib import Path
+from tempfile import TemporaryDirectory
+import time
+import traceback
+from typing import Any
+
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.common.jobs import JobOutcome, JobProgress, outcomes
+from cpg_ros.fitting.inversion.parameter_files import robot_file_of, write_fitted
+from cpg_ros.fitting.inversion.recording_fit import fit_recording, RecordingFit
+from cpg_ros.fitting.inversion.results import (
+    digest,
+    FITTED,
+    found,
+    library,
+    outline,
+    Results,
+    write_page,
+    write_tables,
+)
+from cpg_ros.fitting.recordings.formats import format_of, read_recording
+from cpg_ros.fitting.recordings.recording import Recording
+from cpg_ros.motion.robot import Robot
+
+# The inversion of one recording, as a job: the result in plain types, or the reason for none.
+
+#: Joints that are drawn, points of their mean cycles, and the size of the picture in pixels.
+DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """How recordings are read and fitted: as the options of the executable ``inversion``."""
+
+    robot: Robot | None = None
+    network: str = ''
+    gait: str = ''
+    preset: str = ''
+    free: tuple[str, ...] = ()
+    order: int = 3
+    starts: tuple[Mapping[str, float], ...] = ()
+    #: As of read_recording; each is for those recordings whose format has it.
+    reading: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A recording to invert.
+
+    Attributes:
+        recording: where it is, for workers, too.
+        settings: as for all.
+        known: digest of the contents that were inverted before, or ''.
+        folder: that the fitted file will be in.
+        name: of the fitted file, without its ending.
+
+    """
+
+    recording: Path
+    settings: FitSettings
+    known: str
+    folder: Path
+    name: str
+
+
+def read(path: Path, settings: FitSettings) -> Recording:
+    """Read a recording of any format, by those of the options that it has."""
+    args, robot = format_of(path), settings.robot
+    return read_recording(
+        path, args.name, progress=False,
+        robot_joints=[joint.name for joint in robot.joints] if robot else (),
+        **{name: value for name, value in settings.reading.items() if not args.refusal(name)})
+
+
+def invert_recording(task: Task) -> dict[str, Any]:
+    """Invert a recording; the result contains whatever is wrong with it.
+
+    Returns:
+        ``digest``, and nothing else if that is the known one; otherwise the fields of a row of
+        the table, ``files`` (name -> text) and ``picture`` (SVG).
+
+    """
+    began = time.perf_counter()
+    row: dict[str, Any] = {'digest': '', 'reason': ''}
+    try:
+        row['digest'] = digest(task.recording)
+        if task.known and row['digest'] == task.known:
+            return {'digest': task.known}
+        settings = task.settings
+        found = fit_recording(read(task.recording, settings), settings.robot, settings.network,
+                              settings.gait, free=settings.free, order=settings.order,
+                              preset=settings.preset, starts=settings.starts)
+        row |= {**_facts(found), 'picture': picture(found)}
+        row['files'] = _files(task, found)
+    except (CpgError, OSError) as error:
+        row['reason'] = ' '.join(str(error).split())
+    # A bug costs one row, too, and is reported with its traceback.
+    except Exception as error:
+        row['reason'] = f'{type(error).__name__}: {" ".join(str(error).split())}'
+        row['traceback'] = traceback.format_exc()
+    row['seconds'] = round(time.perf_counter() - began, 3)
+    return row
+
+
+def _facts(found: RecordingFit) -> dict[str, Any]:
+    results = found.as_dict()
+    return {'gait': results['gait'], 'recognised': results['recognised'] or '',
+            'frequency': results['frequency'], 'frequency_error': results['frequency_error'],
+            'confidence': results['confidence'], 'cycles': results['cycles'],
+            'begin': results['begin'], 'end': results['end'], 'network': results['network'],
+            'parameters': results['parameters'], 'phases': results['phases'],
+            'rms_share': results['rms_share'],
+            'joints': {name: one['rms'] for name, one in results['joints'].items()},
+            'warnings': results['warnings']}
+
+
+def _files(task: Task, found: RecordingFit) -> dict[str, str]:
+    """The parameter file and the robot file, as they will be in their folder."""
+    with TemporaryDirectory(prefix='cpg_ros_') as folder:
+        written = write_fitted(Path(folder, f'{task.name}.yaml'), found, task.settings.robot,
+                               robot_file_of(task.folder / f'{task.name}.yaml'))
+        return {path.name: path.read_text() for path in written}
+
+
+def picture(found: RecordingFit) -> str:
+    """Mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
+    recorded, fitted = found.fit.recorded, found.fit.fitted
+    span = recorded.max(axis=1) - recorded.min(axis=1)
+    largest = sorted(span.argsort()[::-1][:DRAWN])
+    step = max(1, recorded.shape[1] // POINTS)
+    lines = []
+    for k, joint in enumerate(largest):
+        low, size = recorded[joint].min(), max(span[joint], 1e-9)
+        width = WIDTH / len(largest)
+        for kind, row in (('r', recorded[joint]), ('f', fitted[joint])):
+            points = ' '.join(
+                f'{k * width + 0.9 * width * m / len(row[::step]):.0f},'
+                f'{HEIGHT - 3 - (HEIGHT - 6) * (value - low) / size:.0f}'
+                for m, value in enumerate(row[::step]))
+            lines.append(f'<polyline class="{kind}" points="{points}"/>')
+    return (f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="mean cycles">'
+            f'{"".join(lines)}</svg>')
+
+
+#: While new recordings are waited for: seconds between two looks at the folders, and between two
+#: tables.
+LOOK, TABLES = 2.0, 30.0
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Numbers of recordings: all, those without a fit, those done before; and the files."""
+
+    done: int
+    failed: int
+    kept: int
+    written: tuple[Path, ...]
+
+
+def settings_digest(settings: FitSettings) -> str:
+    """Return a digest that differs between settings."""
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    values |= values.pop('reading')
+    lines = '\n'.join(f'{name}={value!r}' for name, value in values.items())
+    return hashlib.sha256(lines.encode()).hexdigest()[:16]
+
+
+class Folders:
+    """Recordings of some folders, inverted into a folder of results."""
+
+    def __init__(self, folders: Sequence[Path], out: Path, settings: FitSettings,
+                 progress: bool = True) -> None:
+        """Look for the recordings.
+
+        Raises:
+            InputError: a folder is not there or has no recordings, or out holds something else.
+            MissingLibraryError: pyarrow is missing.
+
+        """
+        library()
+        self.folders, self.settings, self.progress = folders, settings, progress
+        # Before the folder of results is made: one that is not there leaves nothing behind.
+        self.recordings = list(found(folders))
+        self.results = Results(out, settings_digest(settings))
+        self.recordings = list(found(folders))
+
+    def tasks(self, recordings: Iterable[Path]) -> Iterator[Task]:
+        """Yield the jobs, each made when it is needed."""
+        for one in recordings:
+            row = self.results.get(one)
+            yield Task(one.absolute(), self.settings, row['digest'] if row else '',
+                       (self.results.folder / FITTED).absolute(), self.results.name(one))
+
+    def keep(self, outcome: JobOutcome[Task], shown: Path, tally: JobProgress) -> None:
+        """Store the outcome of a job, unless the recording was done before."""
+        if outcome.error is None and 'reason' not in outcome.value:
+            before = self.results.get(shown) or {'reason': ''}
+            tally.add(failed=bool(before['reason']), kept=True)
+            return
+        row: dict[str, Any] = outcome.value if outcome.error is None else {
+            'digest': '', 'reason': f'{type(outcome.error).__name__}: {outcome.error}',
+            'seconds': None}
+        tally.add(failed=bool(row['reason']))
+        self.results.put(shown, row)
+
+    def run(self, executor: Executor) -> Summary:
+        """Invert all recordings that are not done, and write the table and the page.
+
+        On KeyboardInterrupt, both are written for the finished recordings before it is raised.
+
+        Raises:
+            InputError: there are none.
+            OSError: a result cannot be written.
+
+        """
+        if not self.recordings:
+            raise InputError('no bags or tables in '
+                             + ', '.join(str(folder) for folder in self.folders))
+        tally = JobProgress('recordings', len(self.recordings), self.progress)
+        try:
+            with tally:
+                self._through(executor, self.recordings, tally)
+        except BaseException:
+            self.write()
+            raise
+        return self.write(tally.kept)
+
+    def _through(self, executor: Executor, recordings: Sequence[Path], tally: JobProgress) -> None:
+        shown = {one.absolute(): one for one in recordings}
+        for outcome in outcomes(executor, invert_recording, self.tasks(recordings), tally.tick):
+            self.keep(outcome, shown[outcome.job.recording], tally)
+
+    def watch(self, executor: Executor, say: Callable[[str], None],
+              goes_on: Callable[[], bool] = lambda: True) -> Summary:
+        """Invert the recordings in the folders, and new ones, until interrupted.
+
+        A recording is read once its files do not change between two looks.
+
+        Args:
+            executor: any.
+            say: takes a line for each recording that is taken.
+            goes_on: called before every look; False ends the watch.
+
+        """
+        seen: dict[Path, Any] = {}
+        done: dict[Path, Any] = {}
+        written, waits = time.monotonic() - TABLES, False
+        try:
+            while goes_on():
+                self.recordings = list(found(self.folders))
+                now = {one: outline(one) for one in self.recordings}
+                ready = [one for one, at in now.items() if at == seen.get(one) != done.get(one)]
+                seen = now
+                if ready:
+                    for one in ready:
+                        say(f'new recording: {one}')
+                    with JobProgress('recordings', len(ready), self.progress) as tally:
+                        self._through(executor, ready, tally)
+                    done |= {one: now[one] for one in ready}
+                    waits = True
+                if waits and time.monotonic() - written >= TABLES:
+                    self.write()
+                    written, waits = time.monotonic(), False
+                time.sleep(LOOK)
+        finally:
+            summary = self.write()
+        return summary
+
+    def write(self, kept: int = 0) -> Summary:
+        """Write the table and the page of the finished recordings."""
+        def rows() -> Iterator[dict[str, Any]]:
+            return self.results.rows(self.recordings)
+
+        done = failed = 0
+        for row in rows():
+            done += 1
+            failed += bool(row['reason'])
+        page = self.results.folder / 'index.html'
+        written = write_tables(self.results.folder, rows)
+        write_page(page, rows(), done, failed)
+        return Summary(done, failed, kept, (*written, page))

@@ -1,0 +1,188 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which network explains a recording? All that have its legs, fitted and judged on other strides.
+
+Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
+network that follows noise gains nothing by it. Networks whose errors a recording cannot
+distinguish, joint by joint, are ranked by how few numbers they take: readouts of order 3 make many
+a waveform of one that is nearly sinusoidal.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.fitting.gaits.mean_cycle import average_cycles
+from cpg_ros.fitting.gaits.stride import Stride
+from cpg_ros.fitting.inversion.fit import STANDS
+from cpg_ros.fitting.inversion.fit_data import WEIGHTS
+from cpg_ros.fitting.inversion.leg_duty import GaitReadout
+from cpg_ros.fitting.inversion.recording_fit import (
+    fit_with_fallbacks,
+    leg_joints,
+    networks_of,
+    preset_of,
+    stride_of,
+)
+from cpg_ros.fitting.recordings.recording import Recording
+from cpg_ros.motion.robot import Robot
+import numpy as np
+
+#: Networks are distinct where their errors differ by so many standard errors of the difference.
+DISTINCT = 2.0
+
+
+@dataclass(frozen=True)
+class NetworkComparison:
+    """How well a network explains a recording.
+
+    Attributes:
+        network: its name.
+        gait: that was fitted, '' if none was.
+        error: mean over the joints of RMS error over range on strides that were left out.
+        fitted: the same on those that were fitted.
+        parameters: numbers of the network that were fitted, or read off the legs' phases.
+        numbers: all numbers, those of the readouts included.
+        why: why nothing was fitted, or ''.
+        by_joint: error of each joint that moves.
+        alike: whether the recording cannot distinguish it from the network of the least error.
+
+    """
+
+    network: str
+    gait: str
+    error: float = np.inf
+    fitted: float = np.inf
+    parameters: int = 0
+    numbers: int = 0
+    why: str = ''
+    by_joint: dict[str, float] = field(default_factory=dict)
+    alike: bool = False
+
+
+def compare_networks(recording: Recording, robot: Robot | None = None, order: int = 3,
+                     done: Callable[[float], None] = lambda fraction: None
+                     ) -> list[NetworkComparison]:
+    """Fit every network that has the recording's legs; the best on other strides come first.
+
+    Of several that the recording cannot distinguish, the one with the fewest numbers is first.
+
+    Args:
+        recording: joints over time.
+        robot: whose networks, legs and cells are taken; all shipped ones by default.
+        order: of the readouts, 1 to 3.
+        done: called with the share of the work that is done, 0 to 1.
+
+    Raises:
+        CpgError: there are no legs or no steady gait, or no network has such legs.
+
+    """
+    legs, _ = leg_joints(recording, robot)
+    kinds, found = list(networks_of(robot, legs)), []
+    if not kinds:
+        raise InputError(f'{recording.source}: no network has {len(legs)} legs')
+    for count, kind in enumerate(kinds):
+        cells, stride = stride_of(recording, legs, kind, robot)
+        gait = stride.gait or kind.unnamed
+        if not gait:
+            found.append(NetworkComparison(kind.name, '', why=(
+                f'its nearest gait, {stride.nearest}, is {stride.distance:.3f} of a cycle off')))
+            continue
+        half, others = split_strides(recording, stride)
+        parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
+        done(count / len(kinds))
+        try:
+            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, order=order,
+                                        readout=GaitReadout.of(kind, gait, robot=robot))
+        except CpgError as error:
+            found.append(NetworkComparison(kind.name, gait, why=str(error)))
+            continue
+        free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
+        rows = [half.joints.index(name) for name in fit.joints]
+        fractions = _shares(fit.joints, fit.fitted - others[rows], others[rows])
+        found.append(NetworkComparison(
+            kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
+            free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=fractions))
+    done(1.0)
+    least = min(found, key=lambda one: (one.error, one.numbers))
+    found = [replace(one, alike=not one.why and not _distinct(one, least)) for one in found]
+    return sorted(found, key=lambda one: (not one.alike, one.numbers if one.alike else one.error))
+
+
+def _distinct(one: NetworkComparison, least: NetworkComparison) -> bool:
+    """Whether a network's errors are larger than the least ones, beyond their own scatter."""
+    if one is least:
+        return False
+    more = np.array([error - least.by_joint[name] for name, error in one.by_joint.items()
+                     if name in least.by_joint])
+    if more.size < 2:
+        return one.error > least.error
+    return bool(more.mean() > DISTINCT * more.std(ddof=1) / np.sqrt(more.size))
+
+
+def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
+    """Return the stride of every other cycle, and the mean of those between, (joints, m), rad.
+
+    Raises:
+        InputError: there are too few of them.
+
+    """
+    x = recording.positions[:, [recording.joints.index(name) for name in stride.joints]]
+    inside = ((recording.times >= stride.warp.knots[0])
+              & (recording.times <= stride.warp.knots[-1]))
+    phases = stride.warp(recording.times[inside])
+    if stride.cycles < 4:
+        raise InputError(f'{recording.source}: comparing networks takes 4 strides or more, to fit '
+                         f'one half and judge on the other; here are {stride.cycles}')
+    even = np.floor(phases - phases[0]).astype(int) % 2 == 0
+    means = []
+    for mask in (even, ~even):
+        part = average_cycles(phases[mask], x[inside][mask], stride.theta,
+                              range(len(stride.joints)))
+        means.append((part.mean(stride.theta - part.zero), part.error))
+    return replace(stride, mean=means[0][0], error=means[0][1]), means[1][0]
+
+
+def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
+            ) -> dict[str, float]:
+    """RMS errors of the joints that move over their ranges."""
+    spans, sizes = np.ptp(recorded, axis=1), np.sqrt(np.mean(errors**2, axis=1))
+    return {name: float(size / span) for name, size, span in
+            zip(joints, sizes, spans, strict=True) if span > STANDS}
+
+
+def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
+    """Name the networks that a recording cannot distinguish by readouts of an order, or ''."""
+    alike = [one.network for one in found if one.alike]
+    if len(alike) < 2:
+        return ''
+    text = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
+            'with the fewest numbers is fitted')
+    return text if order == 1 else f'{text}; readouts of a lower order (--order 1) tell more apart'
+
+
+def as_rows(found: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
+    """Rows of a table, with a head."""
+    rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
+                                    'all numbers', 'told from the least')]
+    least = min((one.error for one in found), default=np.inf)
+    for one in found:
+        if one.why:
+            rows.append((one.network, one.gait or 'none', '-', '-', '-', '-', one.why))
+            continue
+        rows.append((one.network, one.gait, f'{100 * one.error:.2f} %',
+                     f'{100 * one.fitted:.2f} %', str(one.parameters), str(one.numbers),
+                     '' if one.error == least else 'no' if one.alike else 'yes'))
+    return rows

@@ -1,0 +1,390 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A fit to a recording: its steady stride, the gait fitted to it, and how well that does."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.fitting.gaits.leg_names import legs_of
+from cpg_ros.fitting.gaits.stride import find_stride, Stride
+from cpg_ros.fitting.inversion.fit import Estimate, Fit
+from cpg_ros.fitting.inversion.fit_data import cells_of, MeanCycle
+from cpg_ros.fitting.inversion.invert import invert
+from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY, GaitReadout
+from cpg_ros.fitting.recordings.recording import Recording
+from cpg_ros.motion.plan import refusal
+from cpg_ros.motion.robot import Robot
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.registry import (
+    find_network,
+    NetworkError,
+    NETWORKS,
+    numbered,
+    SHIPPED,
+    with_legs_of,
+)
+from cpg_ros.networks.stated_gait import other_gait
+import numpy as np
+
+# A fit for every steady gait: where the requested one has no orbit, a simpler one.
+
+#: Half the range of a parameter that keeps its value, over that value.
+STAYS = 1e-9
+#: A duty that no robot file states is one of the recording's where legs that stand as the cells
+#: do fit worse by this many standard errors, or where it is known to this standard error.
+ASKED, KNOWN = 3.3, 0.03
+#: Names, order and starts of a fit, and what they are in words.
+Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
+
+
+def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, float]]
+          ) -> Iterator[Way]:
+    yield names, order, starts, ''
+    if starts:
+        yield names, order, (), 'fitted from the start of the preset'
+    for lower in range(order - 1, 0, -1):
+        yield names, lower, (), f'fitted with readouts of order {lower}'
+    for name in names if len(names) > 1 else ():
+        yield (name,), order, (), f'fitted with {name} free alone'
+
+
+def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+                       free: Sequence[str] = (), order: int = 3,
+                       starts: Sequence[Mapping[str, float]] = (),
+                       readout: GaitReadout | None = None,
+                       done: Callable[[float], None] = lambda fraction: None
+                       ) -> tuple[Fit, tuple[str, ...]]:
+    """Fit with these names and this order, or as near to them as the generator runs.
+
+    Without names, the usual ones and the duty of the gait are fitted; the duty only if the readout
+    has one, or else if the recording tells it from that of the network's cells.
+
+    Args: as of invert.
+
+    Returns:
+        The fit, and warnings of what was given up for it.
+
+    Raises:
+        InputError: as in invert.
+        NoOrbit: not even the parameters given have an orbit that the generator runs.
+
+    """
+    readout = readout or GaitReadout.of(type(network), gait)
+    first, known = '', tuple(free) or network.free
+
+    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]]
+               ) -> tuple[Fit, tuple[str, ...]]:
+        if not names:
+            # Phases are known beforehand, and no other parameter shows.
+            return _as_it_is(cycle, cells, network, gait, lower, readout, done), ()
+        return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
+                      done=done), ()
+
+    for names, lower, begins, relaxation in _ways(known, order, starts):
+        try:
+            if free or begins:
+                fit, notes = fitted(names, lower, begins)
+            elif readout.duty is not None:
+                fit, notes = fitted((*names, GAIT_DUTY), lower, begins)
+            else:
+                fit, notes = _with_duty_if_told(names, lower, fitted)
+        except NoOrbit as error:
+            first = first or str(error)
+            continue
+        flaw = refusal(fit.orbit, gait, fit.harmonics)
+        if not flaw:
+            return fit, (*notes, *((f'not fitted as asked for: {first}; {relaxation} instead',)
+                                   if relaxation else ()))
+        first = first or f'the generator would refuse the {gait} that fits best: {flaw}'
+    fit = _as_it_is(cycle, cells, network, gait, order, readout, done)
+    if flaw := refusal(fit.orbit, gait, fit.harmonics):
+        raise NoOrbit(f'{first}; nor does the generator run the parameters given: {flaw}')
+    return fit, (f'not fitted as asked for: {first}; the parameters stay those of the preset, '
+                 'only the readouts are fitted',)
+
+
+def _with_duty_if_told(names: tuple[str, ...], order: int,
+                       fitted: Callable[..., tuple[Fit, tuple[str, ...]]]
+                       ) -> tuple[Fit, tuple[str, ...]]:
+    """Fit with legs that stand as the cells do, unless the recording tells another duty."""
+    try:
+        other, _ = fitted((*names, GAIT_DUTY), order, ())
+    except NoOrbit:
+        return fitted(names, order, ())
+    own, _ = fitted(names, order, [{}, *(dict(zip(names, one.values.tolist(), strict=False))
+                                         for one in other.minima)])
+    sizes = np.array(list(other.sizes.values()))[:, None]
+    rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
+    if rise > 0.5 * ASKED**2 * other.sharing:
+        return other, ()
+    error = other.parameters[GAIT_DUTY].stderr
+    return own, () if error < KNOWN else (
+        'the recording does not tell how long legs stand: they are taken to stand as the cells of '
+        'the network do, and the intervals hold for that alone',)
+
+
+def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str, order: int,
+              readout: GaitReadout, done: Callable[[float], None]) -> Fit:
+    """Fit readouts to the gait of a network whose parameters stay."""
+    name = next(iter(network.parameters()))
+    value, kind = float(network.as_dict()[name]), network.ranges[name]
+    room = STAYS * max(abs(value), 1.0)
+    bounds = {name: (max(kind.low, value - room), min(kind.high, value + room))}
+    fit = invert(cycle, cells, network, gait, (name,), order, ({},), readout=readout,
+                 bounds=bounds, profiles=False, done=done)
+    # The parameter was never fitted: an interval would claim what is not known.
+    return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())
+
+
+#: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
+#: and walks leave 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04; and what it leaves of confidence.
+POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordingFit(ShortRepr):
+    """A network's gait fitted to a recording.
+
+    Attributes:
+        recording: joint angles, rad, over times in s.
+        read: how its joints were given to legs.
+        legs: leg -> its joints.
+        stride: its steady gait.
+        fit: the network's gait fitted to that.
+        fractions: order of the readout -> mean over the joints of RMS error over range.
+        warnings: one line each.
+
+    """
+
+    recording: Recording
+    read: str
+    legs: Mapping[str, Sequence[str]]
+    stride: Stride
+    fit: Fit
+    fractions: dict[int, float]
+    warnings: tuple[str, ...]
+
+    def _summary(self) -> str:
+        fit = self.fit
+        return (f'{fit.gait} of {fit.network.name} to {self.recording.source}: '
+                f'{self.stride.frequency:.6g} Hz, confidence {self.confidence:.3g}, RMS error '
+                f'{100.0 * fit.mean_rms_share:.3g} % of range, warnings: {len(self.warnings)}')
+
+    @property
+    def confidence(self) -> float:
+        """Probability that gait and frequency are those named; less where the fit is poor."""
+        return self.stride.confidence * (LEFT if self.poor else 1.0)
+
+    @property
+    def poor(self) -> bool:
+        """Whether the readouts leave more than those of their order do of a gait."""
+        return self.fit.mean_rms_share > POOR[self.fit.order]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything in plain types, for JSON."""
+        fit, stride = self.fit, self.stride
+        rms, fraction = fit.rms, fit.rms_share
+        verdict = fit.verdict
+        return {
+            'gait': fit.gait, 'recognised': stride.gait if len(stride.alike) < 2 else None,
+            'nearest': stride.nearest, 'alike': list(stride.alike),
+            'distance': stride.distance, 'margin': stride.margin, 'confidence': self.confidence,
+            'frequency': stride.frequency, 'frequency_error': stride.frequency_error,
+            'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,
+            'phases': {leg: float(phase) for leg, phase in stride.phases.items()},
+            'network': fit.network.name, 'params': fit.network.as_dict(),
+            'parameters': {name: {'value': one.value, 'stderr': one.stderr,
+                                  'low': one.low, 'high': one.high}
+                           for name, one in fit.parameters.items()},
+            'order': fit.order, 'rms_share': fit.mean_rms_share,
+            'rms_share_by_order': {str(order): value for order, value in self.fractions.items()},
+            'joints': {name: {'rms': rms[name], 'rms_share': fraction[name],
+                              'cell': fit.cells[name]}
+                       for name in fit.joints},
+            'starts': [{'start': dict(zip(fit.free, trial.start.tolist(), strict=False)),
+                        'end': dict(zip(fit.free, trial.values.tolist(), strict=False)),
+                        'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
+                       for trial in fit.starts],
+            'minima': [{**dict(zip(fit.free, trial.values.tolist(), strict=False)),
+                        'cost': trial.cost} for trial in fit.minima],
+            'duty': fit.duty,
+            'period': fit.orbit.period,
+            'critical_delay': None if fit.hopf is None else fit.hopf.value,
+            'stable': verdict.stable, 'stable_with_default_gain': verdict.stable_with_default_gain,
+            'source': self.recording.source, 'legs': {leg: list(names) for leg, names
+                                                      in self.legs.items()},
+            'read': self.read, 'notes': [*self.recording.notes, *stride.notes],
+            'warnings': list(self.warnings)}
+
+
+def preset_of(network: str, gait: str) -> Preset:
+    """Return the shipped parameters that a gait is fitted from.
+
+    Raises:
+        InputError: the network has no such gait or preset.
+
+    """
+    presets = find_network(network).presets()
+    if gait not in presets:
+        raise InputError(f"'{gait}' is not one of the presets of the network {network}: "
+                         f'{", ".join(presets)}')
+    return presets[gait]
+
+
+def network_of(legs: Iterable[str]) -> str:
+    """Name the first shipped network that has these legs."""
+    wanted = set(legs)
+    return next(kind.name for kind in (*SHIPPED.values(), *numbered(len(wanted)))
+                if wanted <= set(next(iter(kind.legs.values()))))
+
+
+def leg_joints(recording: Recording, robot: Robot | None
+               ) -> tuple[dict[str, tuple[str, ...]], str]:
+    """Return which joints each leg has, and how that was read."""
+    if robot is None:
+        found = legs_of(recording.joints)
+        return dict(found.joints), found.explanation
+    legs = {leg: tuple(joint.name for joint in joints if joint.name in recording.joints)
+            for leg, joints in robot.legs.items()}
+    missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
+    if len(missing) == len(robot.joints):
+        raise InputError(f'{recording.source}: none of the joints of robot {robot.name} is '
+                         f'there: it has {", ".join(recording.joints)}')
+    read = f'legs and cells are those of robot {robot.name}'
+    return ({leg: names for leg, names in legs.items() if names},
+            read + (f'; not recorded: {", ".join(missing)}' if missing else ''))
+
+
+def networks_of(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
+    """Yield the networks that drive a robot, or else those shipped that have these legs."""
+    wanted = set(legs)
+    yield from ((NETWORKS[name] for name in robot.networks) if robot is not None else
+                (kind for kind in numbered(len(wanted))
+                 if wanted <= set(next(iter(kind.legs.values())))))
+
+
+def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
+              robot: Robot | None) -> tuple[dict[str, int], Stride]:
+    """Return joint -> its cell in a network, and the steady stride of the recording."""
+    cells = cells_of(robot if robot is not None else legs, kind)
+    cells = {name: cell for name, cell in cells.items() if name in recording.joints}
+    gains = None if robot is None else {
+        joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
+    return cells, find_stride(recording.select(tuple(cells)), legs, kind,
+                              None if robot is None else cells, gains, recording.loads)
+
+
+def _none_of(kind: type[Network], stride: Stride) -> str:
+    """Return a line on phases that are those of no gait: their values and their scatter."""
+    phases = ', '.join(f'{leg} {phase:.3f}' + (
+        f' +- {stride.scatter[leg].spread:.3f}' if stride.scatter[leg].spread > 0.0 else '')
+        for leg, phase in stride.phases.items())
+    return (f'the recorded phases are none of the gaits of the network {kind.name}: the nearest '
+            f'is {stride.nearest}, {stride.distance:.3f} of a cycle off; phases at '
+            f'{stride.frequency:.4g} Hz, and how far single strides are off them: {phases}')
+
+
+def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
+    """Return the estimates of the phases that are parameters of the network."""
+    known, found = fit.network.as_dict(), {}
+    for leg, one in list(stride.scatter.items())[1:]:
+        name = fit.network.offsets.get(leg)
+        if name is not None and name not in fit.parameters:
+            known_error = one.error == one.error
+            half = one.half_width if known_error else np.inf
+            found[name] = Estimate(known[name], one.error if known_error else np.inf,
+                                   known[name] - half, known[name] + half, known_error)
+    return found
+
+
+def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
+                  gait: str = '', *, free: Sequence[str] = (), order: int = 3, preset: str = '',
+                  starts: Sequence[Mapping[str, float]] = (),
+                  done: Callable[[float], None] = lambda fraction: None) -> RecordingFit:
+    """Find the steady gait of a recording and fit a network's gait and readouts to it.
+
+    Args:
+        recording: joints over time.
+        robot: which joints belong to which legs and cells; by default their names decide.
+        network: name or file; by default the robot's first, or the first that has such legs.
+        gait: of the network; by default the recorded one, as it is recognised.
+        free: parameters to fit, among them GAIT_DUTY, the share of the stride that legs stand; by
+            default the network's usual ones and that, if the robot's gait has a duty or the
+            recording tells it.
+        order: of the readouts, 1 to 3.
+        preset: whose parameters are taken that are not free; the gait's by default.
+        starts: free number -> value to start from; by default several that cover the ranges.
+        done: called with the share of the fit that is done, 0 to 1.
+
+    Raises:
+        CpgError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no
+            gait of the network's, or no orbit (NoOrbit).
+
+    """
+    legs, read = leg_joints(recording, robot)
+    network_given = bool(network)
+    if not network:
+        network = robot.networks[0] if robot is not None else network_of(legs)
+    try:
+        kind = with_legs_of(find_network(network), legs)
+    except NetworkError as error:
+        raise InputError(f'network {error}') from error
+    cells, stride = stride_of(recording, legs, kind, robot)
+    between = ''
+    if not (gait or stride.gait or network_given or kind.offsets):
+        between = _none_of(kind, stride)
+        as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
+        if as_they_are is not None:
+            kind = as_they_are
+            cells, stride = stride_of(recording, legs, kind, robot)
+            between += f'; they are fitted as they are, by the network {kind.name}'
+    warnings = [*([between] if between else []), *stride.issues]
+    if not gait:
+        gait = stride.gait or kind.unnamed
+        if not gait:
+            raise InputError('; '.join((
+                f'{recording.source}: {_none_of(kind, stride)}; name the gait to fit it all the '
+                'same', *recording.notes, *stride.notes, *stride.issues)))
+        if not stride.gait and not between:
+            warnings.append(_none_of(kind, stride))
+    elif (stride.gait or kind.unnamed) != gait:
+        warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
+                        f'not of {gait}')
+    parameters = preset_of(kind.name, preset or gait).network
+    as_recorded = parameters.with_phases(stride.phases)
+    if not other_gait(as_recorded, gait):
+        parameters = as_recorded
+    if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
+        read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
+                 'which, and parameters and intervals hold for that alone')
+    if stride.contacts is not None:
+        warnings.append('feet bore loads: what servos, the ground and feedback changed of the '
+                        "joints' motion counts as the network's, which intervals do not know")
+    readout = GaitReadout.of(kind, gait, preset, robot)
+    fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts,
+                                        readout, done)
+    fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
+    found = RecordingFit(recording, read, legs, stride, fit,
+                         fit.fractions,
+                         (*warnings, *fallbacks, *fit.warnings))
+    if not found.poor:
+        return found
+    return replace(found, warnings=(
+        f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "
+        f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',
+        *found.warnings))

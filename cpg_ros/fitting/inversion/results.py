@@ -1,0 +1,373 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Rows of inverted recordings as table.parquet and table.csv, made a batch at a time."""
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+import csv
+import hashlib
+from html import escape
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.command_line import printable
+from cpg_ros.common.errors import InputError, MissingLibraryError
+from cpg_ros.common.files import replacing, stored_json, write_atomically
+from cpg_ros.common.report_page import STYLE
+from cpg_ros.fitting.recordings.formats import FORMATS
+
+# Recordings in folders: bags, split ones as one, and other files of known formats.
+
+#: A folder that has this is one that results are written to: what is in it is no recording.
+RESULTS = 'cpg_ros_results.json'
+#: Bytes that are read at once.
+BLOCK = 1 << 20
+
+
+def found(folders: Sequence[Path]) -> Iterator[Path]:
+    """Yield the recordings in folders, each of which may be one, sorted, each once.
+
+    A folder that a format takes for one recording is one; other files of known endings are
+    recordings by themselves.
+
+    Raises:
+        InputError: a folder is not there.
+
+    """
+    seen: set[Path] = set()
+    for folder in folders:
+        if not folder.exists():
+            raise InputError(f'{folder}: there is no such folder')
+        for one in _below(folder):
+            if (place := one.resolve()) not in seen:
+                seen.add(place)
+                yield one
+
+
+def _below(place: Path) -> Iterator[Path]:
+    if place.is_file():
+        if place.name.endswith(tuple(
+                ending for one in FORMATS.values() for ending in one.endings)):
+            yield place
+        return
+    if (place / RESULTS).exists():
+        return
+    try:
+        inside = sorted(place.iterdir())
+        whole = bool(files_of(place))
+    except PermissionError:
+        inside, whole = [], True
+    if whole:
+        yield place
+        return
+    for one in inside:
+        if not one.name.startswith('.') and not (one.is_symlink() and one.is_dir()):
+            yield from _below(one)
+
+
+def files_of(recording: Path) -> list[Path]:
+    """The files that a recording is made of, sorted; none of a folder that is no recording."""
+    if not recording.is_dir():
+        return [recording]
+    return next((files for one in FORMATS.values()
+                 if one.files_in is not None and (files := one.files_in(recording))), [])
+
+
+def digest(recording: Path) -> str:
+    """SHA-256 of the names and the contents of a recording's files, as hexadecimal digits.
+
+    Raises:
+        OSError: one cannot be read.
+
+    """
+    total = hashlib.sha256()
+    for one in files_of(recording):
+        size = one.stat().st_size
+        total.update(os.fsencode(f'{one.name if recording.is_dir() else one.suffix}\n{size}\n'))
+        with one.open('rb') as file:
+            while block := file.read(BLOCK):
+                total.update(block)
+    return total.hexdigest()
+
+
+def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
+    """Names, sizes and times of a recording's files: while it is written they change."""
+    found = []
+    for one in files_of(recording):
+        try:
+            status = one.stat()
+        except FileNotFoundError:
+            continue
+        found.append((one.name, status.st_size, status.st_mtime_ns))
+    return tuple(found)
+
+
+# A folder of results: a file for every recording that is done, from which the table is made.
+
+#: Folders of the rows and of the fitted files.
+ROWS, FITTED = 'rows', 'fitted'
+
+
+def key(recording: Path) -> str:
+    """Return the name of a recording's files here, from its path."""
+    return hashlib.sha256(os.fsencode(recording.resolve())).hexdigest()[:16]
+
+
+class Results:
+    """Rows on disk, by recording.
+
+    Attributes:
+        folder: of all.
+        settings: digest of how recordings are fitted: rows of others are done again.
+
+    """
+
+    def __init__(self, folder: Path, settings: str) -> None:
+        """Make the folder, or resume in it.
+
+        Raises:
+            InputError: it holds something else.
+            OSError: it cannot be made.
+
+        """
+        self.folder, self.settings = folder, settings
+        mark = folder / RESULTS
+        if folder.exists() and not mark.exists() and any(folder.iterdir()):
+            raise InputError(f'{folder} is not a results folder: it contains other files')
+        for one in (ROWS, FITTED):
+            (folder / one).mkdir(parents=True, exist_ok=True)
+        write_atomically(mark, json.dumps({'made by': 'inversion --bags'}) + '\n')
+
+    def _place(self, recording: Path) -> Path:
+        return self.folder / ROWS / f'{key(recording)}.json'
+
+    def get(self, recording: Path) -> dict[str, Any] | None:
+        """Return a recording's row, if it was made with the same settings."""
+        row: dict[str, Any] | None = stored_json(self._place(recording))
+        return row if row and row.get('settings') == self.settings else None
+
+    def put(self, recording: Path, row: dict[str, Any]) -> None:
+        """Store the result of a recording: first its files, then the row that names them.
+
+        Raises:
+            OSError: it cannot be written.
+
+        """
+        files = row.pop('files', {})
+        for name, text in files.items():
+            write_atomically(self.folder / FITTED / name, text)
+        if not files:
+            # Of contents that it no longer has.
+            for ending in ('.yaml', '_robot.yaml'):
+                (self.folder / FITTED / f'{self.name(recording)}{ending}').unlink(missing_ok=True)
+        kept = {'file': printable(str(recording)), 'settings': self.settings, **row,
+                'reason': printable(row['reason']),
+                'fitted': str(Path(FITTED, next(iter(files)))) if files else ''}
+        write_atomically(self._place(recording), json.dumps(kept))
+
+    def name(self, recording: Path) -> str:
+        """Name of a recording's fitted file, without its ending."""
+        stem = ''.join(letter if letter.isalnum() or letter in '-_' else '_'
+                       for letter in recording.name.split('.')[0])
+        return f'{stem[:60]}-{key(recording)[:8]}'
+
+    def rows(self, recordings: list[Path]) -> Iterator[dict[str, Any]]:
+        """Yield the rows of those recordings that have one, in their order."""
+        yield from filter(None, map(self.get, recordings))
+
+
+# The page of many inverted recordings: one file, a table that can be sorted, small pictures.
+
+MORE = """
+th { cursor: pointer; white-space: nowrap; } th[aria-sort]::after { content: " \\2191"; }
+th[aria-sort=descending]::after { content: " \\2193"; }
+svg polyline { fill: none; stroke-width: 1.2; } svg .r { stroke: #a0aec0; stroke-width: 2.5; }
+svg .f { stroke: #2b6cb0; } td.num { text-align: right; font-variant-numeric: tabular-nums; }
+body { max-width: 110em; } td:first-child { min-width: 14em; }
+td:nth-child(2) { white-space: nowrap; }
+td.value { white-space: nowrap; } td.note { max-width: 40em; }
+input { font: inherit; padding: 0.3em 0.5em; width: 24em; max-width: 100%; }
+"""
+SCRIPT = """
+const body = document.querySelector('tbody'), heads = [...document.querySelectorAll('th')];
+heads.forEach((head, k) => head.addEventListener('click', () => {
+  const down = head.getAttribute('aria-sort') === 'ascending';
+  heads.forEach(one => one.removeAttribute('aria-sort'));
+  head.setAttribute('aria-sort', down ? 'descending' : 'ascending');
+  const value = row => row.cells[k].dataset.v ?? row.cells[k].textContent;
+  const order = (a, b) => {
+    const [x, y] = [value(a), value(b)];
+    if (x === '' || y === '') return (x === '') - (y === '');
+    const d = x - y;
+    return (isNaN(d) ? x.localeCompare(y) : d) * (down ? -1 : 1);
+  };
+  body.append(...[...body.rows].sort(order));
+}));
+document.querySelector('input').addEventListener('input', event => {
+  const wanted = event.target.value.toLowerCase();
+  for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
+});
+"""
+HEADS = ('file', 'gait', 'frequency [Hz]', 'confidence', 'residual / range [%]', 'parameters',
+         'mean cycles', 'remarks', 'seconds')
+
+
+def _number(value: float | None, form: str, more: str = '') -> str:
+    if value is None:
+        return '<td class="num" data-v=""></td>'
+    return f'<td class="num" data-v="{value!r}">{value:{form}}{more}</td>'
+
+
+def _row(row: dict[str, Any]) -> str:
+    fitted = row.get('fitted', '')
+    name = (f'<a href="{escape(fitted)}">{escape(row["file"])}</a>' if fitted
+            else escape(row['file']))
+    error = row.get('frequency_error') or 0.0
+    parameters = '<br>'.join(
+        f'{escape(name)} {one["value"]:.5g} ({one["low"]:.5g} to {one["high"]:.5g})'
+        for name, one in row.get('parameters', {}).items())
+    fraction = row.get('rms_share')
+    remarks = '<br>'.join(escape(text) for text in
+                          ([row['reason']] if row['reason'] else row.get('warnings', [])))
+    return (f'<tr{" class=fails" if row["reason"] else ""}><td>{name}</td>'
+            f'<td>{escape(row.get("gait", ""))}</td>'
+            f'{_number(row.get("frequency"), ".4f", f" &plusmn; {error:.1g}")}'
+            f'{_number(row.get("confidence"), ".2f")}'
+            f'{_number(None if fraction is None else 100.0 * fraction, ".1f")}'
+            f'<td class="value">{parameters}</td><td>{row.get("picture", "")}</td>'
+            f'<td class="note">{remarks}</td>{_number(row.get("seconds"), ".1f")}</tr>\n')
+
+
+def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: int) -> None:
+    """Write the page, row by row, beside and rename it.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    title = f'{done} recordings, {done - failed} fitted, {failed} not'
+    with replacing(path) as beside, beside.open('w', encoding='utf-8') as out:
+        out.write(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+                  f'<title>{title}</title><style>{STYLE}{MORE}</style></head><body>\n'
+                  f'<h1>{title}</h1>\n<p><input placeholder="show rows that contain this" '
+                  'aria-label="filter"> Click a column head to sort. Grey: recorded; blue: '
+                  'fitted.</p>\n<table><thead><tr>'
+                  + ''.join(f'<th>{escape(head)}</th>' for head in HEADS)
+                  + '</tr></thead><tbody>\n')
+        out.writelines(_row(row) for row in rows)
+        out.write(f'</tbody></table><script>{SCRIPT}</script></body></html>\n')
+
+
+#: Rows that are held at once.
+BATCH = 256
+#: Columns with their units, in the order of the table; before those of the parameters.
+FIRST = {'file': '', 'digest': '', 'reason': '', 'gait': '', 'recognised': '',
+         'frequency': 'Hz', 'frequency_error': 'Hz', 'confidence': '', 'cycles': '',
+         'begin': 's', 'end': 's', 'network': '', 'rms_share': ''}
+TEXT = ('file', 'digest', 'reason', 'gait', 'recognised', 'network', 'fitted')
+#: What each parameter has: its value, standard error and 95 % interval.
+PARTS = ('value', 'stderr', 'low', 'high')
+
+Rows = Callable[[], Iterable[dict[str, Any]]]
+
+
+def library() -> Any:
+    """Return pyarrow.
+
+    Raises:
+        MissingLibraryError: it is not installed.
+
+    """
+    try:
+        import pyarrow.parquet
+    except ImportError as error:
+        raise MissingLibraryError('tables need pyarrow: pip install pyarrow') from error
+    return pyarrow
+
+
+def parameter_columns(rows: Iterable[dict[str, Any]]) -> list[str]:
+    """Names of the columns of the parameters, those of all rows, sorted."""
+    names = {f'{row["network"]}.{name}' for row in rows for name in row.get('parameters', {})}
+    return [f'{name}{"" if part == "value" else f".{part}"}' for name in sorted(names)
+            for part in PARTS]
+
+
+def flat(row: dict[str, Any], columns: list[str]) -> dict[str, Any]:
+    """A row with a field for every column."""
+    cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
+    cells |= dict.fromkeys(columns)
+    for name, one in row.get('parameters', {}).items():
+        for part in PARTS:
+            column = f'{row["network"]}.{name}{"" if part == "value" else f".{part}"}'
+            cells[column] = one[part]
+    return cells | {'phases': row.get('phases', {}), 'joints': row.get('joints', {}),
+                    'warnings': row.get('warnings', []), 'fitted': row.get('fitted', ''),
+                    'seconds': row.get('seconds')}
+
+
+def _batches(rows: Iterable[dict[str, Any]], columns: list[str]
+             ) -> Iterator[list[dict[str, Any]]]:
+    batch: list[dict[str, Any]] = []
+    for row in rows:
+        batch.append(flat(row, columns))
+        if len(batch) == BATCH:
+            yield batch
+            batch = []
+    if batch:
+        yield batch
+
+
+def write_tables(folder: Path, rows: Rows) -> list[Path]:
+    """Write both tables beside and rename them; return their paths.
+
+    Args:
+        folder: for them.
+        rows: begins with the first row anew whenever it is called.
+
+    Raises:
+        OSError: they cannot be written.
+
+    """
+    arrow = library()
+    columns = parameter_columns(rows())
+    kinds = {**{name: arrow.string() if name in TEXT else arrow.float64() for name in FIRST},
+             'cycles': arrow.int64(), **dict.fromkeys(columns, arrow.float64()),
+             'phases': arrow.map_(arrow.string(), arrow.float64()),
+             'joints': arrow.map_(arrow.string(), arrow.float64()),
+             'warnings': arrow.list_(arrow.string()), 'fitted': arrow.string(),
+             'seconds': arrow.float64()}
+    schema = arrow.schema([arrow.field(name, kind, metadata={'unit': FIRST[name]}
+                                       if FIRST.get(name) else None)
+                           for name, kind in kinds.items()])
+    parquet, table = folder / 'table.parquet', folder / 'table.csv'
+    with (replacing(parquet) as one, replacing(table) as other,
+          arrow.parquet.ParquetWriter(one, schema) as out,
+          other.open('w', newline='', encoding='utf-8') as text):
+        writer = csv.DictWriter(text, list(kinds), lineterminator='\n')
+        writer.writeheader()
+        for batch in _batches(rows(), columns):
+            out.write_table(arrow.Table.from_pylist(
+                [{**row, 'phases': list(row['phases'].items()),
+                  'joints': list(row['joints'].items())} for row in batch], schema))
+            writer.writerows(_cells_of(row) for row in batch)
+    return [parquet, table]
+
+
+def _cells_of(row: dict[str, Any]) -> dict[str, Any]:
+    """A row as text: maps as JSON, lists with bars between."""
+    return {**row, 'phases': json.dumps(row['phases']) if row['phases'] else '',
+            'joints': json.dumps(row['joints']) if row['joints'] else '',
+            'warnings': ' | '.join(row['warnings'])}

@@ -1,0 +1,323 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stride by stride: how long each leg is retracted and protracted, from its joint angles alone.
+
+A leg's hip (or what corresponds to it) is foremost about when the foot is set down. From there to
+its hindmost angle the leg is retracted, mostly in stance, and from there on protracted, mostly in
+swing (Alexander 2003, Principles of Animal Locomotion). Which of the two strokes is which, the
+joint below tells: it is bent more in protraction. Where that does not decide, neither does this.
+A trotting Go1 retracts its legs in 74 % of the stride, by its thighs, and loads its feet in 58 %:
+where loads on the feet were recorded, too, strides go from touchdown to touchdown, through stance
+and swing.
+"""
+
+from collections.abc import Mapping, Sequence
+import csv
+from dataclasses import dataclass
+import io
+from itertools import pairwise
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.fitting.gaits.leg_names import role_of
+from cpg_ros.fitting.gaits.mean_cycle import evaluate_coefficients
+from cpg_ros.fitting.gaits.steady_stretch import RecordingLike
+from cpg_ros.fitting.gaits.stride import Stride
+from cpg_ros.fitting.inversion.recording_fit import RecordingFit
+import numpy as np
+
+#: Words for joints that move a leg to and fro, and for those below, which bend it.
+PROXIMAL = frozenset(('hip', 'thigh', 'hfe', 'hy', 'coxa', 'shoulder', 'upper', 'hippitch'))
+DISTAL = frozenset(('knee', 'calf', 'kfe', 'lower', 'tibia', 'elbow', 'shank', 'kn', 'kneepitch'))
+#: Harmonics of the mean cycle whose extremes are taken, and points at which they are looked for.
+HARMONICS, POINTS = 12, 4096
+#: Parts of a cycle: on either side of an extreme, to which it is fitted, and on either side of
+#: where the mean cycle has it, in which it is looked for; at how many places; fewest samples on a
+#: side.
+AROUND, SEARCHED, TRIED, SAMPLES = 0.08, 0.08, 33, 3
+#: A joint bends in the sense of its skewness if that is so large, otherwise of its mean if that is
+#: so many times its RMS motion; and by how much of this it has to be bent more in one stroke than
+#: in the other.
+SKEWED, BENT, CLEARER = 0.4, 1.0, 0.3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LegStrides(ShortRepr):
+    """The strides of a leg.
+
+    Attributes:
+        leg: its name.
+        joint: whose extremes are taken.
+        begins: s, when its strides begin: the joint is foremost or, where nothing tells the sense,
+            at its largest angle, or the foot touches down; shape (n,).
+        periods: s, shape (n,).
+        retractions: s, from foremost to hindmost, or in stance, shape (n,); nan if nothing tells
+            the sense.
+        range: of the joint in the mean cycle, rad.
+        why: why retraction and protraction cannot be told apart, or ''.
+        by_contacts: whether the strides are those of the foot's contacts, not of the joint.
+
+    """
+
+    leg: str
+    joint: str
+    begins: np.ndarray
+    periods: np.ndarray
+    retractions: np.ndarray
+    range: float  # noqa: A003
+    why: str = ''
+    by_contacts: bool = False
+
+    def _summary(self) -> str:
+        by = 'loads' if self.by_contacts else self.joint
+        return f'{self.leg}: {len(self.begins)} strides by {by}'
+
+    @property
+    def protractions(self) -> np.ndarray:
+        """Durations of the forward strokes, or in swing, s, shape (n,)."""
+        return self.periods - self.retractions
+
+    @property
+    def fractions(self) -> np.ndarray:
+        """Shares of the retractions in their strides, shape (n,)."""
+        return self.retractions / self.periods
+
+
+def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+                ) -> list[LegStrides]:
+    """Find the strides of every leg within the steady stretch of a recording.
+
+    Args:
+        recording: of the joints.
+        legs: leg -> its joints.
+        stride: the recording's, as `find_stride` returns it.
+
+    """
+    inside = (recording.times >= stride.begin) & (recording.times <= stride.end)
+    times = recording.times[inside]
+    phases = stride.warp(times)
+    coefficients = np.fft.rfft(stride.mean, axis=1).T[:HARMONICS + 1] / stride.mean.shape[1]
+    c = dict(zip(stride.joints, coefficients.T, strict=True))
+    contacts = stride.contacts
+    if contacts is not None and not set(stride.phases) <= set(contacts.legs):
+        contacts = None
+    found = []
+    for leg in stride.phases:
+        names = [name for name in legs[leg] if name in c]
+        joint, sense, why = _leading(names, c)
+        x = sense * recording.positions[inside, recording.joints.index(joint)]
+        span = float(np.ptp(evaluate_coefficients(c[joint][:, None], np.arange(POINTS) / POINTS)))
+        if contacts is not None:
+            begins, periods, stances = contacts.strides(leg).T
+            found.append(LegStrides(leg, joint, begins, periods, stances, span, '', True))
+            continue
+        fore = _extremes(times, phases, x, sense * c[joint], 1.0)
+        hind = None if why else _extremes(times, phases, x, sense * c[joint], -1.0)
+        rows = _strides(fore, hind)
+        begins, periods, back = rows.T
+        found.append(LegStrides(leg, joint, begins, periods, back, span, why))
+    return found
+
+
+def _words(name: str) -> set[str]:
+    return set(role_of(name).split())
+
+
+def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, float, str]:
+    """Return the joint whose extremes count, the sense in which it is protracted, and why not."""
+    def most(listed: Sequence[str]) -> str:
+        return max(listed, key=lambda name: float(np.abs(c[name][1])))
+
+    upper = [name for name in names if _words(name) & PROXIMAL]
+    lower = [name for name in names if _words(name) & DISTAL]
+    joint = most(upper or names)
+    if not upper:
+        return joint, 1.0, f'no joint of {", ".join(names)} is called like a hip'
+    if not lower:
+        return joint, 1.0, f'no joint of {", ".join(names)} is called like a knee'
+    bending = most(lower)
+    theta = np.arange(POINTS) / POINTS
+    x, y = evaluate_coefficients(np.column_stack([c[joint], c[bending]]), theta)
+    size, mean = float(np.std(y)), float(np.mean(y))
+    # It is bent far for a short time; where it is bent evenly, its zero is where it is straight.
+    skewness = float(np.mean((y - mean)**3)) / size**3 if size else 0.0
+    if abs(skewness) < SKEWED and (abs(mean) < BENT * size or not size):
+        return joint, 1.0, f'nothing tells in which sense {bending} bends'
+    bent = np.sign(skewness if abs(skewness) >= SKEWED else mean) * y
+    # From its smallest to its largest angle the joint rises.
+    least, largest = theta[np.argmin(x)], theta[np.argmax(x)]
+    rising = (theta - least) % 1.0 < (largest - least) % 1.0
+    more = float(bent[rising].mean() - bent[~rising].mean())
+    if abs(more) < CLEARER * size:
+        return joint, 1.0, f'{bending} is bent as much in one stroke of {joint} as in the other'
+    return joint, float(np.sign(more)), ''
+
+
+def _extremes(times: np.ndarray, phases: np.ndarray, x: np.ndarray, c: np.ndarray, side: float
+              ) -> np.ndarray:
+    """Return the times of a joint's maxima (side 1) or minima (-1), and phases, shape (k, 2)."""
+    theta = np.arange(POINTS) / POINTS
+    peak = float(theta[np.argmax(side * evaluate_coefficients(c[:, None], theta)[0])])
+    found = []
+    for k in range(int(np.floor(phases[0] - peak)), int(np.ceil(phases[-1] - peak)) + 1):
+        near = (np.abs(phases - peak - k) <= SEARCHED + AROUND) & np.isfinite(x)
+        at = _summit(phases[near], side * x[near], peak + k)
+        if at is not None:
+            found.append((float(np.interp(at, phases, times)), at))
+    return np.array(found).reshape(-1, 2)
+
+
+def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
+    """Return where two half parabolas that meet in their summit fit best, None if nowhere.
+
+    The strokes on either side of an extreme last differently long, so its sides are differently
+    steep: a summit that is the same on both sides, and a mean of strides that differ, too, lie off
+    towards the slower stroke.
+    """
+    tried = expected + np.linspace(-SEARCHED, SEARCHED, TRIED)
+    misfits = np.full(TRIED, np.inf)
+    for k, at in enumerate(tried):
+        near = np.abs(phases - at) <= AROUND
+        before, after = (near & (phases < at)).sum(), (near & (phases > at)).sum()
+        if min(before, after) < SAMPLES:
+            continue
+        off = phases[near] - at
+        rows = np.column_stack([np.ones(off.size), np.minimum(off, 0.0)**2,
+                                np.maximum(off, 0.0)**2])
+        fitted = np.linalg.lstsq(rows, x[near])[0]
+        if max(fitted[1:]) < 0.0:
+            misfits[k] = np.mean((rows @ fitted - x[near])**2)
+    k = int(np.argmin(misfits))
+    if not 0 < k < TRIED - 1 or not np.isfinite(misfits[k - 1:k + 2]).all():
+        return None
+    low, middle, high = misfits[k - 1:k + 2]
+    bend = low - 2.0 * middle + high
+    between = 0.5 * (low - high) / bend if bend > 0.0 else 0.0
+    return float(tried[k] + between * (tried[1] - tried[0]))
+
+
+def _strides(fore: np.ndarray, hind: np.ndarray | None) -> np.ndarray:
+    """Return begin, period and retraction of strides with all of their extremes, s, shape (n, 3).
+
+    Without hindmost instants all retractions are nan.
+    """
+    rows = []
+    for (begin, phase), (end, following) in pairwise(fore):
+        if following - phase >= 1.5:
+            continue
+        if hind is None:
+            rows.append((begin, end - begin, np.nan))
+        elif len(between := hind[(hind[:, 0] > begin) & (hind[:, 0] < end)]) == 1:
+            rows.append((begin, end - begin, between[0, 0] - begin))
+    return np.array(rows).reshape(-1, 3)
+
+
+# The strides of a recording as tables: each stride, each leg, and left against right.
+
+#: Fewest strides of a leg that have a scatter.
+FEWEST = 3
+#: What is reported of strides: name by joints and by contacts, attribute of LegStrides, format.
+QUANTITIES = (('stride [s]', 'stride [s]', 'periods', '.4f'),
+              ('retraction [s]', 'stance [s]', 'retractions', '.4f'),
+              ('protraction [s]', 'swing [s]', 'protractions', '.4f'),
+              ('retracted', 'duty', 'shares', '.3f'))
+Rows = list[tuple[str, ...]]
+
+
+def strides_of(found: RecordingFit) -> list[LegStrides]:
+    """Return the strides of every leg of an inverted recording."""
+    return leg_strides(found.recording, found.legs, found.stride)
+
+
+def _names(legs: list[LegStrides]) -> list[str]:
+    return [names[legs[0].by_contacts] for *names, _, _ in QUANTITIES]
+
+
+def every_stride(legs: list[LegStrides]) -> Rows:
+    """Rows of the strides, leg by leg, with a head; empty cells where nothing tells."""
+    rows: Rows = [('leg', 'number', 'begin [s]', *_names(legs))]
+    for one in legs:
+        for k, begin in enumerate(one.begins):
+            values = [(getattr(one, attribute)[k], form) for *_, attribute, form in QUANTITIES]
+            rows.append((one.leg, str(k + 1), f'{begin:.4f}',
+                         *(_shown(value, form) for value, form in values)))
+    return rows
+
+
+def by_leg(legs: list[LegStrides]) -> Rows:
+    """Rows of means and standard deviations, and the coefficient of variation of the period."""
+    rows: Rows = [('leg', 'strides', *_names(legs), 'variation of strides',
+                   'range [rad]', 'by')]
+    for one in legs:
+        cells = []
+        for *_, attribute, form in QUANTITIES:
+            values = getattr(one, attribute)
+            known = len(values) > 0 and np.isfinite(values).all()
+            cells.append('cannot tell' if not known else f'{values.mean():{form}}' + (
+                f' +- {values.std(ddof=1):{form}}' if len(values) >= FEWEST else ''))
+        scatter = (f'{one.periods.std(ddof=1) / one.periods.mean():.1%}'
+                   if len(one.periods) >= FEWEST else f'fewer than {FEWEST}')
+        rows.append((one.leg, str(len(one.begins)), *cells, scatter, f'{one.range:.3f}',
+                     'foot loads' if one.by_contacts else one.joint))
+    return rows
+
+
+def symmetry(legs: list[LegStrides]) -> Rows:
+    """Rows of the symmetry index of left and right legs, in percent; a head alone for none.
+
+    100 (left - right) / ((left + right) / 2), of the means (Robinson, Herzog & Nigg 1987): 0 where
+    both sides are alike.
+    """
+    rows: Rows = [('left - right', *_names(legs), 'range')]
+    named = {one.leg: one for one in legs}
+    for leg, left in named.items():
+        right = named.get('right' if leg == 'left' else 'r' + leg[1:])
+        if right is None or not leg.startswith('l'):
+            continue
+        pairs = [(_mean(getattr(left, attribute)), _mean(getattr(right, attribute)))
+                 for *_, attribute, _ in QUANTITIES]
+        rows.append((f'{leg} - {right.leg}', *(
+            'cannot tell' if not a + b > 0.0 else f'{200.0 * (a - b) / (a + b):+.1f} %'
+            for a, b in [*pairs, (left.range, right.range)])))
+    return rows
+
+
+def notes(legs: list[LegStrides]) -> list[str]:
+    """Return what the strokes rest on, one line each."""
+    known = [one.leg for one in legs if not one.why and not one.by_contacts]
+    lines = [f'{one.leg}: cannot tell retraction from protraction: {one.why}'
+             for one in legs if one.why]
+    if legs[0].by_contacts:
+        lines.insert(0, 'stance and swing are those of the loads on the feet: strides begin with '
+                     'a touchdown')
+    if known:
+        lines.insert(0, f'{", ".join(known)}: a leg is retracted from the foremost to the '
+                     'hindmost angle of the joint named, and then protracted; contacts are not '
+                     'known, and stance is often shorter')
+    return lines
+
+
+def as_csv(found: RecordingFit) -> str:
+    """Return every stride as a CSV file."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator='\n').writerows(every_stride(strides_of(found)))
+    return out.getvalue()
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean()) if len(values) else float('nan')
+
+
+def _shown(value: float, form: str) -> str:
+    return f'{value:{form}}' if np.isfinite(value) else ''

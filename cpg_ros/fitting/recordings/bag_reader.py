@@ -1,0 +1,206 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Loads on the feet out of a bag, on the clock of the joint states beside them.
+
+Robots publish them as arrays without stamps, one number a leg, labelled with the legs' names. When
+they were received says where between the joint states they belong.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+import struct
+
+from cpg_ros.common.command_line import printable, progress_bar
+from cpg_ros.fitting.recordings.bag_storage import Bag, files_of_bag, opened, STORAGES
+from cpg_ros.fitting.recordings.joint_streams import BATCH, recorded, Servo, Stream
+from cpg_ros.fitting.recordings.recording import (
+    FootLoads,
+    JOINTS,
+    Option,
+    Recording,
+    RecordingError,
+    RecordingFormat,
+)
+import numpy as np
+
+#: Topics that have this name, in whatever namespace, and this type.
+NAME, TYPE = 'foot_contacts', 'std_msgs/msg/Float64MultiArray'
+#: Bytes before a message's content, the second of which is 1 if numbers are little-endian.
+HEAD = 4
+#: A recording that starts so long before the first stamp (s) does not use the stamps.
+APART = 60.0
+
+
+class LoadStream:
+    """What a topic of foot loads delivered, and when the joint states came in between."""
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self._received: list[int] = []
+        self._messages: list[bytes] = []
+        #: Of joint states: when they were received and what their headers say, ns.
+        self._clock: list[tuple[int, int]] = []
+
+    def add(self, received: int, message: bytes) -> None:
+        """Take a serialised message, received at a time in ns."""
+        self._received.append(received)
+        self._messages.append(bytes(message))
+
+    def pass_joint_state(self, received: int, message: bytes) -> None:
+        """Take the clock from a serialised JointState."""
+        if len(message) >= HEAD + 8:
+            seconds, rest = struct.unpack_from(f'{_order(message)}iI', message, HEAD)
+            self._clock.append((received, 1_000_000_000 * seconds + rest))
+
+    def loads(self, start: float) -> FootLoads | None:
+        """Return the loads, None if nothing was delivered.
+
+        Args:
+            start: the recording's, s on the clock that it uses.
+
+        Raises:
+            RecordingError: a message is none, or has no label that names the legs.
+
+        """
+        if not self._messages or not self._clock:
+            return None
+        first = self._messages[0]
+        try:
+            legs, place = _layout(first)
+            whole = {len(one) for one in self._messages} == {len(first)}
+        except (struct.error, UnicodeDecodeError, ValueError):
+            whole = False
+        if not whole or place + 8 * len(legs) > len(first):
+            raise RecordingError(f'{self.topic}: foot loads need a label with the names of the '
+                                 'legs, and a number for each')
+        body = b''.join(one[place:place + 8 * len(legs)] for one in self._messages)
+        rows = np.frombuffer(body, f'{_order(first)}f8').reshape(-1, len(legs)).astype(float)
+        times = self._on_clock(start)
+        rising = np.append(True, np.diff(np.maximum.accumulate(times)) > 0.0)
+        return FootLoads(legs, times[rising], rows[rising])
+
+    def _on_clock(self, start: float) -> np.ndarray:
+        received, stamps = np.array(self._clock, dtype=np.int64).T
+        if abs(start - 1e-9 * stamps[0]) > APART:
+            # Joint states without stamps are recorded by when they were received.
+            stamps = received
+        begin, own = received[0], np.array(self._received, dtype=np.int64)
+        # Differences, which floats hold to the nanosecond.
+        return np.asarray(1e-9 * np.interp(own - begin, received - begin, stamps - stamps[0])
+                          + (1e-9 * float(stamps[0]) - start))
+
+
+def _order(message: bytes) -> str:
+    return '<' if message[1] & 1 else '>'
+
+
+def _layout(message: bytes) -> tuple[tuple[str, ...], int]:
+    """Return the names of the legs in the label of the only dimension, and where numbers begin.
+
+    Raises:
+        struct.error, UnicodeDecodeError, ValueError: it has another layout.
+
+    """
+    order = _order(message)
+    dimensions, length = struct.unpack_from(f'{order}II', message, HEAD)
+    end = HEAD + 8 + length
+    if dimensions != 1 or not 1 < length <= len(message):
+        raise ValueError('not one dimension with a label')
+    legs = tuple(message[HEAD + 8:end - 1].decode().split(','))
+    # Size, stride and offset, four bytes each, then how many numbers there are.
+    (count,) = struct.unpack_from(f'{order}I', message, end + -(end - HEAD) % 4 + 12)
+    place = end + -(end - HEAD) % 4 + 16
+    if count != len(legs):
+        raise ValueError('not a number for each name')
+    return legs, place + -(place - HEAD) % 8
+
+
+# Joint states out of rosbag2 bags: sqlite3 and mcap, compressed or not, without ROS.
+
+def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str] = (),
+             progress: bool = True, some: bool = False, servo: Servo | None = None
+             ) -> Recording:
+    """Read the joint states of a bag.
+
+    See `recorded` for joints that are on several topics, and for stamps. Loads on the feet are
+    read if one topic of the bag has them (see `LoadStream`).
+
+    A recorder that died leaves mcap files without an end and no metadata.yaml. The complete part
+    of such files is read, and a note reports it. A truncated sqlite3 file is an error.
+
+    Args:
+        path: the bag's folder, or one of its storage files (.mcap, .db3).
+        topics: which to read; all topics of type sensor_msgs/msg/JointState, if empty.
+        joints: which joints to take, in this order; all of them, if empty.
+        progress: show a progress bar.
+        some: joints that are not there are passed over, unless none is.
+        servo: of the joints, if the angles that they were driven to are wanted.
+
+    Raises:
+        RecordingError: see `recorded`; a bag that cannot be read, a topic that is not there or of
+            another type.
+
+    """
+    path = Path(path)
+    source = printable(f'{path}, ')
+    with opened(path) as bag:
+        streams = {topic: Stream(topic, joints, servo, source)
+                   for topic in bag.choose(topics)}
+        loads = _load_stream(bag)
+        expected = bag.expected()
+        total = max(1, sum(expected[topic] for topic in streams))
+        with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:
+            messages = bag.messages([*streams, *([loads.topic] if loads else [])])
+            for done, (topic, received, message) in enumerate(messages, 1):
+                if loads and topic == loads.topic:
+                    loads.add(received, message)
+                    continue
+                streams[topic].add(received, message)
+                if loads:
+                    loads.pass_joint_state(received, message)
+                if not done % BATCH:
+                    bar(done)
+        for stream in streams.values():
+            stream.decode()
+        notes = [*map(printable, bag.notes), *(
+            f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
+            for topic, stream in streams.items() if stream.count != expected[topic]), *(
+            f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
+    recording = recorded(list(streams.values()), joints, source, notes, some)
+    return recording if loads is None else _with_loads(recording, loads)
+
+
+def _load_stream(bag: Bag) -> LoadStream | None:
+    """Return a stream for the topic with foot loads, None unless exactly one has them."""
+    found = {one.topic for one in bag.connections
+             if one.topic.rsplit('/')[-1] == NAME and one.msgtype == TYPE}
+    return LoadStream(found.pop()) if len(found) == 1 else None
+
+
+def _with_loads(recording: Recording, stream: LoadStream) -> Recording:
+    try:
+        return replace(recording, loads=stream.loads(recording.start))
+    except RecordingError as error:
+        # What is asked for is the joints.
+        return replace(recording, notes=(*recording.notes, f'{error}: left out'))
+
+
+BAG = RecordingFormat(
+    name='bag', contents='a rosbag2 bag', help='a rosbag2 bag, sqlite3 or mcap', metavar='DIR',
+    read=read_bag, endings=STORAGES, files_in=files_of_bag, features=('servo', 'some'),
+    options=(Option('topics', 'topics of the bag to read (default: all of type '
+                    'sensor_msgs/msg/JointState)', 'TOPIC', several=True), JOINTS),
+    lacks={'unit': 'joint states are in rad', 'time': 'joint states have their stamps'})

@@ -1,0 +1,167 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joint angles out of BVH files: every rotation of a joint is one, with the channel in its name.
+
+The format is Biovision's: a tree of joints with their channels, then a row of numbers per frame,
+angles in degrees (Meredith & Maddock 2001).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+import math
+from pathlib import Path
+
+from cpg_ros.common.command_line import printable
+from cpg_ros.fitting.recordings.recording import (
+    abbreviate,
+    merged,
+    Recording,
+    RecordingError,
+    RecordingFormat,
+    require,
+)
+from cpg_ros.fitting.recordings.tables import matching, number_rows, opened, remaining_lines
+from cpg_ros.fitting.recordings.thinned import counted, FARTHEST
+import numpy as np
+
+CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
+#: Words of a tree, and channels of all joints: a body with hands has 300.
+LONGEST, MOST = 200_000, 10_000
+
+
+def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True) -> Recording:
+    """Read joint angles from a BVH file.
+
+    Every channel that rotates is a joint, called `LeftLeg_x` for the channel Xrotation of
+    LeftLeg; angles are Euler's as they stand in the file, without jumps by whole turns. Channels
+    that do not move are left out.
+
+    Args:
+        path: the file.
+        joints: the joints to take, in this order, or patterns such as 'Left*_x'; all that move,
+            if empty.
+        progress: not used; files of minutes are read in a second.
+
+    Raises:
+        RecordingError: see `merged`; a file that is no such tree with rows.
+
+    """
+    path = Path(path)
+    with opened(path) as file:
+        words = _words(file)
+        channels = _tree(words, path)
+        count, interval, line = _motion(file, path, words)
+        rows, notes = number_rows(remaining_lines(file, path), None, len(channels), path, line)
+    if not len(rows):
+        raise RecordingError(f'{path}: no frames')
+    if len(rows) != count:
+        notes.append(f'{counted(len(rows), "frame")}, where the file states {count}')
+    turning = [k for k, (_, channel) in enumerate(channels) if channel.endswith('rotation')]
+    names = [f'{channels[k][0]}_{channels[k][1][0].lower()}' for k in turning]
+    require(names, names, str(path))
+    with np.errstate(invalid='ignore'):
+        angles = np.radians(rows[:, turning])
+        angles[~(np.abs(angles) <= FARTHEST)] = np.nan
+        moving = [k for k, column in enumerate(angles.T) if not (column == column[0]).all()]
+    args = ([names.index(name) for name in matching(joints, names, str(path))] if joints
+              else moving)
+    if not args:
+        raise RecordingError(f'{path}: no joint moves in {counted(len(rows), "frame")}')
+    if not joints and len(moving) < len(names):
+        notes.append(f'{counted(len(names) - len(moving), "channel")} left out: no motion')
+    for k in args:
+        there = np.isfinite(angles[:, k])
+        angles[there, k] = np.unwrap(angles[there, k])
+    stamps = np.rint(np.arange(len(rows)) * interval * 1e9).astype(np.int64)
+    found = merged([(stamps, [names[k] for k in args], angles[:, args])],
+                   printable(str(path)))
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _words(file: Iterator[str]) -> list[str]:
+    """Return the words of the tree."""
+    words: list[str] = []
+    for line in islice(file, LONGEST):
+        if line.strip() == 'MOTION':
+            return [*words, 'MOTION', '']
+        words += [*line.split(), '\n']
+        if len(words) > LONGEST:
+            break
+    return words
+
+
+def _tree(words: list[str], path: Path) -> list[tuple[str, str]]:
+    """Return joint and channel of each column."""
+    if words[:1] != ['HIERARCHY']:
+        raise RecordingError(f"{path}: no BVH file: it does not begin with 'HIERARCHY'")
+    if words[-2:] != ['MOTION', '']:
+        raise RecordingError(f"{path}: no BVH file: no line 'MOTION' follows the tree of joints")
+    channels: list[tuple[str, str]] = []
+    joint, depth = '', 0
+    for k, word in enumerate(words):
+        if word in ('ROOT', 'JOINT'):
+            name = ' '.join(_line(words, k + 1)).partition('{')[0].strip()
+            joint = name.rpartition(':')[2]
+            if not joint:
+                raise RecordingError(f'{path}: a {word} without a name')
+        elif word == 'CHANNELS':
+            count, *named = [*_line(words, k + 1), '']
+            named = named[:-1]
+            if count != str(len(named)) or not set(named) <= CHANNELS or not joint:
+                raise RecordingError(f'{path}: the channels of {joint or "nothing"!r}, '
+                                     f'{abbreviate([count, *named])}, are no number and as many '
+                                     'names '
+                                     'such as Xrotation')
+            channels += [(joint, channel) for channel in named]
+        depth += word.endswith('{') - word.startswith('}')
+    if depth:
+        raise RecordingError(f'{path}: not as many braces close as open in its tree of joints')
+    if not any(channel.endswith('rotation') for _, channel in channels) or len(channels) > MOST:
+        raise RecordingError(f'{path}: {counted(len(channels), "channel")}, where joints that '
+                             f'turn have up to {MOST}')
+    return channels
+
+
+def _line(words: list[str], begin: int) -> list[str]:
+    return words[begin:words.index('\n', begin)]
+
+
+def _motion(file: Iterator[str], path: Path, words: list[str]) -> tuple[int, float, int]:
+    """Return the number of frames, their interval (s), and the number of the next line."""
+    number = words.count('\n') + 1
+    values: dict[str, float] = {}
+    for line in islice(file, 10):
+        number += 1
+        name, mark, value = line.partition(':')
+        if mark:
+            try:
+                values[' '.join(name.lower().split())] = float(value)
+            except ValueError:
+                raise RecordingError(f'{path}, line {number}: {value.strip()[:40]!r} is not a '
+                                     'number') from None
+        if 'frame time' in values:
+            break
+    count, interval = values.get('frames', math.nan), values.get('frame time', math.nan)
+    if not (0.0 <= count < 1e9 and 1e-6 <= interval <= 10.0):
+        raise RecordingError(f"{path}: after 'MOTION', 'Frames:' and 'Frame Time:' (1e-6 to 10 s) "
+                             f'have to follow, not {count:g} and {interval:g}')
+    return int(count), interval, number + 1
+
+
+BVH = RecordingFormat(
+    name='bvh', contents='a BVH file', help='joint rotations, as motion capture writes them',
+    metavar='FILE', read=read_bvh, endings=('.bvh',),
+    lacks={'unit': 'BVH files have degrees', 'time': 'BVH files have seconds'})

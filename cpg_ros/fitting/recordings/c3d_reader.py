@@ -1,0 +1,161 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Markers and joint angles out of C3D files, by the library ezc3d (Michaud & Begon 2021, Journal
+of Open Source Software 6(58), 2911), which runs in a process of its own (see c3d_process).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common import files
+from cpg_ros.common.command_line import printable
+from cpg_ros.common.errors import needed
+from cpg_ros.fitting.recordings.c3d_process import read_apart, UnreadableC3D
+from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
+from cpg_ros.fitting.recordings.recording import (
+    abbreviate,
+    JOINTS,
+    merged,
+    Recording,
+    RecordingError,
+    RecordingFormat,
+)
+from cpg_ros.fitting.recordings.tables import ANGLES, matching, stamps_of_frames
+from cpg_ros.fitting.recordings.thinned import counted
+import numpy as np
+
+#: Largest file, and what its first block has, bytes.
+LARGEST, BLOCK = 1_000_000_000, 512
+
+
+def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Sequence[str] = (),
+             progress: bool = True) -> Recording:
+    """Read the joint angles of a C3D file: those that are in it, or those between its markers.
+
+    A biomechanical model, such as Plug-in Gait, writes angles as points that the parameter
+    POINT:ANGLES lists. They are taken where no segments are given: of each its first component,
+    flexion in Plug-in Gait, without jumps by whole turns.
+
+    Args:
+        path: the file.
+        segments: which markers span which segment; see `load_segments`.
+        joints: of these, in this order, or patterns such as '*Knee*'; all of them, if empty.
+        progress: not used.
+
+    Raises:
+        RecordingError: see `c3d_markers` and `joint_recording`; an unknown unit of angles, or no
+            angle of a joint.
+
+    """
+    markers, angles, unit = _contents(Path(path))
+    if segments is None and angles:
+        return _modelled(markers, angles, unit, joints)
+    return joint_recording(markers, segments, joints)
+
+
+def c3d_markers(path: str | Path) -> Markers:
+    """Read the points of a C3D file; one with a negative residual was not seen.
+
+    Names lose what stands before a colon, the subject.
+
+    Raises:
+        RecordingError: the file is damaged, or has no points.
+        MissingLibraryError: ezc3d is not installed.
+
+    """
+    return _contents(Path(path))[0]
+
+
+def _contents(path: Path) -> tuple[Markers, list[str], str]:
+    """Return the points, the names of those that are angles, and the unit of these, '' if none."""
+    stated = _stated(path)
+    needed('ezc3d')
+    try:
+        point, points, residuals = read_apart(path, path.stat().st_size)
+        rate = float(point['RATE'][0])
+    except (UnreadableC3D, LookupError, TypeError, ValueError, OSError) as error:
+        why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+        raise RecordingError(f'{path}: no C3D file that can be read: {why[:200]}') from error
+    labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
+    units = [str(one) for one in point.get('ANGLE_UNITS', [])]
+    count, frames = points.shape[1:]
+    if not count or not frames:
+        raise RecordingError(f'{path}: {counted(count, "point")} in {counted(frames, "frame")}')
+    names = labels[:count]
+    if len(names) != count:
+        raise RecordingError(f'{path}: {len(names)} labels for {counted(count, "point")}')
+    places = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
+    notes = ([f'{counted(frames, "frame")}, where the header states {stated}: it may be cut']
+             if frames < stated else [])
+    found = Markers(tuple(names), stamps_of_frames(np.arange(frames), rate, path), places, path,
+                    notes=tuple(notes))
+    return found, [name for name in names if name in angles], ''.join(units[:1]).strip()
+
+
+def _names(point: Mapping[str, Any], key: str) -> list[str]:
+    """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
+    keys = sorted((one for one in point if one.startswith(key)), key=lambda one: (len(one), one))
+    return [str(name).rpartition(':')[2].strip() for one in keys for name in point[one]]
+
+
+def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]
+              ) -> Recording:
+    """Return the angles that a model wrote."""
+    source = points.source
+    scale = ANGLES.get(unit.lower() or 'deg')
+    if scale is None:
+        raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
+    wanted = matching(joints, angles, str(source))
+    places = points.points[:, [points.names.index(name) for name in wanted]]
+    # Where a model had no value, some write zeros.
+    first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
+    there = np.isfinite(first)
+    silent = [name for k, name in enumerate(wanted) if not there[:, k].any()]
+    if silent and (joints or len(silent) == len(wanted)):
+        raise RecordingError(f'{source}: no value of {abbreviate(silent)}')
+    for k in range(len(wanted)):
+        first[there[:, k], k] = np.unwrap(first[there[:, k], k])
+    kept = [k for k, name in enumerate(wanted) if name not in silent]
+    recording = merged([(points.stamps, [wanted[k] for k in kept], first[:, kept])],
+                       printable(str(source)))
+    notes = [*points.notes, 'of each angle the first component is taken, flexion in Plug-in Gait']
+    if not unit:
+        notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
+    if silent:
+        notes.append(f'without a value, left out: {abbreviate(silent)}')
+    return replace(recording, notes=(*map(printable, notes), *recording.notes))
+
+
+def _stated(path: Path) -> int:
+    """Return the number of frames that a file's first block states, mod 65536.
+
+    Raises:
+        RecordingError: it is no C3D file.
+
+    """
+    with files.opened(path, RecordingError, largest=LARGEST) as file:
+        data = file.read(BLOCK)
+    if len(data) < BLOCK or data[1] != 0x50 or not data[0]:
+        raise RecordingError(f'{path}: no C3D file: it does not begin as one')
+    first, last = np.frombuffer(data, '<u2')[3:5].astype(int)
+    return (last - first + 1) % 65536
+
+
+C3D = RecordingFormat(
+    name='c3d', contents='a C3D file', help='joint angles of a model, or markers',
+    metavar='FILE', read=read_c3d, endings=('.c3d',), options=(JOINTS, SEGMENTS),
+    lacks={'unit': 'C3D files have their unit', 'time': 'C3D files have their rate'})

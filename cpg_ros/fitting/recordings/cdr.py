@@ -1,0 +1,197 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""JointState messages decoded in bulk, straight from their CDR bytes.
+
+The messages of a publisher mostly share one layout: frame, names and lengths are the same bytes
+at the same places, and only the stamp and the numbers differ. Then the positions of many
+messages are one strided array. The library decodes the first message of a layout, which gives
+the places; every other message is compared with it in all bytes that make up the layout. Padding
+is not initialised and never compared. Messages of rare layouts are left to the library.
+"""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.fitting.recordings.bag_library import deserialize, SerdeError
+import numpy as np
+
+JOINT_STATE = 'sensor_msgs/msg/JointState'
+#: Layouts of a batch that are decoded in bulk; what is left goes one by one.
+LAYOUTS = 8
+#: Numbers of a message, in its order.
+FIELDS = ('position', 'velocity', 'effort')
+#: Bytes before the body: representation, of which the library reads two bytes, and options.
+HEADER = 4
+
+
+class UndecodableError(CpgError):
+    """Message `index` of a batch is no JointState."""
+
+    def __init__(self, index: int, reason: str) -> None:
+        super().__init__(reason)
+        self.index = index
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SerializedBlock(ShortRepr):
+    """Messages that have the same names.
+
+    Attributes:
+        rows: their places in the batch, shape (n,), rising.
+        stamps: of the headers, ns, shape (n,), int64.
+        names: of the joints, as in the messages.
+        positions: shape (n, positions); a message may have more or fewer than names.
+        velocities, efforts: likewise, rad/s and N m; of width 0 where they were not requested.
+
+    """
+
+    rows: np.ndarray
+    stamps: np.ndarray
+    names: tuple[str, ...]
+    positions: np.ndarray
+    velocities: np.ndarray
+    efforts: np.ndarray
+
+
+def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[SerializedBlock]:
+    """Decode a batch of serialised JointState messages.
+
+    Args:
+        messages: as they were received.
+        efforts: whether to decode velocities and efforts, too.
+
+    Raises:
+        UndecodableError: a message is damaged or of another type.
+
+    """
+    fields = FIELDS if efforts else FIELDS[:1]
+    left = np.arange(len(messages))
+    lengths = np.fromiter(map(len, messages), np.intp, len(messages))
+    for _ in range(LAYOUTS):
+        if not left.size:
+            return
+        layout = _Layout(messages, int(left[0]))
+        alike = lengths[left] == layout.length
+        same = left[alike]
+        joined = b''.join(messages if len(same) == len(messages) else
+                          [messages[k] for k in same])
+        fits = layout.fits(joined)
+        stamps, numbers = layout.read(joined, fields)
+        if fits.all():
+            left = left[~alike]
+        else:
+            same, stamps, numbers = same[fits], stamps[fits], [one[fits] for one in numbers]
+            left = np.setdiff1d(left, same, assume_unique=True)
+        yield SerializedBlock(same, stamps, layout.names, *numbers)
+    for k in left.tolist():
+        message = _decoded(messages, k)
+        stamp = message.header.stamp
+        yield SerializedBlock(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
+                              tuple(message.name), *(
+                        np.array(getattr(message, which) if which in fields else (), float)[None]
+                        for which in FIELDS))
+
+
+def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
+    """Join blocks of equal names and widths, their messages in the order of the batch again.
+
+    They can differ in what is no number: byte order, or the frame's name.
+    """
+    alike: dict[tuple, list[SerializedBlock]] = {}
+    for block in blocks:
+        widths = (one.shape[1] for one in (block.positions, block.velocities, block.efforts))
+        alike.setdefault((block.names, *widths), []).append(block)
+    for same in alike.values():
+        if len(same) == 1:
+            yield same[0]
+            continue
+        order = np.argsort(np.concatenate([block.rows for block in same]))
+        rows, stamps, *numbers = (np.concatenate([getattr(block, name) for block in same])[order]
+                                  for name in ('rows', 'stamps', 'positions', 'velocities',
+                                               'efforts'))
+        yield SerializedBlock(rows, stamps, same[0].names, *numbers)
+
+
+def _decoded(messages: Sequence[bytes], index: int) -> Any:
+    try:
+        return deserialize(messages[index])
+    except SerdeError as error:
+        raise UndecodableError(index, str(error)) from error
+
+
+class _Layout:
+    """Where a message has what, and all its bytes but stamp, numbers and padding."""
+
+    def __init__(self, messages: Sequence[bytes], index: int) -> None:
+        message, first = _decoded(messages, index), messages[index]
+        self.length = len(first)
+        self.names = tuple(message.name)
+        self.order = '<' if first[1] else '>'
+        fixed = np.zeros(self.length, bool)
+        fixed[:2] = True
+        end = HEADER + 8
+
+        def text(value: str) -> None:
+            nonlocal end
+            begin = end
+            end += 4 + len(value.encode()) + 1
+            fixed[begin:end] = True
+            end += -end % 4
+
+        def number() -> None:
+            nonlocal end
+            fixed[end:end + 4] = True
+            end += 4
+
+        text(message.header.frame_id)
+        number()
+        for name in self.names:
+            text(name)
+        #: Field -> where its numbers are, and how many.
+        self.places: dict[str, tuple[int, int]] = {}
+        for which in FIELDS:
+            number()
+            count = len(getattr(message, which))
+            if count:
+                end += (HEADER - end) % 8
+            self.places[which] = end, count
+            end += 8 * count
+        # Bytes are compared as words of four, which all of these but the first fill or pad.
+        words = self.length // 4
+        mask = np.where(fixed[:4 * words], 255, 0).astype(np.uint8).view(np.uint32)
+        self.words = np.flatnonzero(mask)
+        self.mask = mask[self.words]
+        self.value = np.frombuffer(first, np.uint32, words)[self.words] & self.mask
+
+    def _array(self, joined: bytes, kind: str, offset: int, width: int) -> np.ndarray:
+        """Return an array of what every message has at an offset; a view, unaligned."""
+        dtype = np.dtype(kind)
+        return np.ndarray((len(joined) // self.length, width), dtype, joined, offset,
+                          (self.length, dtype.itemsize))
+
+    def fits(self, joined: bytes) -> np.ndarray:
+        """Tell which messages of this length have this layout."""
+        words = self._array(joined, '=u4', 0, self.length // 4)[:, self.words]
+        return ((words & self.mask) == self.value).all(axis=1)
+
+    def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return stamps and the numbers of all fields, copied; of width 0 if not requested."""
+        seconds = self._array(joined, self.order + 'i4', HEADER, 1)[:, 0].astype(np.int64)
+        nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
+        return seconds * 10**9 + nanoseconds, [
+            self._array(joined, self.order + 'f8', place, count if which in fields else 0)
+            .astype(np.float64) for which, (place, count) in self.places.items()]

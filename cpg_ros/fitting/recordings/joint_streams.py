@@ -1,0 +1,381 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joint states topic by topic, from serialised messages to one recording."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.fitting.recordings.bag_storage import line
+from cpg_ros.fitting.recordings.cdr import (
+    decode,
+    in_order,
+    JOINT_STATE,
+    SerializedBlock,
+    UndecodableError,
+)
+from cpg_ros.fitting.recordings.recording import (
+    abbreviate,
+    Chunk,
+    joint_list,
+    merged,
+    Recording,
+    RecordingError,
+    require,
+)
+from cpg_ros.fitting.recordings.thinned import LONG, Thinned
+import numpy as np
+
+# The commands of joints, from their positions, velocities and efforts.
+
+#: Gains beyond these are mistakes, and would make numbers overflow.
+SMALLEST, LARGEST = 1e-3, 1e5
+
+
+@dataclass(frozen=True)
+class Servo:
+    """The controller of a robot's joints: effort = kp (command - position) - kd velocity.
+
+    Attributes:
+        kp: N m / rad, from SMALLEST to LARGEST.
+        kd: N m s / rad, from 0 to LARGEST.
+
+    Raises:
+        InputError: a gain is out of its range.
+
+    """
+
+    kp: float
+    kd: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not SMALLEST <= self.kp <= LARGEST:
+            raise InputError(f'kp {self.kp:g} is not from {SMALLEST:g} to {LARGEST:g} N m/rad')
+        if not 0.0 <= self.kd <= LARGEST:
+            raise InputError(f'kd {self.kd:g} is not from 0 to {LARGEST:g} N m s/rad')
+
+    @property
+    def needs(self) -> str:
+        """What joint states must have besides positions."""
+        return 'velocity and effort' if self.kd else 'effort'
+
+    def command(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray
+                ) -> np.ndarray:
+        """Return the angles that joints were driven to, rad.
+
+        Args:
+            position: rad.
+            velocity: rad/s, of the same shape; not looked at where kd is 0.
+            effort: N m, of the same shape.
+
+        """
+        if self.kd:
+            effort = effort + self.kd * velocity
+        return position + effort / self.kp
+
+
+#: Messages of a topic that are decoded together, and from how many bytes on; a few MB.
+BATCH, BATCH_BYTES = 4096, 16_000_000
+#: Stamps later than this (ns) are of a clock that shows the date, where 0 means not stamped.
+DATED = 10**17
+
+
+class Stream:
+    """What a topic delivered.
+
+    Args:
+        topic: its name.
+        joints: that are wanted; all of them, if empty.
+        servo: of the joints, if their commands are wanted instead of what they did.
+        source: what to put before the topic's name in messages.
+
+    """
+
+    def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None,
+                 source: str = '') -> None:
+        self.topic, self.servo, self.source = topic, servo, source
+        self.wanted = set(joints)
+        self.taken: set[str] = set()
+        #: What is not decoded yet, and the times of receipt in ns.
+        self.messages: list[bytes] = []
+        self.received: list[int] = []
+        self._bytes = 0
+        #: Header stamps and receive times in ns, names, positions.
+        self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
+        self._size = 0
+        #: Of a long topic: joints -> samples on a grid, and by how many seconds the other clock is
+        #: ahead more than it was at first.
+        self._thinned: dict[tuple[str, ...], Thinned] = {}
+        self._by_headers, self._ahead = True, 0
+        self.joints: dict[str, None] = {}
+        self.count = self.mute = self.odd = self.slack = self.unstamped = 0
+        #: Joints with a position, but not what the servo needs besides; and those whose effort
+        #: was ever a number but 0.
+        self.lacking: dict[str, None] = {}
+        self.pulled: set[str] = set()
+        self.dated = False
+
+    @property
+    def stamped_so_far(self) -> bool:
+        """Whether most messages at hand have a header stamp."""
+        stamped = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
+        return stamped > 0.5 * self._size
+
+    @property
+    def stamped(self) -> bool:
+        """Whether any message has a header stamp."""
+        return self.unstamped < self.count - self.mute - self.odd - self.slack
+
+    def add(self, received: int, message: bytes) -> None:
+        """Take a serialised message, received at a time in ns; errors as of decode."""
+        self.received.append(received)
+        self.messages.append(message)
+        self._bytes += len(message)
+        if len(self.messages) == BATCH or self._bytes > BATCH_BYTES:
+            self.decode()
+
+    def decode(self) -> None:
+        """Decode the messages at hand.
+
+        Raises:
+            RecordingError: a message that is no JointState.
+
+        """
+        received = np.array(self.received, np.int64)
+        try:
+            for block in in_order(decode(self.messages, self.servo is not None)):
+                self._keep(block, received[block.rows])
+        except UndecodableError as error:
+            raise RecordingError(
+                f'{self.source}{self.topic}: message {self.count + error.index + 1} is not '
+                f'a {JOINT_STATE}: {line(error)}') from error
+        self.count += len(self.messages)
+        self.messages, self.received, self._bytes = [], [], 0
+
+    def _keep(self, block: SerializedBlock, received: np.ndarray) -> None:
+        stamps, names, positions = block.stamps, block.names, block.positions
+        if not positions.shape[1]:
+            self.mute += len(stamps)
+        elif positions.shape[1] != len(names):
+            self.odd += len(stamps)
+        elif self.servo and not (positions.shape == block.efforts.shape and (
+                not self.servo.kd or positions.shape == block.velocities.shape)):
+            self.slack += len(stamps)
+            self.lacking.update(dict.fromkeys(names))
+        else:
+            if self.servo:
+                pulling = (np.isfinite(block.efforts) & (block.efforts != 0.0)).any(axis=0)
+                self.pulled.update(compress(names, pulling))
+                positions = self.servo.command(positions, block.velocities, block.efforts)
+            self.joints.update(dict.fromkeys(names))
+            self.unstamped += int((stamps == 0).sum())
+            self.dated = self.dated or bool((stamps > DATED).any())
+            if self.wanted:
+                names, positions = _of_joints(self.wanted, names, positions)
+            self.parts.append((stamps, received, names, positions))
+            self._size += len(stamps)
+            if self._size >= LONG:
+                self._thin()
+
+    def _thin(self) -> None:
+        """Downsample the samples at hand, with both clocks side by side."""
+        if not self._thinned:
+            self._by_headers = self.stamped_so_far
+        for stamps, received, names, positions in self.parts:
+            if self._by_headers and self.dated and not stamps.all():
+                there = stamps != 0
+                stamps, received, positions = stamps[there], received[there], positions[there]
+            if not len(stamps):
+                continue
+            own, other = (stamps, received) if self._by_headers else (received, stamps)
+            self._ahead = self._ahead or int(other[0] - own[0])
+            self._thinned.setdefault(names, Thinned()).add(
+                own, np.column_stack([positions, 1e-9 * (other - own - self._ahead)]))
+        self.parts, self._size = [], LONG
+
+    def notes(self, headers: bool) -> list[str]:
+        """List what is left out, one line each."""
+        counts = ((self.mute, 'without positions'),
+                  (self.odd, 'with more or fewer positions than names'),
+                  (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
+                  (self.unstamped if headers and self.dated else 0, 'without a stamp'))
+        return [*(f'{self.topic}: {count} of {self.count} messages {what}, left out'
+                  for count, what in counts if count),
+                *(f'{self.topic}: {samples.note}' for samples in self._thinned.values()
+                  if samples.note)]
+
+    def chunks(self, headers: bool) -> Iterator[Chunk]:
+        """Yield the samples, and forget them."""
+        for names, samples in self._thinned.items():
+            own, values = samples.taken()
+            other = own + self._ahead + np.rint(1e9 * values[:, -1]).astype(np.int64)
+            pair = (own, other) if self._by_headers else (other, own)
+            self.parts.append((*pair, names, values[:, :-1]))
+        self._thinned = {}
+        self.parts.reverse()
+        while self.parts:
+            stamps, received, names, positions = self.parts.pop()
+            if headers and self.dated and not stamps.all():
+                there = stamps != 0
+                stamps, positions = stamps[there], positions[there]
+            names, positions = _of_joints(self.taken, names, positions)
+            yield stamps if headers else received, names, positions
+
+
+def _of_joints(wanted: set[str], names: tuple[str, ...], positions: np.ndarray
+               ) -> tuple[tuple[str, ...], np.ndarray]:
+    """Keep the names and positions of the joints wanted, copied only where others are there."""
+    if wanted.issuperset(names):
+        return names, positions
+    columns = [k for k, name in enumerate(names) if name in wanted]
+    return tuple(names[k] for k in columns), positions[:, columns]
+
+
+def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
+    """Choose one topic for every joint that is on several; return a note for each."""
+    order = sorted(streams, key=lambda one: (
+        -len(one.joints), one.topic.rsplit('/')[-1] != 'joint_states', -one.count))
+    owner = {name: stream for stream in reversed(order) for name in stream.joints}
+    notes = []
+    for stream in streams:
+        stream.taken = {name for name in wanted if owner[name] is stream}
+        for other in streams:
+            common = [name for name in wanted
+                      if name in stream.joints and owner[name] is other is not stream]
+            if common:
+                notes.append(f'{stream.topic}: {joint_list(common)} taken from {other.topic}')
+    return notes
+
+
+def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
+    """Reject joints whose servo cannot be inverted."""
+    if joints:
+        raise RecordingError(f'{where}: no {what} of {joint_list(joints)}, and kp needs it; '
+                             'name the '
+                             'joints to take to do without')
+
+
+def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
+             notes: Sequence[str] = (), some: bool = False) -> Recording:
+    """Make one recording of what topics delivered.
+
+    A joint on several topics is taken from one: from the topic with the most joints, and among
+    these the one called joint_states, the one with the most messages, the first. Samples are at
+    their header stamps; where all of a topic's are 0, all samples are at their receive times.
+
+    Args:
+        streams: decoded topics; their samples are forgotten.
+        joints: which to take, in this order; all of them, if empty.
+        source: what to put before the topics' names in messages.
+        notes: to begin with.
+        some: joints that are not there are passed over, unless none is.
+
+    Raises:
+        RecordingError: see `merged`; no message with positions, or, where the joints' servo is
+            known, a joint without efforts, or with none but 0.
+
+    """
+    there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
+    whole = f'{source}{", ".join(stream.topic for stream in streams)}'
+    for stream in streams:
+        idle = [name for name in stream.lacking if name not in there
+                and (not joints or name in joints)]
+        if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', stream.servo.needs, idle)
+    if not there:
+        raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
+    found = [name for name in joints if name in there]
+    joints = found if some and found else joints
+    require(joints, there, whole)
+    notes = [*notes, *_once_each(list(streams), joints or there)]
+    read = [stream for stream in streams if stream.taken]
+    whole = f'{source}{", ".join(stream.topic for stream in read)}'
+    headers = all(stream.stamped for stream in read)
+    if not headers:
+        unset = [stream.topic for stream in read if not stream.stamped]
+        notes.append(f'no header stamps on {abbreviate(unset)}: the times are those of receipt')
+    elif len({stream.dated for stream in read}) > 1:
+        headers = False
+        other = [stream.topic for stream in read if not stream.dated]
+        notes.append(f'{abbreviate(other)}: the stamps come from a different clock than on the '
+                     "other topics, such as a simulation's: the times are those of receipt")
+    for stream in read:
+        if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
+                            sorted(stream.taken - stream.pulled))
+            notes.append(f'{stream.topic}: commands of the joints, computed with kp '
+                         f'{stream.servo.kp:g} and kd {stream.servo.kd:g}')
+        notes += stream.notes(headers)
+    chunks = (chunk for stream in read for chunk in stream.chunks(headers))
+    recording = merged(chunks, whole, joints)
+    return replace(recording, notes=(*notes, *recording.notes))
+
+
+# Joint states as they arrive, kept as bytes until a recording is requested.
+
+class LiveRecording:
+    """The last messages of some topics.
+
+    Args:
+        topics: their names.
+        window: how long messages are kept, s; 0 for ever.
+
+    """
+
+    def __init__(self, topics: Sequence[str], window: float) -> None:
+        self.window = window
+        self._kept: dict[str, deque[tuple[int, bytes]]] = {topic: deque() for topic in topics}
+
+    def add(self, topic: str, received: int, message: bytes) -> None:
+        """Keep a serialised JointState that came in at a time in ns; forget those too old."""
+        kept = self._kept[topic]
+        kept.append((received, message))
+        if self.window > 0.0:
+            oldest = received - int(self.window * 1e9)
+            while kept[0][0] < oldest:
+                kept.popleft()
+
+    def copy(self) -> 'LiveRecording':
+        """Return the same messages, to be decoded while more come in."""
+        other = LiveRecording(tuple(self._kept), self.window)
+        for topic, kept in self._kept.items():
+            other._kept[topic].extend(kept)
+        return other
+
+    def recording(self, joints: Sequence[str] = (), some: bool = False,
+                  servo: Servo | None = None) -> Recording:
+        """Decode what is kept.
+
+        Args:
+            joints: which to take; all of them, if empty.
+            some: joints that are not there are passed over, unless none is.
+            servo: of the joints, if the angles that they were driven to are wanted.
+
+        Raises:
+            RecordingError: nothing, or nothing that can be used, came in.
+
+        """
+        if not any(self._kept.values()):
+            raise RecordingError(f'{", ".join(self._kept)}: no joint states came in')
+        streams = []
+        for topic, kept in self._kept.items():
+            stream = Stream(topic, joints, servo)
+            for received, message in kept:
+                stream.add(received, message)
+            stream.decode()
+            streams.append(stream)
+        return recorded(streams, joints, '', some=some)

@@ -1,0 +1,345 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Markers on a body over time, and the recording of the joint angles between them.
+
+A marker that was not seen, or hardly, makes the angles that need it missing; nothing is filled
+in. Angles are between a body's own segments: they do not depend on where the camera or the
+laboratory's axes stand.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+import math
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.command_line import printable
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.common.files import resource_folder
+from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.fitting.recordings.recording import (
+    abbreviate,
+    merged,
+    Option,
+    Recording,
+    RecordingError,
+)
+from cpg_ros.fitting.recordings.tables import matching
+from cpg_ros.fitting.recordings.thinned import counted
+import numpy as np
+
+# Files of segments: which markers span which part of a body, and which parts a joint connects.
+
+#: What every reader of markers takes.
+SEGMENTS = Option('segments', 'for markers: a file that says which of them span which segment '
+                  'and which joints are between, or the name of a shipped one', 'FILE')
+#: Likelihood below which a marker counts as not seen, if the file does not say: as DeepLabCut's.
+LIKELY = 0.6
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A line through a body, from one end to the other; each end is the mean of its markers."""
+
+    begin: tuple[str, ...]
+    end: tuple[str, ...]
+
+    @property
+    def markers(self) -> tuple[str, ...]:
+        """Those of both ends."""
+        return self.begin + self.end
+
+
+@dataclass(frozen=True)
+class JointAngle:
+    """The angle by which a segment is turned from another.
+
+    Attributes:
+        first: name of the segment it is turned from, such as the thigh.
+        second: name of the segment that is turned, such as the shank.
+        axis: name of the segment about which it turns, by the right hand, in three dimensions;
+            '' for the angle between the two, which has no sign.
+        neutral: angle that counts as 0, rad.
+
+    """
+
+    first: str
+    second: str
+    axis: str = ''
+    neutral: float = 0.0
+
+
+@dataclass(frozen=True)
+class Segments:
+    """Segments, the joints between them, and the likelihood below which a marker is not seen."""
+
+    segments: Mapping[str, Segment]
+    joints: Mapping[str, JointAngle]
+    likely: float = LIKELY
+
+    def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
+        """Return the markers that a joint's angle is made of, each once.
+
+        Args:
+            joint: its name.
+            solid: in three dimensions, where its axis' markers count, too.
+
+        """
+        one = self.joints[joint]
+        return tuple(dict.fromkeys(
+            marker for name in (one.first, one.second, *[one.axis] * bool(one.axis and solid))
+            for marker in self.segments[name].markers))
+
+
+class _Reader(YamlReader):
+    """Reads the ends of segments, too."""
+
+    def ends(self, value: Any, where: str) -> Segment:
+        listed = self.items(value, where)
+        if len(listed) != 2:
+            raise self.fail(where, f'has two ends, not {len(listed)}')
+        ends = [tuple(self.text(one, f'{where}[{k}]') for one in (
+            self.items(end, f'{where}[{k}]') if isinstance(end, list) else [end]))
+            for k, end in enumerate(listed)]
+        if ends[0] == ends[1]:
+            raise self.fail(where, 'begins and ends at the same marker')
+        return Segment(*ends)
+
+    def joint(self, value: Any, where: str, segments: Mapping[str, Segment]) -> JointAngle:
+        tree = self.keys(value, where, {'between'}, {'axis', 'neutral'})
+        between = self.items(tree['between'], f'{where}.between')
+        if len(between) != 2 or between[0] == between[1]:
+            raise self.fail(f'{where}.between', 'must be two segments')
+        first, second = (self.text(one, f'{where}.between') for one in between)
+        axis = self.text(tree['axis'], f'{where}.axis') if 'axis' in tree else ''
+        for name in (first, second, *[axis] * bool(axis)):
+            if name not in segments:
+                raise self.fail(where, f'there is no segment {name!r}, only '
+                                f'{abbreviate(list(segments), 20)}')
+        neutral = self.number(tree.get('neutral', 0.0), f'{where}.neutral')
+        if abs(neutral) > math.pi:
+            raise self.fail(f'{where}.neutral', f'{neutral:g} rad is more than half a turn')
+        return JointAngle(first, second, axis, neutral)
+
+
+def shipped() -> list[str]:
+    """Return the names of the shipped files."""
+    return sorted(file.stem for file in (resource_folder() / 'config' / 'segments').glob('*.yaml'))
+
+
+def load_segments(name: str | Path) -> Segments:
+    """Read a file of segments.
+
+    ::
+
+        least_likelihood: 0.6       # optional
+        segments:
+          thigh: [hip, knee]        # from, to
+          shank: [knee, [ankle_inner, ankle_outer]]
+          leftward: [pelvis_right, pelvis_left]
+        joints:
+          knee: {between: [thigh, shank], axis: leftward, neutral: 0.0}
+
+    In three dimensions, a joint with an axis is the angle that its two segments have as seen along
+    the axis, positive by the right hand; one without is the angle between them, which is never
+    negative. In a picture, angles are positive counter-clockwise, and an axis is ignored. The
+    angle that counts as 0 is `neutral` (rad); others lie within half a turn of it.
+
+    Args:
+        name: path of the file, or the name of a shipped one.
+
+    Raises:
+        RecordingError: the file is not there or wrong; the message names the place.
+
+    """
+    path = Path(name)
+    if not path.exists() and str(name) in shipped():
+        path = resource_folder() / 'config' / 'segments' / f'{name}.yaml'
+    reader = _Reader(path, 'segments', RecordingError, 1e6)
+    if not path.exists():
+        raise RecordingError(f'{path}: there is no such file of segments; shipped are '
+                             f'{abbreviate(shipped())}')
+    tree = reader.keys(reader.tree(), 'file', {'segments', 'joints'}, {'least_likelihood'})
+    for key in ('segments', 'joints'):
+        if not isinstance(tree[key], Mapping) or not tree[key]:
+            raise reader.fail(key, 'must be a mapping with at least one entry')
+    segments = {key: reader.ends(value, f'segments.{key}')
+                for key, value in tree['segments'].items()}
+    joints = {key: reader.joint(value, f'joints.{key}', segments)
+              for key, value in tree['joints'].items()}
+    likely = reader.number(tree.get('least_likelihood', LIKELY), 'least_likelihood')
+    if not 0.0 <= likely <= 1.0:
+        raise reader.fail('least_likelihood', f'{likely:g} is not from 0 to 1')
+    return Segments(segments, joints, likely)
+
+
+#: A segment that, as seen along the axis, has less than this share of its length has no direction.
+SHORTEST = 1e-3
+#: A coordinate beyond this is no place of a marker, whatever the unit.
+FARTHEST = 1e9
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Markers(ShortRepr):
+    """Places of markers.
+
+    Attributes:
+        names: of the markers.
+        stamps: ns, int64, shape (n,).
+        points: shape (n, markers, 2 or 3), in any unit, nan where not seen; of a picture x to the
+            right and y up.
+        source: the file.
+        likelihoods: that a marker is where it is said to be, 0 to 1, shape (n, markers), nan if
+            that is not known; None where all are certain.
+        notes: what was repaired or left out, one line each.
+
+    Raises:
+        RecordingError: a name that is there twice.
+
+    """
+
+    names: tuple[str, ...]
+    stamps: np.ndarray
+    points: np.ndarray
+    source: Path
+    likelihoods: np.ndarray | None = None
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        again = [name for k, name in enumerate(self.names) if name in self.names[:k]]
+        if again:
+            raise RecordingError(f'{self.source}: two markers are called {again[0]!r}')
+
+    def _summary(self) -> str:
+        return (f'{self.source}: {len(self.names)} markers in {self.points.shape[-1]} '
+                f'dimensions, {counted(len(self.stamps), "sample")}')
+
+
+def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None) -> np.ndarray:
+    """Return the angle by which a direction is turned from another.
+
+    Args:
+        first: direction, of any length, shape (n, 2 or 3).
+        second: of the same shape.
+        axis: in three dimensions, the direction about which it turns, shape (n, 3); None for the
+            angle between the two.
+
+    Returns:
+        rad, shape (n,): from -pi to pi, positive counter-clockwise or, about the axis, by the
+        right hand; without an axis in three dimensions from 0 to pi. nan where a direction is
+        missing, or has none as seen along the axis.
+
+    """
+    with np.errstate(all='ignore'):
+        first, second = (one / np.linalg.norm(one, axis=1, keepdims=True)
+                         for one in (first, second))
+        if first.shape[1] == 2:
+            cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+        elif axis is None:
+            cross = np.linalg.norm(np.cross(first, second), axis=1)
+        else:
+            axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+            first, second = (one - np.sum(one * axis, axis=1, keepdims=True) * axis
+                             for one in (first, second))
+            cross = np.sum(axis * np.cross(first, second), axis=1)
+        angle = np.arctan2(cross, np.sum(first * second, axis=1))
+        short = [~(np.linalg.norm(one, axis=1) >= SHORTEST) for one in (first, second)]
+    return np.where(short[0] | short[1], np.nan, angle)
+
+
+def joint_recording(markers: Markers, segments: str | Path | Segments | None,
+                    joints: Sequence[str] = ()) -> Recording:
+    """Return the joint angles between markers.
+
+    Joints whose markers are not in the file, or never seen together, are left out with a note,
+    unless they are asked for.
+
+    Args:
+        markers: over time.
+        segments: which markers span what; the path of a file, or the name of a shipped one.
+        joints: names or patterns, in this order; all joints, if empty.
+
+    Raises:
+        RecordingError: see `merged` and `load_segments`; no segments, or no joint has an angle.
+
+    """
+    source = markers.source
+    if segments is None:
+        raise RecordingError(f'{source}: it has markers, no joint angles: give a file of segments '
+                             f'(segments), or a shipped one: {abbreviate(shipped())}')
+    if not isinstance(segments, Segments):
+        segments = load_segments(segments)
+    notes = list(markers.notes)
+    wanted = matching(joints, list(segments.joints), f'{source}, segments')
+    solid = markers.points.shape[2] == 3
+    needs = {name: segments.markers(name, solid) for name in wanted}
+    found = [name for name in wanted if set(needs[name]) <= set(markers.names)]
+    lost = [name for name in wanted if name not in found]
+    missing = sorted({marker for name in lost for marker in needs[name]} - set(markers.names))
+    if lost and (joints or not found):
+        raise RecordingError(f'{source}: no marker {abbreviate(missing)}, which '
+                             f'{abbreviate(lost)} need{"s" * (len(lost) == 1)}; there are '
+                             f'{abbreviate(markers.names, 40)}')
+    if lost:
+        notes.append(f'without the markers {abbreviate(missing)}, left out: {abbreviate(lost)}')
+    used = list(dict.fromkeys(marker for name in found for marker in needs[name]))
+    points = _seen(markers, segments.likely, used, notes)
+    angles = {name: _angle(name, segments, markers, points) for name in found}
+    silent = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
+    if silent and (joints or len(silent) == len(angles)):
+        raise RecordingError(f'{source}: no angle of {abbreviate(silent)}: its markers are never '
+                             'seen '
+                             'together')
+    if silent:
+        notes.append(f'never seen, left out: {abbreviate(silent)}')
+    table = {name: angle for name, angle in angles.items() if name not in silent}
+    recording = merged([(markers.stamps, list(table), np.column_stack(list(table.values())))],
+                       printable(str(source)))
+    return replace(recording, notes=(*map(printable, notes), *recording.notes))
+
+
+def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:
+    """Return the points, nan where they are not seen or hardly."""
+    points = markers.points.astype(float)
+    points[~(np.abs(points) <= FARTHEST).all(axis=2)] = np.nan
+    if markers.likelihoods is None:
+        return points
+    unlikely = ~(markers.likelihoods >= likely)
+    columns = [markers.names.index(name) for name in used]
+    there = np.isfinite(points[:, columns]).all(axis=2)
+    if count := int((unlikely[:, columns] & there).sum()):
+        notes.append(f'{count / max(1, int(there.sum())):.0%} of the places of {len(columns)} '
+                     f'markers have a likelihood below {likely:g}: not used')
+    points[unlikely] = np.nan
+    return points
+
+
+def _angle(name: str, segments: Segments, markers: Markers, points: np.ndarray) -> np.ndarray:
+    """Return a joint's angle in rad, shape (n,)."""
+    joint = segments.joints[name]
+
+    def direction(segment: str) -> np.ndarray:
+        ends = segments.segments[segment]
+        begin, end = (points[:, [markers.names.index(one) for one in names]].mean(axis=1)
+                      for names in (ends.begin, ends.end))
+        return end - begin
+
+    flat = points.shape[2] == 2
+    axis = direction(joint.axis) if joint.axis and not flat else None
+    angle = turned(direction(joint.first), direction(joint.second), axis)
+    angle = angle - joint.neutral
+    if flat or axis is not None:
+        angle = (angle + np.pi) % (2.0 * np.pi) - np.pi
+    return angle

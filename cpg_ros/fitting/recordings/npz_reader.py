@@ -1,0 +1,204 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joint angles or markers out of numpy's archives (.npz) of arrays with names."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
+import os
+from pathlib import Path
+import zipfile
+
+from cpg_ros.common import files
+from cpg_ros.common.command_line import printable
+from cpg_ros.fitting.recordings.recording import (
+    abbreviate,
+    JOINTS,
+    LATEST,
+    merged,
+    Recording,
+    RecordingError,
+    RecordingFormat,
+    require,
+    UNIT,
+)
+from cpg_ros.fitting.recordings.tables import FPS, matching, stamps_of_frames, UnpackedSize
+from cpg_ros.fitting.recordings.thinned import counted
+import numpy as np
+
+#: What arrays may be called.
+TIMES = ('time', 'times', 't', 'timestamps')
+RATES = ('fps', 'rate', 'frequency', 'sampling_rate')
+NAMES = ('joints', 'joint_names', 'names')
+ANGLES = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
+UNITS = ('unit', 'units')
+#: Largest archive, bytes.
+LARGEST = 1_000_000_000
+
+
+def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None = None,
+             joints: Sequence[str] = (), progress: bool = True) -> Recording:
+    """Read joint angles from an archive of arrays.
+
+    Either one array per joint, called like it, shape (n,); or `positions`, shape (n, joints),
+    and their names in `joints`. Besides, `time` (s), shape (n,), or `fps` (Hz), a number; and
+    `unit`, 'rad' or 'deg'. Arrays of objects are not read: they may run code.
+
+    Args:
+        path: the file.
+        unit: 'rad' or 'deg', where the archive does not say.
+        fps: samples a second, where the archive has neither times nor a rate.
+        joints: the joints to take, in this order, or patterns such as 'left*'; all of them, if
+            empty.
+        progress: not used.
+
+    Raises:
+        RecordingError: see `merged`; an archive that is damaged or has no such arrays.
+
+    """
+    path = Path(path)
+    notes: list[str] = []
+    arrays = _arrays(path, notes)
+    names, angles = _angles(arrays, path, notes)
+    angles = angles * _scale(arrays, unit, path, notes)
+    stamps = _stamps(arrays, fps, len(angles), path)
+    found = merged([(stamps, names, angles)], printable(str(path)),
+                   matching(joints, names, str(path)))
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
+    """Read all arrays of numbers and texts."""
+    with files.opened(path, RecordingError, largest=LARGEST) as file:
+        try:
+            with zipfile.ZipFile(file) as packed:
+                members = [one.filename for one in packed.infolist()]
+                names = [name for name in members if name.endswith('.npy')]
+                unpacked = UnpackedSize(os.fstat(file.fileno()).st_size)
+                for name in names:
+                    unpacked.add(_needed(packed, name))
+            if others := [name for name in members if name not in names]:
+                notes.append(f'{counted(len(others), "member")} that are no arrays left out: '
+                             f'{abbreviate(others)}')
+            file.seek(0)
+            with np.load(file, allow_pickle=False) as archive:
+                return {name.removesuffix('.npy'): archive[name] for name in names}
+        except RecordingError as error:
+            raise RecordingError(f'{path}: {error}') from error
+        # Neither zipfile nor numpy lists what damaged archives make them raise.
+        except Exception as error:
+            why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+            raise RecordingError(f"{path}: no archive of numpy's arrays: {why[:200]}") from error
+
+
+def _needed(packed: zipfile.ZipFile, name: str) -> int:
+    """Return the bytes that an array takes as float64, from its header."""
+    with packed.open(name) as member:
+        version = np.lib.format.read_magic(member)
+        read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
+                else np.lib.format.read_array_header_2_0)
+        shape, _, kind = read(member)
+    # Whole numbers of Python: a product of sizes may be beyond those of numpy.
+    return max(packed.getinfo(name).file_size, math.prod(shape) * max(8, kind.itemsize))
+
+
+def _named(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:
+    """Return which of the names an array has, or ''."""
+    return next((name for name in arrays if name.lower() in names), '')
+
+
+def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
+            ) -> tuple[list[str], np.ndarray]:
+    """Return the joints' names and their angles."""
+    table, listed = _named(arrays, ANGLES), _named(arrays, NAMES)
+    if table and arrays[table].ndim == 2:
+        if not listed:
+            raise RecordingError(f"{path}: the columns of {table!r} have no names: an array "
+                                 "'joints' has to list them")
+        names = [str(one) for one in np.ravel(arrays[listed])]
+        if arrays[listed].dtype.kind != 'U' or len(names) != arrays[table].shape[1]:
+            raise RecordingError(f'{path}: {listed!r} are {arrays[listed].size} of type '
+                                 f'{arrays[listed].dtype}, where {table!r} has '
+                                 f'{arrays[table].shape[1]} columns to name')
+        used, angles = [table, listed], arrays[table]
+    else:
+        other = {*TIMES, *RATES, *UNITS, *NAMES}
+        size = arrays[time].size if (time := _named(arrays, TIMES)) else None
+        names = [name for name, array in arrays.items() if name.lower() not in other
+                 and array.ndim == 1 and array.dtype.kind in 'fiu' and array.size > 1
+                 and size in (None, array.size)]
+        if not names:
+            raise RecordingError(
+                f"{path}: neither 'positions' with 'joints' nor an array per joint, as long as "
+                f'the times; there are {abbreviate(_described(arrays), 20)}')
+        if len({arrays[name].size for name in names}) > 1:
+            raise RecordingError(f'{path}: arrays of different lengths, '
+                                 f'{abbreviate(_described({one: arrays[one] for one in names}))}')
+        used, angles = names, np.column_stack([arrays[name] for name in names])
+    if angles.dtype.kind not in 'fiu':
+        raise RecordingError(f'{path}: {used[0]!r} is of type {angles.dtype}, not of numbers')
+    require(names, names, str(path))
+    known = {one for one in arrays if one.lower() in (*TIMES, *RATES, *UNITS)}
+    left = [name for name in arrays if name not in used and name not in known]
+    if left:
+        notes.append(f'{counted(len(left), "array")} left out: {abbreviate(left)}')
+    return names, angles.astype(float)
+
+
+def _described(arrays: Mapping[str, np.ndarray]) -> list[str]:
+    return [f'{name} {array.shape}' for name, array in arrays.items()]
+
+
+def _scale(arrays: Mapping[str, np.ndarray], option: str | None, path: Path, notes: list[str]
+           ) -> float:
+    """Return the size of the unit in rad."""
+    name = _named(arrays, UNITS)
+    stated = str(arrays[name]) if name and arrays[name].ndim == 0 else None
+    known = {'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degrees': 'deg', '°': 'deg'}
+    for value in (stated, option):
+        if value is not None and value not in known:
+            raise RecordingError(f'{path}: unit {value[:40]!r} is none of '
+                                 f'{abbreviate(list(known))}')
+    if stated and option and known[stated] != known[option]:
+        raise RecordingError(f'{path}: its angles are in {stated}, not {option}')
+    if not stated and not option:
+        notes.append("no array 'unit': the angles are taken to be in rad")
+    return np.pi / 180.0 if known[stated or option or 'rad'] == 'deg' else 1.0
+
+
+def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: int, path: Path
+            ) -> np.ndarray:
+    """Return stamps in ns, shape (count,)."""
+    if name := _named(arrays, TIMES):
+        times = arrays[name]
+        if times.shape != (count,) or times.dtype.kind not in 'fiu':
+            raise RecordingError(f'{path}: {name!r} of shape {times.shape} and type '
+                                 f'{times.dtype}, where there are {count} samples')
+        seconds = times.astype(float)
+        if not (np.abs(seconds) < LATEST).all():
+            raise RecordingError(f'{path}: {name!r} has values that are no times in s, such as '
+                                 f'{seconds[~(np.abs(seconds) < LATEST)][0]:g}')
+        return np.rint(seconds * 1e9).astype(np.int64)
+    if name := _named(arrays, RATES):
+        if arrays[name].size != 1 or arrays[name].dtype.kind not in 'fiu':
+            raise RecordingError(f'{path}: {name!r} is not one number')
+        fps = float(arrays[name].item())
+    return stamps_of_frames(np.arange(count), fps, path)
+
+
+NPZ = RecordingFormat(
+    name='npz', contents="an archive of numpy's arrays", help='arrays of angles with names',
+    metavar='FILE', read=read_npz, endings=('.npz',), options=(JOINTS, UNIT, FPS),
+    lacks={'time': "an archive's times are in s"})

@@ -1,0 +1,403 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joint angles over time, from whatever source, and what had to be repaired in them.
+
+Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.fitting.recordings.thinned import (
+    counted,
+    drop_outlier_positions,
+    drop_outlier_stamps,
+    Part,
+    Thinned,
+)
+import numpy as np
+
+# Loads on the feet, beside the joint states of a recording.
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FootLoads(ShortRepr):
+    """Loads on the feet over time.
+
+    Attributes:
+        legs: their names, or those of columns that name them, such as FR_force.
+        times: s from the recording's start, rising, shape (n,).
+        loads: in the robot's unit, such as N, or 1 for contact; shape (n, legs).
+
+    """
+
+    legs: tuple[str, ...]
+    times: np.ndarray
+    loads: np.ndarray
+
+    def _summary(self) -> str:
+        return f'{len(self.times)} loads on {", ".join(self.legs)}'
+
+
+#: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
+Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
+
+#: An interval longer than so many usual ones is a dropout, and one that is off by such a share
+#: of the usual one is jitter.
+DROPOUT, JITTER = 1.5, 0.1
+#: Stamps lie within +- this (s): what ROS can stamp, and what keeps differences in int64.
+LATEST = 2**32
+
+
+class RecordingError(CpgError):
+    """A recording cannot be used; the message is one line with the file, topic and place."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(ShortRepr):
+    """Joint angles over time.
+
+    Attributes:
+        joints: their names.
+        times: s, shape (n,), strictly rising, the first is 0.
+        positions: rad, shape (n, joints); nan where a joint has no sample.
+        source: what to call it in messages, such as 'walk_bag, /joint_states'.
+        start: stamp at times = 0, s.
+        notes: what was repaired or left out, one line each.
+        loads: on the feet, where they were recorded, too.
+
+    Raises:
+        RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
+            do not belong together.
+
+    """
+
+    joints: tuple[str, ...]
+    times: np.ndarray
+    positions: np.ndarray
+    source: str
+    start: float = 0.0
+    notes: tuple[str, ...] = ()
+    loads: FootLoads | None = None
+
+    def _summary(self) -> str:
+        return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '
+                f'in {self.times[-1]:.6g} s')
+
+    def __post_init__(self) -> None:
+        if self.positions.shape != (len(self.times), len(self.joints)):
+            raise RecordingError(
+                f'{self.source}: positions of shape {self.positions.shape} for '
+                f'{len(self.times)} times and {len(self.joints)} joints')
+        if len(self.times) < 2:
+            raise RecordingError(f'{self.source}: {counted(len(self.times), "sample")}; '
+                                 'a movement needs at least two')
+        if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
+            raise RecordingError(f'{self.source}: times do not rise strictly from 0')
+
+    def select(self, names: Sequence[str]) -> 'Recording':
+        """Return the recording of these joints, in this order.
+
+        Raises:
+            RecordingError: a joint is not there; the message names those that are.
+
+        """
+        require(names, self.joints, self.source)
+        columns = [self.joints.index(name) for name in names]
+        return replace(self, joints=tuple(names), positions=self.positions[:, columns])
+
+    def between(self, begin: float, end: float) -> 'Recording':
+        """Return what was recorded from one time to another, s; its times begin at 0 again.
+
+        Raises:
+            RecordingError: fewer than two samples are there.
+
+        """
+        within = (self.times >= begin) & (self.times <= end)
+        times = self.times[within]
+        first = float(times[0]) if times.size else 0.0
+        loads = self.loads
+        if loads is not None:
+            held = (loads.times >= begin) & (loads.times <= end)
+            loads = replace(loads, times=loads.times[held] - first, loads=loads.loads[held])
+        return replace(self, times=times - first, positions=self.positions[within],
+                       start=self.start + first, loads=loads)
+
+
+def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
+    """Check that joints are there, and that none is named twice.
+
+    Raises:
+        RecordingError: one is missing or named twice.
+
+    """
+    unknown = [name for name in names if name not in there]
+    if unknown:
+        raise RecordingError(f'{source}: no {joint_list(unknown)}; there are '
+                             f'{abbreviate(there, 40)}')
+    again = [name for k, name in enumerate(names) if name in names[:k]]
+    if again:
+        raise RecordingError(f'{source}: {joint_list(again[:1])} is named twice')
+
+
+def abbreviate(names: Sequence[str], most: int = 6) -> str:
+    """Return names in quotes, the first ones where they are many."""
+    shown = ', '.join(repr(name) for name in names[:most])
+    return shown + (f' and {len(names) - most} more' if len(names) > most else '')
+
+
+def joint_list(joints: Sequence[str]) -> str:
+    """Return 'joint' and its name, or 'joints' and their names."""
+    return f'joint{"" if len(joints) == 1 else "s"} {abbreviate(joints)}'
+
+
+def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
+    """Join samples, each of all joints or of some, into one recording.
+
+    Samples of different joints with the same stamp become one; a joint without a sample at a
+    stamp is nan there. Of samples of a joint with the same stamp the first is kept. Values that
+    are not finite count as missing. A long recording is put on a coarser grid (see `thinned`).
+
+    Args:
+        chunks: in the order of arrival, for each set of names; see `Chunk`.
+        source: what to call the recording in messages.
+        joints: which joints to take, in this order; all of them, if empty.
+
+    Raises:
+        RecordingError: no sample, a joint that is not there or has no finite position, or no
+            time passes.
+
+    """
+    groups = _groups(chunks, source)
+    names = list(dict.fromkeys(name for group in groups for name in group))
+    if not names:
+        raise RecordingError(f'{source}: no samples')
+    require(joints, names, source)
+    wanted = tuple(joints) or tuple(names)
+    notes: list[str] = []
+    found = []
+    for group in list(groups):
+        columns = [k for k, name in enumerate(group) if name in wanted]
+        if columns:
+            samples = groups.pop(group)
+            stamps, positions = samples.taken()
+            notes += [samples.note] if samples.note else []
+            found.append((stamps, [wanted.index(group[k]) for k in columns],
+                          positions[:, columns] if len(columns) < len(group) else positions))
+    found, astray = drop_outlier_stamps(found)
+    notes += astray
+    origin = min(int(stamps.min()) for stamps, _, _ in found)
+    ordered = []
+    late = again = received = 0
+    for stamps, columns, positions in found:
+        received += len(stamps)
+        # Duplicates are found in float64, where two stamps can be one a week into a recording.
+        times = (stamps - origin) / 1e9
+        steps = np.diff(times)
+        if (steps < 0.0).any():
+            late += int((times < np.maximum.accumulate(times)).sum())
+            order = np.argsort(times, kind='stable')
+            times, positions = times[order], positions[order]
+            steps = np.diff(times)
+        if (steps == 0.0).any():
+            fresh = np.append(True, steps > 0.0)
+            again += int((~fresh).sum())
+            times, positions = times[fresh], positions[fresh]
+        ordered.append((times, columns, positions))
+    del found
+    far = drop_outlier_positions(ordered, len(wanted))
+    times, positions, odd, twice = _one_table(ordered, len(wanted))
+    del ordered
+    if late:
+        notes.append(f'{counted(late, "sample")} out of order, sorted by stamp')
+    if again + twice:
+        notes.append(f'{counted(again + twice, "duplicate")} of a stamp, the first is kept')
+    odd -= far
+    notes += [f'joint {wanted[k]!r}: {counted(int(odd[k]), "position")} not a finite number'
+              for k in np.flatnonzero(odd)]
+    notes += [f'joint {wanted[k]!r}: {counted(int(far[k]), "position")} far beyond the others, '
+              'left out' for k in np.flatnonzero(far)]
+    there = ~np.isnan(positions)
+    silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
+              if not any_there]
+    if silent:
+        raise RecordingError(f'{source}: no finite position of {joint_list(silent)} in '
+                             f'{counted(received, "sample")}; name the joints to take to do '
+                             'without')
+    heard = there.any(axis=1)
+    if not heard.all():
+        times, positions, there = times[heard], positions[heard], there[heard]
+    if len(times) < 2:
+        raise RecordingError(f'{source}: {counted(received, "sample")}, all at stamp '
+                             f'{origin / 1e9:.9f} s: no time passes')
+    notes += _missing(wanted, there)
+    notes += _intervals(wanted, times, there)
+    return Recording(wanted, times - times[0], positions, source,
+                     origin / 1e9 + float(times[0]), tuple(notes))
+
+
+def _groups(chunks: Iterable[Chunk], source: str
+            ) -> dict[tuple[str, ...], Thinned]:
+    """Sort chunks by the joints they hold."""
+    groups: dict[tuple[str, ...], Thinned] = {}
+    for stamps, names, positions in chunks:
+        stamps, positions = np.asarray(stamps), np.asarray(positions, float)
+        if stamps.ndim != 1 or positions.shape != (len(stamps), len(names)):
+            raise RecordingError(f'{source}: {len(names)} names and positions of shape '
+                                 f'{positions.shape} for stamps of shape {stamps.shape}')
+        if not stamps.size or not len(names):
+            continue
+        if not np.issubdtype(stamps.dtype, np.integer):
+            raise RecordingError(f'{source}: stamps must be whole nanoseconds, not {stamps.dtype}')
+        far = np.abs(stamps.astype(float)) > LATEST * 1e9
+        if far.any():
+            raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')
+        if len(set(names)) < len(names):
+            require(names, names, source)
+        groups.setdefault(tuple(names), Thinned()).add(stamps.astype(np.int64), positions)
+    return groups
+
+
+def _one_table(parts: list[Part], width: int
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return times, positions, the number of odd values by joint, and of what came twice."""
+    odd, twice = np.zeros(width, int), 0
+    for _, columns, positions in parts:
+        strange = ~np.isfinite(positions)
+        if strange.any():
+            odd[columns] += strange.sum(axis=0)
+            positions[strange] = np.nan
+    times, columns, positions = parts[0]
+    if len(parts) == 1 and columns == list(range(width)):
+        return times, positions, odd, twice
+    times = np.unique(np.concatenate([times for times, _, _ in parts]))
+    table = np.full((len(times), width), np.nan)
+    for own, columns, positions in parts:
+        cells = np.searchsorted(times, own)[:, None], np.array(columns)
+        before = table[cells]
+        first = np.isnan(before)
+        twice += int((~first & ~np.isnan(positions)).any(axis=1).sum())
+        table[cells] = np.where(first, positions, before)
+    return times, table, odd, twice
+
+
+def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
+    """Name the joints that have fewer samples than others."""
+    counts = there.sum(axis=0)
+    most = counts.max()
+    return [f'{joint_list([joints[k] for k in np.flatnonzero(counts == count)])}: '
+            f'{counted(int(count), "sample")} where others have {most}'
+            for count in np.unique(counts[counts < most])]
+
+
+def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) -> list[str]:
+    """Report dropouts and jitter of the intervals, for joints sampled together."""
+    together: dict[bytes, list[int]] = {}
+    if there.all():
+        together[b''] = list(range(len(joints)))
+    else:
+        for k in range(len(joints)):
+            together.setdefault(there[:, k].tobytes(), []).append(k)
+    notes = []
+    for columns in together.values():
+        own = times if there.all() else times[there[:, columns[0]]]
+        if len(own) < 3:
+            continue
+        steps = np.diff(own)
+        usual = float(np.median(steps))
+        long = steps > DROPOUT * usual
+        who = '' if len(together) == 1 else f'{joint_list([joints[k] for k in columns])}: '
+        if long.any():
+            lost = int((np.rint(steps[long] / usual) - 1).sum())
+            worst = int(np.argmax(steps))
+            notes.append(f'{who}{counted(int(long.sum()), "dropout")}, about '
+                         f'{counted(lost, "sample")} of {len(own) + lost}, the longest '
+                         f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
+        off = int((np.abs(steps - usual)[~long] > JITTER * usual).sum())
+        if off:
+            notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
+                         f'{JITTER:.0%} of the usual {usual:.4g} s')
+    return notes
+
+
+# The declaration of a format of recordings; each format is one file that ends in one of these.
+
+@dataclass(frozen=True)
+class Option:
+    """An option of readers, which the command line has, too.
+
+    Attributes:
+        name: of the reader's argument; on the command line after two dashes.
+        help: in a phrase.
+        metavar: its value in the help.
+        choices: values it may have; any, if empty.
+        several: whether it takes one or more values, none of them by default.
+
+    """
+
+    name: str
+    help: str  # noqa: A003
+    metavar: str | None = None
+    choices: tuple[str, ...] = ()
+    several: bool = False
+
+
+#: Every format has joints, so that every reader takes this.
+JOINTS = Option('joints', "joints to use (default: the robot's, or all); for files other than "
+                "bags also patterns such as 'JointPos*'", 'NAME', several=True)
+UNIT = Option('unit', 'unit of the angles (default: as the file says, or rad)',
+              choices=('rad', 'deg'))
+
+
+@dataclass(frozen=True)
+class RecordingFormat:
+    """A format of recordings.
+
+    Attributes:
+        name: by which it is chosen; on the command line after two dashes.
+        contents: what such a recording is, with its article, for the head of the help.
+        help: of the option that takes one.
+        metavar: the option's value in the help.
+        read: reads one: its path, then by name ``progress`` (show a bar) and the options below.
+        endings: of the names of its files.
+        options: that its reader takes.
+        features: what else its reader takes: ``servo``, if it has velocities and efforts, and
+            ``some``, to pass over joints that are not there.
+        lacks: option or feature -> why it is refused, in a phrase.
+        recognises: tells whether a file with one of its endings is of this format, where others
+            have that ending, too.
+        files_in: returns the files of a folder that is one recording, sorted, or none for any
+            other folder; None if recordings of this format are files.
+
+    """
+
+    name: str
+    contents: str
+    help: str  # noqa: A003
+    metavar: str
+    read: Callable[..., Recording]
+    endings: tuple[str, ...]
+    options: tuple[Option, ...] = (JOINTS,)
+    features: tuple[str, ...] = ()
+    lacks: Mapping[str, str] = field(default_factory=dict)
+    recognises: Callable[[Path], bool] | None = None
+    files_in: Callable[[Path], list[Path]] | None = None
+
+    def refusal(self, argument: str) -> str:
+        """Return why its reader does not take an argument, or ''."""
+        if argument in (*(option.name for option in self.options), *self.features):
+            return ''
+        return self.lacks.get(argument, f'{self.name} recordings have none')

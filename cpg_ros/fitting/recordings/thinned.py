@@ -1,0 +1,307 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Long recordings on a coarser even grid, smoothed as they are read, so that they fit in memory.
+
+Around each point of the grid a parabola is fitted to the samples of three of its steps: that
+passes what a stride is made of and averages what is faster (Savitzky & Golay 1964), whatever the
+stamps' jitter. Grids are multiples of a step since the epoch, so that topics recorded side by
+side come to lie on the same stamps.
+"""
+
+from array import array
+from itertools import pairwise
+
+import numpy as np
+
+# Implausible samples: stamps far from all others, angles that no joint can have.
+
+#: A position beyond this is of no joint (rad).
+FARTHEST = 1e6
+#: A position so many times as far from the median as most of them spread, the spread taken as 1
+#: rad at least, is of no joint, either, where no more than one or this share of them is.
+SPIKE_RATIO, RARE = 100.0, 0.01
+#: A gap of so many times what all samples take, and of this much (ns), has recordings on either
+#: side that do not belong together, or stamps that went wrong.
+ASTRAY, GAP = 10.0, 60_000_000_000
+#: Stamps, the columns that they are of, and positions, shape (n, columns).
+Part = tuple[np.ndarray, list[int], np.ndarray]
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f'{count} {what}{"" if count == 1 else "s"}'
+
+
+def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
+    """Keep the longest run of samples without a huge gap; return it, and notes on the rest."""
+    stamps = np.sort(np.concatenate([stamps for stamps, _, _ in parts]))
+    steps = np.diff(stamps)
+    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
+    gaps = np.flatnonzero(steps > max(ASTRAY * usual * stamps.size, GAP)) + 1
+    ends = np.concatenate([[0], gaps, [stamps.size]])
+    most = int(np.argmax(np.diff(ends)))
+    lost = stamps.size - int(ends[most + 1] - ends[most])
+    if not lost:
+        return parts, []
+    first, last = stamps[ends[most]], stamps[ends[most + 1] - 1]
+    kept = []
+    for own, columns, positions in parts:
+        there = (own >= first) & (own <= last)
+        if there.any():
+            kept.append((own[there], columns, positions[there]))
+    stray = stamps[0] if ends[most] else stamps[-1]
+    return kept, [f'{counted(lost, "sample")} stamped far from the others, left out, such as at '
+                  f'{stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
+                  f'{last / 1e9:.10g} s']
+
+
+def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
+    """Take away positions that no joint can have; return how many, shape (width,)."""
+    count = np.zeros(width, int)
+    for _, columns, positions in parts:
+        # Column by column: a long recording is large.
+        for k, column in zip(columns, positions.T, strict=True):
+            far = _far(column)
+            count[k] += np.count_nonzero(far)
+            column[far] = np.nan
+    return count
+
+
+def _far(column: np.ndarray) -> np.ndarray:
+    """Return which positions of a joint are beyond all others, shape (samples,)."""
+    there = np.isfinite(column)
+    far = there & (np.abs(column) > FARTHEST)
+    known = there & ~far
+    if known.any():
+        low, middle, high = np.percentile(column[known], (5.0, 50.0, 95.0))
+        spikes = known & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
+        if np.count_nonzero(spikes) <= max(1.0, RARE * np.count_nonzero(known)):
+            far |= spikes
+    return far
+
+
+#: Samples from which on a recording is long, of all joints in one message or row.
+LONG = 1 << 17
+#: Steps of the grid (ns), the coarsest first, and how many of them a usual interval is at most.
+STEPS, SHARE = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
+#: Grid points that the strongest motion has a period, and the slowest that counts as one (Hz).
+A_PERIOD, SLOWEST = 40.0, 0.2
+#: Samples of a part of which a spectrum is made.
+PART = 1 << 14
+#: A parabola takes so many samples, about the point: their mean is no farther off (steps).
+SAMPLES, ABOUT = 5, 0.75
+#: A sample is no motion that is off both neighbours by this many standard deviations, and times
+#: as much as they differ.
+SPIKE = 3.0
+
+
+class Thinned:
+    """Samples of some joints: as they came, or on a grid once they are many.
+
+    Attributes:
+        step: of the grid, ns; 0 as long as there is none.
+        count: samples that came in.
+        rate: of theirs, Hz, once there is a grid.
+
+    """
+
+    def __init__(self) -> None:
+        self.step, self.count, self.rate = 0, 0, 0.0
+        self._coming: list[tuple[np.ndarray, np.ndarray]] = []
+        self._size, self._next = 0, LONG
+        # Of the grid so far. Arrays that grow in place: pieces to be joined would take twice that.
+        self._stamps, self._values, self._columns = array('q'), array('d'), 0
+
+    def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
+        """Take samples.
+
+        Args:
+            stamps: ns, int64, shape (n,).
+            values: shape (n, columns).
+
+        """
+        self._coming.append((stamps, values))
+        self.count += len(stamps)
+        self._size += len(stamps)
+        if self._size < self._next:
+            return
+        whole = _joined(self._coming)
+        if not self.step:
+            self.step, self.rate = _step_for(*whole)
+            # Where there is none now, there may be one later: joints may stand first.
+            self._next = LONG if self.step else 2 * self._next
+        if self.step:
+            self._thin(*whole)
+        else:
+            self._coming = [whole]
+
+    def _thin(self, stamps: np.ndarray, values: np.ndarray) -> None:
+        """Thin all but what belongs to the last point of the grid."""
+        place = _places(stamps, self.step)
+        others = np.flatnonzero(place != place[-1])
+        last = int(others[-1]) + 1 if others.size else 0
+        self._keep(stamps[:last], values[:last])
+        self._coming = [(stamps[last:].copy(), values[last:].copy())]
+        self._size = len(stamps) - last
+
+    def _keep(self, stamps: np.ndarray, values: np.ndarray) -> None:
+        """Put samples on the grid."""
+        stamps, values = smoothed(stamps, values, self.step)
+        self._columns = values.shape[1]
+        self._stamps.frombytes(stamps.tobytes())
+        self._values.frombytes(values.tobytes())
+
+    def taken(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return stamps and values, the caller's own, and forget them."""
+        rest = _joined(self._coming)
+        if self.step:
+            self._keep(*rest)
+            rest = (np.frombuffer(self._stamps, np.int64),
+                    np.frombuffer(self._values).reshape(-1, self._columns))
+            self._stamps, self._values = array('q'), array('d')
+        elif len(self._coming) == 1:
+            rest = rest[0].copy(), rest[1].copy()
+        self._coming = []
+        return rest
+
+    @property
+    def note(self) -> str:
+        """What was done, in one line, or ''."""
+        return '' if not self.step else (
+            f'{self.count} samples, of {self.rate:.4g} Hz, smoothed to {1e9 / self.step:g} Hz: '
+            'the recording is long')
+
+
+def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    if len(parts) == 1:
+        return parts[0]
+    return (np.concatenate([stamps for stamps, _ in parts]),
+            np.concatenate([values for _, values in parts]))
+
+
+def _places(stamps: np.ndarray, step: int) -> np.ndarray:
+    """Return the number of the grid point nearest to each stamp."""
+    return (stamps + step // 2) // step
+
+
+def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
+    """Return the grid's step that the motion allows, 0 for none, and the samples' rate (Hz)."""
+    intervals = np.diff(stamps)
+    if not (intervals > 0).any():
+        return 0, 0.0
+    usual = float(np.median(intervals[intervals > 0]))
+    power: np.ndarray | float = 0.0
+    for low, high in pairwise(range(0, len(values) + 1, min(PART, len(values)))):
+        part = _without_odd(values[low:high])
+        part = np.nan_to_num(part - np.nanmean(np.where(np.isfinite(part), part, 0.0), axis=0))
+        power = power + np.sum(np.abs(np.fft.rfft(part, axis=0))**2, axis=1)
+    frequencies = np.fft.rfftfreq(min(PART, len(values)), usual * 1e-9)
+    strongest = frequencies[np.argmax(np.where(frequencies >= SLOWEST, power, 0.0))]
+    steps = [step for step in STEPS if step * A_PERIOD * strongest <= 1e9
+             and usual <= SHARE * step]
+    return (steps[0] if steps else 0), 1e9 / usual
+
+
+def _without_odd(values: np.ndarray) -> np.ndarray:
+    """Return values without what no joint does: what is no angle, and single spikes."""
+    values = np.where(np.abs(values) <= FARTHEST, values, np.nan)
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    off = np.abs(here - 0.5 * (before + after))
+    wild = off > SPIKE * np.maximum(np.nanstd(values, axis=0), np.abs(after - before))
+    here[wild] = np.nan
+    return values
+
+
+def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Put samples on the grid.
+
+    Where a point has too few samples around it, their mean stands, at its own stamp.
+
+    Args:
+        stamps: ns, int64, shape (n,).
+        values: shape (n, columns); not finite where missing.
+        step: of the grid, ns.
+
+    Returns:
+        Stamps, shape (m,), rising, and values, shape (m, columns); m points have samples.
+
+    """
+    if not len(stamps):
+        return stamps, values
+    if (np.diff(stamps) < 0).any():
+        order = np.argsort(stamps, kind='stable')
+        stamps, values = stamps[order], values[order]
+    values = _without_odd(values)
+    places = _places(stamps, step)
+    points, first = np.unique(places, return_index=True)
+    own = (stamps - places * step) / step
+    there = np.isfinite(values)
+    if there.all():
+        level, good = _parabolas(own, values, first, points)
+    else:
+        level, good = np.full((len(points), values.shape[1]), np.nan), np.zeros(len(points), bool)
+        for column, mask in enumerate(there.T):
+            if mask.any():
+                some, begin = np.unique(places[mask], return_index=True)
+                at = np.searchsorted(points, some)
+                found, sound = _parabolas(own[mask], values[mask, column:column + 1], begin, some)
+                level[at, column] = found[:, 0]
+                good[at] |= sound
+    centre = np.add.reduceat(own, first) / np.diff(first, append=len(own))
+    return points * step + np.where(good, 0.0, np.rint(centre * step)).astype(np.int64), level
+
+
+def _parabolas(own: np.ndarray, values: np.ndarray, first: np.ndarray, points: np.ndarray
+               ) -> tuple[np.ndarray, np.ndarray]:
+    """Fit a parabola about every point to its samples and those of both neighbours.
+
+    Args:
+        own: places of the samples about their points, in steps, shape (n,).
+        values: shape (n, columns).
+        first: where the samples of each point begin, shape (m,).
+        points: their numbers, shape (m,).
+
+    Returns:
+        Levels (m, columns), and whether they are those of parabolas, not mere means, (m,).
+
+    """
+    sums = np.array([np.add.reduceat(own**p, first) for p in range(5)])
+    products = np.array([np.add.reduceat(values * (own**p)[:, None], first) for p in range(3)])
+    mean = products[0] / sums[0][:, None]
+    beside = np.diff(points) == 1
+    whole, right = sums.copy(), products.copy()
+    for side in (-1.0, 1.0):
+        # About the point, the neighbours' samples are a step further.
+        into, of = (slice(1, None), slice(None, -1)) if side < 0.0 else (slice(None, -1),
+                                                                         slice(1, None))
+        for p in range(5):
+            moved = sum(_BINOMIAL[p][j] * side**(p - j) * sums[j, of] for j in range(p + 1))
+            whole[p, into] += np.where(beside, moved, 0.0)
+            if p < 3:
+                also = sum(_BINOMIAL[p][j] * side**(p - j) * products[j, of]
+                           for j in range(p + 1))
+                right[p, into] += np.where(beside[:, None], also, 0.0)
+    a, b, c, d, e = whole
+    # Cramer's rule for the level of the parabola.
+    cofactors = c * e - d * d, c * d - b * e, b * d - c * c
+    determinant = a * cofactors[0] + b * cofactors[1] + c * cofactors[2]
+    good = (a >= SAMPLES) & (np.abs(b) <= ABOUT * a) & (determinant > 1e-9 * a**3)
+    level = sum(cofactors[p][:, None] * right[p] for p in range(3)) / np.where(
+        good, determinant, 1.0)[:, None]
+    return np.where(good[:, None], level, mean), good
+
+
+_BINOMIAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))

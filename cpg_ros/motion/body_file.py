@@ -1,0 +1,468 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The robot's body in a robot file, for feedback: leg geometry and efference tables.
+
+Part ``geometry`` has the lengths and axes of legs that feedback can displace, ``efference`` of a
+gait what the base does by itself in it.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
+from dataclasses import asdict, dataclass, field
+import math
+from typing import Any, NamedTuple, TypeVar
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.common.yaml_reader import quoted, YamlReader
+from cpg_ros.motion.description import outward, sprawls
+from cpg_ros.networks.library.biped import CELLS
+import numpy as np
+
+# A biped in a robot file, part ``biped``: links and their masses, soles, servos, gains.
+
+BASE = 'base'
+NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
+#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried on the G1, m/s.
+GAIT_SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
+          'two_legged_jump': (-0.05, 0.05)}
+
+
+@dataclass(frozen=True)
+class BipedLink:
+    """A joint, the link that it moves, and the servo that drives it.
+
+    Attributes:
+        parent: joint that moves the link before, or BASE.
+        axis: of the joint, a unit vector.
+        anchor: a point on the axis, m.
+        mass: of the link, kg.
+        center: of that mass, m.
+        kp: proportional gain of the servo, N m / rad.
+        kd: its damping, N m s / rad.
+        effort: the most it can, N m.
+        armature: inertia of its rotor at the joint, kg m^2.
+        angle: where a joint that is no leg's is held, rad; None of the legs' joints.
+        cell: of the network that swings such a joint, from 1; 0 for none.
+        swing: by how much it does at the peak of the cell's recovery variable, rad.
+
+    """
+
+    parent: str
+    axis: tuple[float, ...]
+    anchor: tuple[float, ...]
+    mass: float
+    center: tuple[float, ...]
+    kp: float
+    kd: float
+    effort: float
+    armature: float = 0.0
+    angle: float | None = None
+    cell: int = 0
+    swing: float = 0.0
+
+
+@dataclass(frozen=True, repr=False)
+class BipedBody(ShortRepr):
+    """Links of a biped with soles, parents before children.
+
+    Attributes:
+        mass: of the base, kg.
+        center: of that mass, m.
+        links: by the names of their joints.
+        soles: middle of each leg's sole, m, by leg.
+        sole_size: length and width of a sole, m.
+        gains: of the feedback where they are not the usual ones, by name.
+        gait_gains: the same in one gait alone, by gait and name.
+        scale: height of the centre of mass and mass of the robot over those of the G1, for which
+            the usual gains were found: they are scaled by them, as their units say (Froude).
+
+    """
+
+    mass: float
+    center: tuple[float, ...]
+    links: dict[str, BipedLink]
+    soles: dict[str, tuple[float, ...]]
+    sole_size: tuple[float, ...]
+    gains: dict[str, float] = field(default_factory=dict)
+    scale: tuple[float, float] = (1.0, 1.0)
+    gait_gains: dict[str, dict[str, float]] = field(default_factory=dict)
+
+    def speeds(self, gait: str) -> tuple[float, float]:
+        """Return the slowest and the fastest speed forward of a gait with feedback, m/s."""
+        slowest, fastest = GAIT_SPEEDS[gait]
+        factor = math.sqrt(self.scale[0])
+        return factor * slowest, factor * fastest
+
+    @property
+    def total(self) -> float:
+        """Mass of all of it, kg."""
+        return self.mass + sum(link.mass for link in self.links.values())
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Joints that are held, and where, rad."""
+        return {name: link.angle for name, link in self.links.items() if link.angle is not None}
+
+
+def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]]) -> BipedBody:
+    """Take the part ``biped``; legs are those of the file with the names of their joints."""
+    tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'},
+                       {'gains', 'scale'})
+    base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
+    driven = {name for names in legs.values() for name in names}
+    links: dict[str, BipedLink] = {}
+    listed = _any_keys(reader, tree['links'], 'biped.links', driven)
+    for name in listed:
+        links[name] = _link(reader, listed[name], f'biped.links.{name}', links, name in driven)
+    soles = reader.keys(tree['soles'], 'biped.soles', set(legs))
+    size = reader.numbers(tree['sole_size'], 'biped.sole_size', 2)
+    for k, value in enumerate(size):
+        _positive(reader, value, f'biped.sole_size[{k}]')
+    gains = _any_keys(reader, tree.get('gains', {}), 'biped.gains')
+    length, mass = (_positive(reader, value, f'biped.scale[{k}]') for k, value in enumerate(
+        reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2)))
+    return BipedBody(
+        _positive(reader, base['mass'], 'biped.base.mass'),
+        reader.numbers(base['center'], 'biped.base.center', 3), links,
+        {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs}, size,
+        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()
+         if name not in GAIT_SPEEDS},
+        (length, mass), {gait: _gait_gains(reader, gains[gait], f'biped.gains.{gait}')
+                         for gait in gains if gait in GAIT_SPEEDS})
+
+
+def _gait_gains(reader: YamlReader, tree: Any, where: str) -> dict[str, float]:
+    return {name: reader.number(value, f'{where}.{name}')
+            for name, value in _any_keys(reader, tree, where).items()}
+
+
+def _any_keys(reader: YamlReader, tree: Any, where: str, required: Set[str] = frozenset()
+              ) -> Mapping[str, Any]:
+    return reader.keys(tree, where, required, set(tree) if isinstance(tree, Mapping) else set())
+
+
+def _positive(reader: YamlReader, value: Any, where: str) -> float:
+    number = reader.number(value, where)
+    if number <= 0.0:
+        raise reader.fail(where, f'{number:g} must be positive')
+    return number
+
+
+def _link(reader: YamlReader, tree: Any, where: str, before: Collection[str], driven: bool
+          ) -> BipedLink:
+    places = ('axis', 'anchor', 'center')
+    tree = reader.keys(tree, where, {'parent', *places, *NUMBERS[:4]}
+                       | (set() if driven else {'angle'}),
+                       {'armature'} | (set() if driven else {'cell', 'swing'}))
+    parent = reader.text(tree['parent'], f'{where}.parent')
+    if parent != BASE and parent not in before:
+        raise reader.fail(f'{where}.parent', f"'{parent}' is neither {BASE} nor a link before")
+    axis, anchor, center = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
+    length = float(np.linalg.norm(axis))
+    if abs(length - 1.0) > 1e-3:
+        raise reader.fail(f'{where}.axis', f'has the length {length:g}, not 1')
+    mass, kp, kd, effort, armature = (reader.number(tree.get(key, 0.0), f'{where}.{key}')
+                                      for key in NUMBERS)
+    for key, value in zip(NUMBERS, (mass, kp, kd, effort, armature), strict=True):
+        if value < 0.0 or (value == 0.0 and key in ('kp', 'effort')):
+            raise reader.fail(f'{where}.{key}', f'{value:g} must be '
+                              + ('positive' if key in ('kp', 'effort') else 'at least 0'))
+    angle = None if driven else reader.number(tree['angle'], f'{where}.angle')
+    cell, swing = tree.get('cell', 0), reader.number(tree.get('swing', 0.0), f'{where}.swing')
+    if not (isinstance(cell, int) and 0 <= cell <= CELLS):
+        raise reader.fail(f'{where}.cell', f'{cell!r} is not the number of a cell, 1 to {CELLS}')
+    if swing and not cell:
+        raise reader.fail(where, 'a swing needs a cell')
+    return BipedLink(parent, tuple(value / length for value in axis), anchor, mass, center, kp, kd,
+                     effort, armature, angle, cell, swing)
+
+
+def biped_tree(biped: BipedBody) -> dict[str, Any]:
+    """Return a biped as the tree that read_biped takes."""
+    links = {name: {key: list(value) if isinstance(value, tuple) else value
+                    for key, value in asdict(link).items()
+                    if value is not None and not (key in ('cell', 'swing') and not link.cell)}
+             for name, link in biped.links.items()}
+    tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
+            'soles': {leg: list(place) for leg, place in biped.soles.items()},
+            'sole_size': list(biped.sole_size)}
+    gains = biped.gains | biped.gait_gains
+    return (tree | ({'scale': list(biped.scale)} if biped.scale != (1.0, 1.0) else {})
+            | ({'gains': gains} if gains else {}))
+
+
+# The feedback of a robot in its file, part ``feedback``: its own laws and gains, if it helps.
+
+Value = TypeVar('Value')
+
+
+@dataclass(frozen=True, repr=False)
+class OwnFeedback(ShortRepr):
+    """What a robot's feedback has of its own, where that is not the usual.
+
+    Attributes:
+        enabled: whether the feedback is on where nothing else is said.
+        made: how this was found, '' if it is not said.
+        laws: whether laws are on, by name.
+        gains: by name, dimensionless: lengths as shares of the legs' length l, times of
+            sqrt(l/g).
+        imu_mount: roll, pitch and yaw of the IMU's frame in the base's, rad; empty for the same.
+
+    """
+
+    enabled: bool = True
+    made: str = ''
+    laws: dict[str, bool] = field(default_factory=dict)
+    gains: dict[str, float] = field(default_factory=dict)
+    imu_mount: tuple[float, ...] = ()
+
+
+def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
+    """Take the part ``feedback``; who uses laws and gains knows their names."""
+    tree = reader.keys(tree, 'feedback', set(), {'enabled', 'made', 'laws', 'gains',
+                                                     'imu_mount'})
+
+    def switch(value: Any, where: str) -> bool:
+        if not isinstance(value, bool):
+            raise reader.fail(where, f'must be true or false, not {quoted(value)}')
+        return value
+
+    def listed(key: str, read: Callable[[Any, str], Value]) -> dict[str, Value]:
+        own = tree.get(key, {})
+        own = reader.keys(own, f'feedback.{key}', set(), set(own) if isinstance(own, dict) else
+                          set())
+        return {name: read(value, f'feedback.{key}.{name}') for name, value in own.items()}
+
+    made = reader.text(tree['made'], 'feedback.made') if 'made' in tree else ''
+    mount = tree.get('imu_mount', [])
+    if not isinstance(mount, list) or len(mount) not in (0, 3):
+        raise reader.fail('feedback.imu_mount', 'must be a list of roll, pitch and yaw in rad')
+    return OwnFeedback(switch(tree.get('enabled', True), 'feedback.enabled'), made,
+                       listed('laws', switch), listed('gains', reader.number),
+                       tuple(reader.number(angle, 'feedback.imu_mount') for angle in mount))
+
+
+def feedback_tree(own: OwnFeedback) -> dict[str, Any]:
+    """Return what ``read_feedback`` reads back."""
+    tree = {key: value for key, value in vars(own).items() if value not in ('', {}, ())}
+    return {**tree, 'imu_mount': list(own.imu_mount)} if own.imu_mount else tree
+
+
+#: Bins of the stride in an efference table, and most speeds that it has.
+BINS, SPEEDS = 64, 10
+#: The legs that feedback can displace.
+LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
+        'hip about z, then two about one level axis')
+#: Its signals: velocities in m/s, rates in rad/s, angles in rad, of the base in its own frame.
+SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """A leg with all joints at 0, in the frame of the base: x forward, y left, z up, m.
+
+    Attributes:
+        joints: names of hip, thigh and calf, or of the last two.
+        turns: 1 or -1 by the sense of each about x, y and y, or y and y; of a leg with a yaw,
+            about z for the hip and, for the others, about the level axis that is 90 degrees to
+            the left of it.
+        hip: the hip joint, from the base; of a leg without one that of the thigh.
+        thigh: the thigh joint, from the hip.
+        calf: the calf joint, from the thigh joint.
+        foot: the middle of the foot, from the calf joint.
+        yaw: of a leg whose hip turns about z, the way in which it reaches from there: 0 forward,
+            positive to the left, rad.
+
+    """
+
+    joints: tuple[str, ...]
+    turns: tuple[float, ...]
+    hip: tuple[float, ...]
+    thigh: tuple[float, ...]
+    calf: tuple[float, ...]
+    foot: tuple[float, ...]
+    yaw: float | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class BodyGeometry(ShortRepr):
+    """Geometry of a body, as feedback needs it.
+
+    Attributes:
+        mass: of the robot, kg.
+        foot_radius: m.
+        legs: those that feedback can displace, by name.
+
+    """
+
+    mass: float
+    foot_radius: float
+    legs: dict[str, LegGeometry] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, repr=False)
+class EfferenceTable(ShortRepr):
+    """Motion of the base in an undisturbed gait, by speed and by the phase of the first leg.
+
+    Attributes:
+        speeds: m/s, rising, at most SPEEDS.
+        rows: by SIGNALS; of each a row for each speed, of BINS values, the means over parts of
+            the stride.
+
+    """
+
+    speeds: tuple[float, ...]
+    rows: dict[str, tuple[tuple[float, ...], ...]]
+
+
+class LegChain(NamedTuple):
+    """A leg as a model of the robot has it, with all joints at 0, in the frame of the base.
+
+    Attributes:
+        joints: names down the leg.
+        axes: of the joints, unit vectors, shape (joints, 3).
+        anchors: points on them, m, the same.
+        foot: the middle of the foot, m, shape (3,).
+        radius: of the foot, m.
+
+    """
+
+    joints: Sequence[str]
+    axes: np.ndarray
+    anchors: np.ndarray
+    foot: np.ndarray
+    radius: float
+
+
+def body_geometry(mass: float, chains: Mapping[str, LegChain]) -> BodyGeometry:
+    """Return the geometry of a body.
+
+    Legs are left out that are not LEGS.
+
+    Args:
+        mass: of the robot, kg.
+        chains: its legs, by name.
+
+    """
+    legs = {leg: found for leg, chain in chains.items() if (found := _leg_geometry(*chain[:4]))}
+    radius = float(np.mean([chains[leg].radius for leg in legs] or 0.0))
+    return BodyGeometry(round(mass, 6), round(radius, 6), legs)
+
+
+def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
+                  ) -> LegGeometry | None:
+    if len(joints) not in (2, 3):
+        return None
+    wanted, yaw = np.eye(3)[[0, 1, 1][-len(joints):]], None
+    if sprawls(axes):
+        out = outward(axes[1], foot - anchors[0])
+        yaw = round(float(np.arctan2(out[1], out[0])), 6)
+        wanted = np.array([[0.0, 0.0, 1.0], *[[-np.sin(yaw), np.cos(yaw), 0.0]] * 2])
+    turns = np.sign((axes * wanted).sum(axis=1))
+    if np.abs(axes - turns[:, None] * wanted).max() > 0.01:
+        return None
+    hip, thigh, calf = anchors[[0, 0, 1] if len(joints) == 2 else [0, 1, 2]]
+
+    def rounded(place: np.ndarray) -> tuple[float, ...]:
+        return tuple((np.round(place, 6) + 0.0).tolist())
+
+    return LegGeometry(tuple(joints), tuple(turns.tolist()), rounded(hip), rounded(thigh - hip),
+                       rounded(calf - thigh), rounded(foot - calf), yaw)
+
+
+def read_geometry(reader: YamlReader, tree: Any,
+                  legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
+    """Take the part ``geometry``; legs are those of the file with the names of their joints."""
+    tree = reader.keys(tree, 'geometry', {'mass', 'foot_radius', 'legs'})
+    mass, radius = (reader.number(tree[key], f'geometry.{key}') for key in ('mass', 'foot_radius'))
+    if mass <= 0.0:
+        raise reader.fail('geometry.mass', f'{mass:g} must be positive')
+    if radius < 0.0:
+        raise reader.fail('geometry.foot_radius', f'{radius:g} must not be negative')
+    listed = reader.keys(tree['legs'], 'geometry.legs', set(), set(legs))
+    return BodyGeometry(mass, radius, {leg: _leg(reader, listed[leg], f'geometry.legs.{leg}',
+                                                 set(legs[leg])) for leg in listed})
+
+
+def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeometry:
+    places = ('hip', 'thigh', 'calf', 'foot')
+    tree = reader.keys(tree, where, {'joints', 'turns', *places}, {'yaw'})
+    joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
+                   in enumerate(reader.items(tree['joints'], f'{where}.joints')))
+    if len(joints) not in (2, 3) or len(set(joints)) < len(joints):
+        raise reader.fail(f'{where}.joints', 'must name hip, thigh and calf, or of '
+                          'thigh and calf')
+    for k, name in enumerate(joints):
+        if name not in known:
+            raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is not a joint of this leg")
+    turns = reader.numbers(tree['turns'], f'{where}.turns', len(joints))
+    for k, turn in enumerate(turns):
+        if turn not in (1.0, -1.0):
+            raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} must be 1 or -1')
+    hip, thigh, calf, foot = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
+    yaw = reader.number(tree['yaw'], f'{where}.yaw') if 'yaw' in tree else None
+    if yaw is not None and len(joints) == 2:
+        raise reader.fail(f'{where}.yaw', 'is of a leg of three joints, the first about z')
+    # Level and upward, of what is in the plane of the leg.
+    level = np.array([1.0, 0.0]) if yaw is None else np.array([np.cos(yaw), np.sin(yaw)])
+    for key, link in (('calf', calf), ('foot', foot)):
+        if np.hypot(level @ link[:2], link[2]) < 1e-9:
+            raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
+    return LegGeometry(joints, turns, hip, thigh, calf, foot, yaw)
+
+
+def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
+    """Take the part ``efference`` of a gait, rows of numbers with spaces between them."""
+    tree = reader.keys(tree, where, {'speeds', *SIGNALS})
+    speeds = reader.numbers(tree['speeds'], f'{where}.speeds')
+    if len(speeds) > SPEEDS:
+        raise reader.fail(f'{where}.speeds', f'has {len(speeds)} speeds; at most {SPEEDS} fit')
+    reader.check_rising(speeds, f'{where}.speeds')
+    rows = {}
+    for key in SIGNALS:
+        listed = reader.items(tree[key], f'{where}.{key}')
+        if len(listed) != len(speeds):
+            raise reader.fail(f'{where}.{key}', f'has {len(listed)} rows, and speeds has '
+                              f'{len(speeds)} numbers')
+        rows[key] = tuple(_row(reader, row, f'{where}.{key}[{k}]') for k, row
+                          in enumerate(listed))
+    return EfferenceTable(speeds, rows)
+
+
+def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(value, str):
+        raise reader.fail(where, f'must be {BINS} numbers with spaces between them, not '
+                          f'{quoted(value)}')
+    words = value.split()
+    if len(words) != BINS:
+        raise reader.fail(where, f'has {len(words)} numbers, not {BINS}')
+    try:
+        return tuple(reader.number(float(word), where) for word in words)
+    except ValueError as error:
+        raise reader.fail(where, f'contains something that is not a number: {error}') from error
+
+
+def geometry_tree(geometry: BodyGeometry) -> dict[str, Any]:
+    """Return what ``read_geometry`` reads back."""
+    return {'mass': geometry.mass, 'foot_radius': geometry.foot_radius,
+            'legs': {leg: {key: list(value) if isinstance(value, tuple) else value
+                           for key, value in asdict(one).items() if value is not None}
+                     for leg, one in geometry.legs.items()}}
+
+
+def efference_tree(table: EfferenceTable) -> dict[str, Any]:
+    """Return what ``read_efference`` reads back, to four digits."""
+    return {'speeds': list(table.speeds)} | {
+        key: [' '.join(f'{value:.4g}' for value in row) for row in table.rows[key]]
+        for key in SIGNALS}

@@ -1,0 +1,366 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Description of a robot by a model file of any format: joints, links and where they are.
+
+``urdf`` reads it from URDF, ``simulation.mjcf_description`` from MJCF.
+"""
+
+from dataclasses import dataclass, field
+import math
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.common.files import one_line, parse, read_bytes
+import numpy as np
+
+#: Kinds of joints that turn, which a cell can drive.
+TURNING = ('revolute', 'continuous')
+#: Limits of speed below this, rad/s, are those of a file rather than of a motor.
+SLOW, SERVOS = 5.0, 'hobby servos reach about 5 to 10 rad/s'
+
+
+class DescriptionError(CpgError):
+    """A description of a robot cannot be used; the message names the file and the reason."""
+
+
+@dataclass(frozen=True)
+class JointDescription:
+    """One joint.
+
+    Attributes:
+        name: as in the file.
+        kind: as URDF has it: revolute, continuous, prismatic, fixed, ...
+        lower, upper: limits in rad (m of a prismatic joint), infinite where there are none.
+        velocity: limit in rad/s, infinite where the file gives none or 0.
+        mimic: the joint that it follows, '' for none.
+        parent, child: links.
+        xyz, rpy: where it is in its parent, m and rad.
+        axis: about which it turns, in its own frame.
+
+    """
+
+    name: str
+    kind: str
+    lower: float
+    upper: float
+    velocity: float
+    mimic: str
+    parent: str
+    child: str
+    xyz: tuple[float, ...] = (0.0, 0.0, 0.0)
+    rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
+    axis: tuple[float, ...] = (1.0, 0.0, 0.0)
+
+    @property
+    def flaw(self) -> str:
+        """Why no cell can drive it, '' if one can."""
+        if self.mimic:
+            return f"follows '{self.mimic}' (mimic)"
+        return '' if self.kind in TURNING else f'is {self.kind}'
+
+
+@dataclass(frozen=True)
+class LinkDescription:
+    """A link.
+
+    Attributes:
+        mass: kg, 0 where the file gives none.
+        radius: of its sphere that collides, m, 0 if it has none.
+        centre: of that sphere in the link's frame, m.
+
+    """
+
+    mass: float = 0.0
+    radius: float = 0.0
+    centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """A robot's joints and links by name, in the order of the file.
+
+    Attributes:
+        format: URDF or MJCF, for messages.
+        joints: by name.
+        links: by name; of URDF only.
+
+    """
+
+    format: str
+    joints: dict[str, JointDescription]
+    links: dict[str, LinkDescription] = field(default_factory=dict)
+
+    def root(self) -> str:
+        """Return the link that no joint moves.
+
+        Raises:
+            DescriptionError: there is none, or more than one.
+
+        """
+        moved = {joint.child for joint in self.joints.values()}
+        found = sorted({joint.parent for joint in self.joints.values()} - moved)
+        if len(found) != 1:
+            raise DescriptionError(f'the {self.format} has {len(found)} root links '
+                                   f'({", ".join(found)}), it must have one')
+        return found[0]
+
+    def chain(self, name: str) -> list[JointDescription]:
+        """Return the joints from the root to one joint, which is the last.
+
+        Raises:
+            DescriptionError: the links form a loop.
+
+        """
+        above = {joint.child: joint for joint in self.joints.values()}
+        found = [self.joints[name]]
+        while found[0].parent in above:
+            found.insert(0, above[found[0].parent])
+            if len(found) > len(self.joints):
+                raise DescriptionError(f"the links above the joint '{name}' form a loop")
+        return found
+
+    def frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return where a joint is in the frame of the root with all joints at 0.
+
+        Its place is in m, shape (3,); its frame's axes are columns, shape (3, 3). Errors as of
+        ``chain``.
+        """
+        place, axes = np.zeros(3), np.eye(3)
+        for joint in self.chain(name):
+            place, axes = place + axes @ joint.xyz, axes @ rotation(joint.rpy)
+        return place, axes
+
+    def direction(self, name: str) -> np.ndarray:
+        """Return the axis of a joint in the frame of the root with all joints at 0, a unit vector.
+
+        Raises:
+            DescriptionError: the axis is zero, or the links form a loop.
+
+        """
+        axis = self.frame(name)[1] @ self.joints[name].axis
+        length = float(np.linalg.norm(axis))
+        if not 0.0 < length < math.inf:
+            raise DescriptionError(f"the joint '{name}' has no axis to turn about")
+        return axis / length
+
+    def foot_below(self, last: str) -> tuple[np.ndarray, float]:
+        """Return the middle of the foot below a leg's last joint, m, (3,), and its radius, m.
+
+        It is the furthest sphere of what that joint moves, or else the furthest fixed frame,
+        which has no radius.
+        """
+        begin, axes = self.frame(last)
+        found = [(begin, axes, self.joints[last].child)]
+        for place, turned, link in found:
+            found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
+                      for joint in self.joints.values()
+                      if joint.parent == link and joint.kind == 'fixed']
+        balls = [(place + turned @ self.links[link].centre, self.links[link].radius)
+                 for place, turned, link in found
+                 if link in self.links and self.links[link].radius]
+        return max(balls or [(place, 0.0) for place, _, _ in found],
+                   key=lambda one: float(np.linalg.norm(one[0] - begin)))
+
+
+def rotation(rpy: tuple[float, ...]) -> np.ndarray:
+    """Return the matrix of roll, pitch and yaw in rad: about the fixed x, then y, then z."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+                     [-sp, cp * sr, cp * cr]])
+
+
+# URDF files: joints with their limits and places, links with their masses and feet.
+
+def read_tree(path: str | Path) -> Element:
+    """Read a URDF file as XML, tags without their prefixes.
+
+    Raises:
+        DescriptionError: the file cannot be read, is not XML, is xacro or is no URDF.
+
+    """
+    return parse_tree(read_bytes(path, DescriptionError, 'URDF'), str(path))
+
+
+def parse_tree(data: bytes, source: str) -> Element:
+    """Parse a URDF; errors as of ``read_tree``, which name the source."""
+    tree = parse(data, lambda why: _error(source, why))
+    for element in tree.iter():
+        if element.tag.startswith('xacro:'):
+            raise _error(source, f'has <{element.tag}> in it: it is xacro, expand it first (xacro '
+                         f'{Path(source).name} > robot.urdf)')
+        element.tag = element.tag.rpartition(':')[2]
+    if tree.tag != 'robot':
+        raise _error(source, f'its root is <{tree.tag}>, not <robot>: this is not a URDF')
+    return tree
+
+
+def load_urdf(path: str | Path) -> RobotDescription:
+    """Read a URDF file.
+
+    Raises:
+        DescriptionError: as of ``read_tree`` and ``describe``.
+
+    """
+    return describe(read_tree(path), str(path))
+
+
+def describe(tree: Element, source: str) -> RobotDescription:
+    """Return what a URDF describes.
+
+    Raises:
+        DescriptionError: it has no joints, or one is incomplete; the message names the source.
+
+    """
+    joints: dict[str, JointDescription] = {}
+    for element in tree.iterfind('joint'):
+        joint = _joint(element, source)
+        if joint.name in joints:
+            raise _error(source, f"the joint '{joint.name}' appears twice")
+        joints[joint.name] = joint
+    if not joints:
+        raise _error(source, 'it has no joints')
+    return RobotDescription('URDF', joints, {link.get('name', '').strip(): _link(link)
+                                             for link in tree.iterfind('link')})
+
+
+def mesh_folder(tree: Element) -> str:
+    """Return the mesh folder that a URDF names (MuJoCo's extension), '' if it names none."""
+    compiler = tree.find('mujoco/compiler')
+    return '' if compiler is None else compiler.get('meshdir', '')
+
+
+def numbers(text: str, count: int, finite: bool = True) -> tuple[float, ...]:
+    """Return the numbers of an attribute, () where they are not as many as they should be.
+
+    Args:
+        text: numbers with spaces between them.
+        count: how many there should be.
+        finite: count what is infinite as no number.
+
+    """
+    try:
+        values = tuple(float(word) for word in text.split())
+    except ValueError:
+        return ()
+    known = not any(value != value or (finite and math.isinf(value)) for value in values)
+    return values if known and len(values) == count else ()
+
+
+def _error(source: str, why: str) -> DescriptionError:
+    return DescriptionError(one_line(f'URDF {source}: {why}'))
+
+
+def _joint(element: Element, source: str) -> JointDescription:
+    name, kind = element.get('name', '').strip(), element.get('type', '').strip()
+    if not name:
+        raise _error(source, 'a joint has no name')
+    if not kind:
+        raise _error(source, f"the joint '{name}' has no type")
+    parts: dict[str, dict[str, str]] = {part.tag: part.attrib for part in element}
+
+    def text(part: str, key: str, default: str = '') -> str:
+        return parts.get(part, {}).get(key, default)
+
+    def read(part: str, key: str, default: str, finite: bool = True) -> tuple[float, ...]:
+        given, count = text(part, key, default), len(default.split())
+        if not (values := numbers(given, count, finite)):
+            what = 'a number' if count == 1 else f'{count} numbers'
+            raise _error(source, f"the joint '{name}': {part} {key}=\"{given[:40]}\" is not "
+                         f'{what}')
+        return values
+
+    lower, upper, velocity = (read('limit', key, '0', finite=False)[0]
+                              for key in ('lower', 'upper', 'velocity'))
+    bounded = kind in ('revolute', 'prismatic')
+    if bounded and 'limit' not in parts:
+        raise _error(source, f"the joint '{name}' is {kind}, but has no <limit>")
+    return JointDescription(
+        name, kind, lower if bounded else -math.inf, upper if bounded else math.inf,
+        abs(velocity) if velocity else math.inf, text('mimic', 'joint'), text('parent', 'link'),
+        text('child', 'link'), read('origin', 'xyz', '0 0 0'), read('origin', 'rpy', '0 0 0'),
+        read('axis', 'xyz', '1 0 0'))
+
+
+def _link(element: Element) -> LinkDescription:
+    """Return a link; what is no number counts as not there."""
+    mass = radius = 0.0
+    centre: tuple[float, ...] = ()
+    for part in element.iterfind('inertial/mass'):
+        mass = sum(numbers(part.get('value', ''), 1))
+    for collision in element.iterfind('collision'):
+        origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
+        if sphere is not None and not radius:
+            radius = sum(numbers(sphere.get('radius', ''), 1))
+            centre = () if origin is None else numbers(origin.get('xyz', ''), 3)
+    return LinkDescription(mass, radius, centre or (0.0, 0.0, 0.0))
+
+
+# Legs that reach to the side, as those of insects: which they are, and how they stand at first.
+
+#: Part of the femur's axis across the body from which on it swings the leg forward.
+ACROSS = 0.9
+#: How far the femur is raised above level in a first stand, and the tibia lowered below it, rad.
+RAISED, LOWERED = 0.4, 1.3
+
+
+def sprawls(axes: np.ndarray) -> bool:
+    """Tell whether a leg is of this kind.
+
+    Args:
+        axes: of its joints down the leg with all of them at 0, unit vectors, shape (joints, 3).
+
+    """
+    if len(axes) < 3:
+        return False
+    coxa, femur, tibia = axes[-3:]
+    return bool(abs(coxa[2]) > 0.99 and max(abs(femur[2]), abs(tibia[2])) < 0.01
+                and abs(femur @ tibia) > 0.99 and abs(femur[1]) < ACROSS)
+
+
+def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Return the level direction in which a leg reaches, in the plane that its femur moves.
+
+    Args:
+        axis: of the femur, shape (3,).
+        reach: from coxa to foot, m; its first two numbers count.
+
+    """
+    out = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])
+    return out if out @ reach[:2] >= 0.0 else -out
+
+
+def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a stand with the foot out to the side and below, and what the joints do there.
+
+    Args:
+        places: of coxa, femur, tibia and foot with all joints at 0, m, shape (4, 3).
+        axes: of the joints, unit vectors, shape (3, 3).
+
+    Returns:
+        Angles of coxa, femur and tibia, rad, the coxa's 0; then 1 or -1 by whether positive
+        angles of the coxa take the foot forward, and of femur and tibia upward.
+
+    """
+    out = outward(axes[1], places[3] - places[0])
+    # As complex numbers out + i up; turns of femur and tibia by what they do to out.
+    upper, lower = np.diff(places[1:, :2] @ out + 1j * places[1:, 2])
+    turns = np.sign(np.cross(axes[1:], [*out, 0.0])[:, 2])
+    femur = RAISED - np.angle(upper)
+    tibia = -LOWERED - np.angle(lower) - femur
+    angles = (np.array([0.0, turns[0] * femur, turns[1] * tibia]) + math.pi) % (2.0 * math.pi)
+    forward = -math.copysign(1.0, axes[0, 2] * out[1])
+    return angles - math.pi, np.array([forward, *turns])

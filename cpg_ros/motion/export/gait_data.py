@@ -1,0 +1,303 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The numbers of gaits as C: their orbits as tables, readouts, limits; ``gait_data.c``."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+import re
+from typing import Any
+
+from cpg_ros.common.command_line import printable
+from cpg_ros.common.errors import InputError
+from cpg_ros.dynamics.integration.c_text import braces, number
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.readout import WaveReadout
+from cpg_ros.motion.robot import WEIGHTS
+from cpg_ros.networks.equations import values_of
+import numpy as np
+
+FLAT = 1e-3
+POINTS = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
+#: Entries of tables by the angle of a waveform.
+LEAD = {'float32': 256, 'float64': 512}
+LIMITS = ('lower', 'upper', 'velocity')
+
+
+@dataclass(frozen=True)
+class CFormat:
+    """How gaits become C.
+
+    Attributes:
+        form: ``network``, or ``table`` for their orbits alone.
+        real: ``float32`` or ``float64``.
+        tolerance: by which tables may differ from what they are of, over its half range.
+
+    """
+
+    form: str = 'network'
+    real: str = 'float32'
+    tolerance: float = 1e-4
+
+
+def c_name(name: str) -> str:
+    """Return a name as C can have it, in capitals."""
+    return re.sub(r'\W', '_', name, flags=re.ASCII).upper()
+
+
+def check_names(what: str, names: Sequence[str]) -> None:
+    """Check that names are distinct as C has them.
+
+    Raises:
+        InputError: two of them are the same there.
+
+    """
+    known: dict[str, str] = {}
+    for name in names:
+        other = known.setdefault(c_name(name), name)
+        if other != name:
+            raise InputError(f'{what} {other!r} and {name!r} are both {c_name(name)} in C: rename '
+                             'one of them')
+
+
+def comment(text: str) -> str:
+    """Return a text as a comment of C can have it, on one line."""
+    return printable(' '.join(text.split())).replace('*/', '* /').replace('/*', '/ *')
+
+
+def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
+                  points: Sequence[int] = POINTS) -> np.ndarray:
+    """Tabulate periodic curves with as few points as a tolerance allows.
+
+    Args:
+        curve: of phases in cycles, shape (m,): values and their slopes per cycle, (curves, m).
+        tolerance: of the cubics in between, over half of each curve's range.
+        points: how many to choose from, rising; the last one if none is enough.
+
+    Returns:
+        Values and slopes per point, shape (curves, points, 2).
+
+    """
+    for count in points:
+        grid = np.arange(count) / count
+        values, slopes = curve(grid)
+        slopes = slopes / count
+        middle = (0.5 * (values + np.roll(values, -1, axis=1))
+                  + 0.125 * (slopes - np.roll(slopes, -1, axis=1)))
+        off = np.abs(middle - curve(grid + 0.5 / count)[0]).max(axis=1)
+        half = 0.5 * np.ptp(values, axis=1)
+        # A curve that hardly moves beside the others need not be as exact.
+        if (off <= tolerance * np.maximum(half, FLAT * half.max())).all():
+            break
+    return np.stack([values, slopes], axis=2)
+
+
+def distinct_joints(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
+    """Return joints of which no two share their angles over a cycle, and which each is like."""
+    both = np.hstack([plan.readout.angles, plan.readout.rises])
+    _, first, place = np.unique(np.round(both, 12), axis=0, return_index=True,
+                                return_inverse=True)
+    return first, place.ravel()
+
+
+def leg_phases(plan: GaitPlan) -> np.ndarray:
+    """Return the legs' phases at the orbit's phase 0, cycles, shape (legs,)."""
+    cells, readout = plan.robot.leg_cells, plan.readout
+    phases = plan.orbit.phases[cells]
+    if isinstance(readout, PhaseReadout):
+        return np.asarray(phases - readout.gait.known.crests[plan.orbit.waves[cells]])
+    return np.asarray(phases)
+
+
+@dataclass
+class _Struct:
+    """A struct's initializer, and the arrays that it points to."""
+
+    name: str
+    real: str
+    arrays: list[str] = field(default_factory=list)
+    fields: list[str] = field(default_factory=list)
+    numbers: int = 0
+    points: int = 0
+
+    def put(self, key: str, value: Any) -> None:
+        """Add a number, or an array that is part of the struct."""
+        if np.ndim(value):
+            text = braces(value, self.real, 8)
+        else:
+            text = str(value) if isinstance(value, int) else number(value, self.real)
+        self.numbers += np.size(value)
+        self.fields.append(f'        .{key} = {text},')
+
+    def point(self, key: str, values: np.ndarray | None) -> None:
+        """Add a pointer to an array, 0 for none."""
+        if values is None:
+            self.fields.append(f'        .{key} = 0,')
+            return
+        name = f'{self.name}_{key}'
+        self.numbers += values.size
+        self.arrays.append(f'static CPG_ROM cpg_real {name}[] = '
+                           f'{braces(values.ravel(), self.real)};')
+        self.fields.append(f'        .{key} = {name},')
+
+
+class GaitData:
+    """Gaits of one robot and one network, as constants of C.
+
+    Attributes:
+        plans: of the gaits.
+        format: how they become C.
+
+    """
+
+    def __init__(self, plans: Sequence[GaitPlan], c_format: CFormat) -> None:
+        """Take gaits whose plans are of one robot and one network."""
+        self.plans, self.format = plans, c_format
+        self.network, self.robot = plans[0].orbit.network, plans[0].robot
+        used = np.flatnonzero(np.any([plan.readout.joints.weights.any(axis=0) for plan in plans],
+                                     axis=0))
+        highest = int(used.max()) + 1 if used.size else 1
+        #: Readout weights of a joint that are exported, and whether phases are retimed.
+        self.weights = next(order for order in WEIGHTS if order >= highest)
+        self.retimed = any((self.maps(plan) is not None) for plan in plans)
+
+    def maps(self, plan: GaitPlan) -> np.ndarray | None:
+        """Return what a duty factor makes of each joint's phase, (joints, 3), None for nothing."""
+        readout = plan.readout
+        if isinstance(readout, WaveReadout):
+            return None if readout.retiming is None else readout.retiming.maps
+        maps = readout.gait.maps[readout.joints.cells]
+        return None if (maps[:, 0] == 1.0).all() else maps
+
+    @cached_property
+    def structs(self) -> list[_Struct]:
+        """The gaits."""
+        made = []
+        for plan in self.plans:
+            one = _Struct(c_name(plan.name).lower(), self.format.real)
+            one.put('frequency', plan.frequency)
+            one.put('period', plan.orbit.period)
+            one.put('start', plan.readout.start)
+            one.put('shift', plan.shift)
+            one.put('speed', plan.speed)
+            (self._table if self.format.form == 'table' else self._network)(one, plan)
+            made.append(one)
+        return made
+
+    def _table(self, one: _Struct, plan: GaitPlan) -> None:
+        readout = plan.readout
+        size = readout.angles.shape[1]
+        first, place = distinct_joints(plan)
+
+        def curve(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            at = np.round(phases * size).astype(int) % size
+            return readout.angles[first][:, at], readout.rises[first][:, at]
+
+        tables = hermite_table(curve, self.format.tolerance,
+                               [2**n for n in range(4, size.bit_length() - 1)])
+        one.put('joint_phase', plan.orbit.phases[self.robot.cells])
+        one.put('leg_phase', leg_phases(plan))
+        one.put('joint_table', place)
+        one.points = tables.shape[1]
+        one.put('points', one.points)
+        one.point('tables', tables)
+
+    def _network(self, one: _Struct, plan: GaitPlan) -> None:
+        orbit, network = plan.orbit, plan.orbit.network
+        waves = self._waves(orbit)
+        one.put('p', np.concatenate([value.ravel() for value in values_of(network)]))
+        one.put('gain', plan.gain)
+        one.put('delay', network.delay / self.step)
+        basis = orbit.symmetry.basis
+        one.put('basis_rows', len(basis) if plan.gain else 0)
+        one.points = waves.shape[1]
+        one.put('points', one.points)
+        one.point('basis', basis if plan.gain else None)
+        one.point('waves', waves)
+        one.put('phase', orbit.phases)
+        one.put('wave', orbit.waves)
+        one.put('weights', plan.readout.joints.weights[:, :self.weights])
+        maps = self.maps(plan)
+        if self.retimed:
+            one.put('maps', np.tile([1.0, 0.0, 0.0], (len(self.robot.joints), 1))
+                    if maps is None else maps)
+        if isinstance(plan.readout, PhaseReadout):
+            known = plan.readout.gait.known
+            one.point('shapes', known.shape)
+            one.point('circles', known.circles)
+            one.point('terms', known.terms)
+            one.point('crests', known.crests)
+            return
+        every = len(plan.readout.wave.lead) // self.lead
+        one.put('peak', orbit.peak)
+        one.point('lead', plan.readout.wave.lead[::every])
+        if self.retimed:
+            retiming = plan.readout.retiming
+            one.point('turn', None if retiming is None else
+                      retiming.lead[::every] * [1.0, every])
+            one.point('cycle', None if retiming is None else
+                      retiming.cycle[::every] * [1.0, every, 1.0, every])
+
+    def _waves(self, orbit: Orbit) -> np.ndarray:
+        """Return the orbit's waveforms as tables, shape (waves * variables, points, 2)."""
+        which = [(wave, variable) for wave in range(int(orbit.waves.max()) + 1)
+                 for variable in range(self.network.variables)]
+
+        def curve(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            values, slopes = (np.stack([orbit.waveform(phases, order, *one) for one in which])
+                              for order in (0, 1))
+            return values, slopes
+
+        return hermite_table(curve, self.format.tolerance)
+
+    @property
+    def lead(self) -> int:
+        """Entries of tables by the angle of a waveform."""
+        return LEAD[self.format.real]
+
+    @property
+    def step(self) -> float:
+        """Model time of a step."""
+        return self.plans[0].step or self.network.step
+
+    @property
+    def points(self) -> int:
+        """Most points of a gait's tables."""
+        return max(one.points for one in self.structs)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of all constants, bytes, to which come pointers and small integers."""
+        size = 4 if self.format.real == 'float32' else 8
+        return size * (sum(one.numbers for one in self.structs) + 4 * len(self.robot.joints))
+
+    def text(self) -> str:
+        """Write ``gait_data.c``, but for its head."""
+        real, robot = self.format.real, self.robot
+        lines = ['#define CPG_INTERNAL', '#include "cpg.h"', '']
+        lines += [array for one in self.structs for array in (*one.arrays, '')]
+        lines.append('CPG_ROM cpg_gait cpg_gaits[CPG_GAITS] = {')
+        for one in self.structs:
+            lines += ['    {', *one.fields, '    },']
+        lines += ['};', '', 'CPG_ROM cpg_real cpg_offset[CPG_JOINTS] = '
+                  f'{braces(robot.column("offset"), real)};',
+                  'CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS] = '
+                  f'{braces([robot.column(key) for key in LIMITS], real)};']
+        if self.format.form == 'network':
+            lines += [f'CPG_ROM uint8_t cpg_joint_cell[CPG_JOINTS] = {braces(robot.cells, real)};',
+                      f'CPG_ROM uint8_t cpg_leg_cell[CPG_LEGS] = {braces(robot.leg_cells, real)};']
+        return '\n'.join([*lines, ''])

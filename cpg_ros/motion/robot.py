@@ -1,0 +1,291 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A robot as the generator sees it: legs, joints, which cell drives each joint and how, limits.
+
+A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
+Morris-Lecar cell: the first harmonics of it), y the derivative of that by phase (in radians),
+psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout). On every gait x runs from -1 to
+1, so weights are in radians. A gait can have offsets and weights of its own, its motion. Where
+legs take strides of different lengths the weights are ``in_place + stride (w - in_place)``, stride
+from -1 to 1.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+import math
+
+from cpg_ros.common.errors import InputError, short, ShortRepr
+from cpg_ros.motion.body_file import BipedBody, BodyGeometry, EfferenceTable, OwnFeedback
+from cpg_ros.networks.registry import NETWORKS
+import numpy as np
+
+#: Default number of harmonics of a Morris-Lecar cell that joints follow.
+HARMONICS = 3
+
+#: How many weights each readout order takes; the bare scale is an order of its own.
+WEIGHTS = (1, 2, 4, 6)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: name, leg, cell from 1; offset, weights, lower, upper in rad; velocity rad/s.
+
+    What is ``invented`` (of lower, upper and velocity) is a guess, as the URDF has no limit there.
+    """
+
+    name: str
+    leg: str
+    cell: int
+    offset: float
+    weights: tuple[float, ...]
+    lower: float
+    upper: float
+    velocity: float
+    invented: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class SteeringTable:
+    """Measured speed and yaw rate of a robot by stride: the strides for a commanded speed.
+
+    Four columns of one table, its rows by rising speed.
+
+    Attributes:
+        speed: forward, m/s.
+        stride: factor of all legs' strides, -1 to 1.
+        frequency: of the strides, Hz.
+        turn: rad/s of yaw for each unit by which the right legs' stride exceeds the left ones'.
+
+    """
+
+    speed: tuple[float, ...]
+    stride: tuple[float, ...]
+    frequency: tuple[float, ...]
+    turn: tuple[float, ...]
+
+    def ask(self, speed: float, turn: float) -> tuple[float, float, float]:
+        """Return the strides of the left and right legs, and the frequency in Hz.
+
+        Args:
+            speed: wanted, forward, m/s; taken to the nearest that the table has.
+            turn: wanted yaw rate, rad/s, positive to the left; where a leg would need a longer
+                stride than 1, turning comes before speed.
+
+        """
+        stride, frequency, rate = (float(np.interp(speed, self.speed, column))
+                                   for column in (self.stride, self.frequency, self.turn))
+        half = min(max(0.5 * turn / rate, -1.0), 1.0)
+        stride = min(max(stride, abs(half) - 1.0), 1.0 - abs(half))
+        return stride - half, stride + half, frequency
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """A joint in one gait: offset, weights, and weights at a stride of 0, rad."""
+
+    offset: float
+    weights: tuple[float, ...]
+    in_place: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, repr=False)
+class Motion(ShortRepr):
+    """A robot in one gait, where that differs from the robot's joints.
+
+    Attributes:
+        frequency: strides per second that it was made for, Hz; None if it does not matter.
+        joints: by name.
+        steering: None if it has not been measured.
+        duty: share of the stride that legs are to stand, None for what they do by themselves.
+        stance: phase of a leg's cell at which it begins to stand by the weights there are, and
+            for which share of the stride, cycles; None if it stands while its cell falls.
+        efference: what the base does by itself, None if it has not been measured.
+
+    """
+
+    frequency: float | None = None
+    joints: dict[str, JointMotion] = field(default_factory=dict)
+    steering: SteeringTable | None = None
+    efference: EfferenceTable | None = None
+    duty: float | None = None
+    stance: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class Robot(ShortRepr):
+    """Legs and joints of a robot, joints grouped by leg in the order of the file.
+
+    Attributes:
+        name: the file's stem.
+        networks: names of the networks whose cells can drive it; all have the same legs.
+        assignment: which of their cells drive which leg.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        legs: leg -> its joints.
+        order: all joints' names in the order in which controllers take them.
+        motions: gait or preset -> its motion.
+        sides: leg -> left or right, as the file or else a network says.
+        girdles: leg -> fore or hind, the same.
+        geometry: of its legs, None if the file does not have it.
+        biped: links, soles and servos of a biped that stands on soles, or None.
+        feedback: what its feedback has of its own, None if everything is the usual.
+
+    """
+
+    name: str
+    networks: tuple[str, ...]
+    assignment: str
+    harmonics: int
+    legs: dict[str, tuple[Joint, ...]]
+    order: tuple[str, ...]
+    motions: dict[str, Motion] = field(default_factory=dict)
+    sides: dict[str, str] = field(default_factory=dict)
+    girdles: dict[str, str] = field(default_factory=dict)
+    geometry: BodyGeometry | None = None
+    biped: BipedBody | None = None
+    feedback: OwnFeedback | None = None
+
+    def __post_init__(self) -> None:
+        for key in ('sides', 'girdles'):
+            stated = {leg: word for name in self.networks
+                      for leg, word in getattr(NETWORKS[name], key).items()}
+            object.__setattr__(self, key, {**stated, **getattr(self, key)})
+
+    def _summary(self) -> str:
+        return (f'{self.name}: {len(self.legs)} legs, {len(self.order)} joints, driven by '
+                f'{short(self.networks)}')
+
+    @property
+    def left(self) -> np.ndarray:
+        """Whether each leg is on the left, shape (legs,).
+
+        Raises:
+            ValueError: neither the network nor the robot file says of each leg on which side.
+
+        """
+        for leg in self.legs:
+            if leg not in self.sides:
+                raise InputError(f"robot file '{self.name}' does not say on which side the leg "
+                                 f'{leg} is (legs.{leg}.side)')
+        return np.array([self.sides[leg] == 'left' for leg in self.legs])
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints, leg by leg."""
+        return tuple(joint for leg in self.legs.values() for joint in leg)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Joints that are no leg's but are held, and where, rad."""
+        return {} if self.biped is None else self.biped.held
+
+    @property
+    def places(self) -> np.ndarray:
+        """Index into ``joints`` of each name in ``order``, shape (joints,)."""
+        names = [joint.name for joint in self.joints]
+        return np.array([names.index(name) for name in self.order])
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Index from 0 of the cell behind each joint, shape (joints,)."""
+        return np.array([joint.cell - 1 for joint in self.joints])
+
+    def motion(self, preset: str, gait: str) -> Motion:
+        """Return the motion of a preset, or else of its gait, or else an empty one."""
+        return self.motions.get(preset) or self.motions.get(gait) or Motion()
+
+    def networks_with(self, gait: str) -> tuple[str, ...]:
+        """Names of those of its networks that have a gait or preset."""
+        return tuple(name for name in self.networks if gait in NETWORKS[name].presets())
+
+    def shift(self, motion: Motion) -> np.ndarray:
+        """Difference between a motion's offsets and those of the stand, rad, shape (joints,)."""
+        return np.array([motion.joints[joint.name].offset - joint.offset
+                         if joint.name in motion.joints else 0.0 for joint in self.joints])
+
+    def weights(self, motion: Motion | None = None, in_place: bool = False) -> np.ndarray:
+        """Readout weights in rad, shape (joints, 6), zero above a joint's own order.
+
+        Args:
+            motion: whose; without one, those of the joints themselves.
+            in_place: those at a stride of 0.
+
+        """
+        table = np.zeros((len(self.joints), WEIGHTS[-1]))
+        for row, joint in zip(table, self.joints, strict=True):
+            moved = (motion or Motion()).joints.get(joint.name)
+            listed = moved or JointMotion(joint.offset, joint.weights)
+            weights = listed.in_place if in_place else listed.weights
+            row[:len(weights)] = weights
+        return table
+
+    def column(self, key: str) -> np.ndarray:
+        """One number of every joint (offset, lower, upper or velocity), shape (joints,)."""
+        return np.array([getattr(joint, key) for joint in self.joints], dtype=float)
+
+    @property
+    def leg_cells(self) -> np.ndarray:
+        """Index from 0 of the cell that gives each leg's phase, shape (legs,)."""
+        cells = NETWORKS[self.networks[0]].legs[self.assignment]
+        return np.array([cells[leg][0] - 1 for leg in self.legs])
+
+    @property
+    def leg_of_joint(self) -> np.ndarray:
+        """Index from 0 of each joint's leg, shape (joints,)."""
+        return np.repeat(np.arange(len(self.legs)), [len(leg) for leg in self.legs.values()])
+
+
+# A gait's readout as one list for each joint: its offset, then its weights, rad.
+
+#: What the generator's parameters of readouts begin with; the joint's name follows.
+READOUT = 'readout.'
+
+
+def gait_readouts(robot: Robot, motion: Motion) -> dict[str, tuple[float, ...]]:
+    """Return offset and weights of every joint in one of the robot's motions, rad, by name."""
+    found = {}
+    for joint in robot.joints:
+        moved = motion.joints.get(joint.name, joint)
+        found[joint.name] = (moved.offset, *moved.weights)
+    return found
+
+
+def with_readouts(robot: Robot, preset: str, gait: str,
+                  wanted: Mapping[str, Sequence[float]]) -> Robot:
+    """Return a robot whose joints are read off a gait in another way.
+
+    Weights at a stride of 0, steering and duty stay those of the file.
+
+    Args:
+        robot: it is returned as it is if that is how it moves already.
+        preset: whose motion is changed, or that of its gait if it has none of its own.
+        gait: of the preset.
+        wanted: of every joint its offset, then 1, 2, 4 or 6 weights, rad.
+
+    Raises:
+        InputError: of a joint there are fewer or more numbers, or one is not finite.
+
+    """
+    motion = robot.motion(preset, gait)
+    if wanted == gait_readouts(robot, motion):
+        return robot
+    joints = {}
+    for name, (offset, *weights) in ((name, [*row] or [math.nan])
+                                     for name, row in wanted.items()):
+        if len(weights) not in WEIGHTS or not all(map(math.isfinite, (offset, *weights))):
+            raise InputError(f'{READOUT}{name} must be an offset and 1, 2, 4 or 6 weights in rad, '
+                             f'not {list(wanted[name])}')
+        own = motion.joints.get(name)
+        joints[name] = JointMotion(offset, tuple(weights), own.in_place if own else ())
+    return replace(robot, motions={**robot.motions, preset: replace(motion, joints=joints)})

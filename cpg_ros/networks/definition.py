@@ -1,0 +1,355 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every network states of itself: parameters, cells, equations, legs, gaits.
+
+States are vectors of ``components`` numbers, variable by variable: first that of every cell
+which the legs read (x or v), then the second one (w or u). All networks have the form
+``dx/dt = f(x(t), x(t - delay); p)``; networks without delay ignore the second argument.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, ClassVar, Literal, TypeVar, Union
+
+from cpg_ros.common.errors import InputError
+
+# What equations are written with: terms that remember how they were made.
+
+#: What may stand in an equation.
+Number = Union['Term', float]
+
+
+class Term:
+    """A part of an equation, as text that sympy reads."""
+
+    def __init__(self, text: str) -> None:
+        """Wrap a text."""
+        self.text = text
+
+    def __add__(self, other: Number) -> 'Term':
+        return Term(f'({self.text} + {_text(other)})')
+
+    def __radd__(self, other: Number) -> 'Term':
+        return Term(f'({_text(other)} + {self.text})')
+
+    def __sub__(self, other: Number) -> 'Term':
+        return Term(f'({self.text} - {_text(other)})')
+
+    def __rsub__(self, other: Number) -> 'Term':
+        return Term(f'({_text(other)} - {self.text})')
+
+    def __mul__(self, other: Number) -> 'Term':
+        return Term(f'({self.text} * {_text(other)})')
+
+    def __rmul__(self, other: Number) -> 'Term':
+        return Term(f'({_text(other)} * {self.text})')
+
+    def __truediv__(self, other: Number) -> 'Term':
+        return Term(f'({self.text} / {_text(other)})')
+
+    def __rtruediv__(self, other: Number) -> 'Term':
+        return Term(f'({_text(other)} / {self.text})')
+
+    def __pow__(self, power: int) -> 'Term':
+        return Term(f'({self.text} ** {power!r})')
+
+    def __neg__(self) -> 'Term':
+        return Term(f'(-{self.text})')
+
+
+def _text(value: Number) -> str:
+    return value.text if isinstance(value, Term) else repr(value)
+
+
+def tanh(x: Number) -> Term:
+    """Hyperbolic tangent."""
+    return Term(f'tanh({_text(x)})')
+
+
+def cosh(x: Number) -> Term:
+    """Hyperbolic cosine."""
+    return Term(f'cosh({_text(x)})')
+
+
+def exp(x: Number) -> Term:
+    """Exponential."""
+    return Term(f'exp({_text(x)})')
+
+
+def sin(x: Number) -> Term:
+    """Sine."""
+    return Term(f'sin({_text(x)})')
+
+
+def cos(x: Number) -> Term:
+    """Cosine."""
+    return Term(f'cos({_text(x)})')
+
+
+def sqrt(x: Number) -> Term:
+    """Square root."""
+    return Term(f'sqrt({_text(x)})')
+
+
+def positive(x: Number) -> Term:
+    """max(0, x): differentiable but at 0, where a network that has it states a kink."""
+    return Term(f'(({_text(x)} + Abs({_text(x)})) / 2)')
+
+
+# A cell of a network and its parameters, as the network's equations see them.
+
+#: Which cell each cell hears, from 0.
+Source = tuple[int, ...]
+#: The same, or a rule: cell -> the cell that it hears, counted round.
+Heard = Source | Callable[[int], int]
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A state variable as it stands in the equations of a cell.
+
+    Attributes:
+        variable: of the cell that is heard, from 0.
+        source: the cell that each cell hears; None for itself.
+        delayed: whether it is heard a delay ago.
+
+    """
+
+    variable: int
+    source: Source | None
+    delayed: bool
+
+
+class Cell:
+    """Any cell of a network, as its equations see it."""
+
+    def __init__(self, variables: int, cells: int) -> None:
+        """Begin to note what is heard."""
+        self._variables, self._cells = variables, cells
+        self.arguments: list[Argument] = []
+
+    def now(self, source: Heard | None = None) -> tuple[Term, ...]:
+        """Return the variables of the cell itself, or of those that each cell hears."""
+        return self._heard(source, False)
+
+    def past(self, source: Heard | None = None) -> tuple[Term, ...]:
+        """Return the same as they were a delay ago."""
+        return self._heard(source, True)
+
+    def _heard(self, source: Heard | None, delayed: bool) -> tuple[Term, ...]:
+        if callable(source):
+            source = tuple(source(i) % self._cells for i in range(self._cells))
+        found = []
+        for variable in range(self._variables):
+            one = Argument(variable, None if source is None else tuple(source), delayed)
+            if one not in self.arguments:
+                self.arguments.append(one)
+            found.append(Term(f'x{self.arguments.index(one)}'))
+        return tuple(found)
+
+
+class Parameters:
+    """A network's parameters, as its equations see them: one number, or one for each cell."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        """Offer the parameters by name, and groups that have one for each cell."""
+        self._known = set(names)
+
+    def __getattr__(self, name: str) -> Term:
+        if name not in self._known:
+            raise AttributeError(f"'{name}' is not one of {', '.join(sorted(self._known))}")
+        return Term(f'p_{name}')
+
+
+AnyDefinition = TypeVar('AnyDefinition', bound='NetworkDefinition')
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter's range and meaning.
+
+    Attributes:
+        low: least value that may be set, in the parameter's own unit.
+        high: greatest value, in the same unit.
+        text: what it is, with its unit in brackets if it has one.
+
+    """
+
+    low: float
+    high: float
+    text: str
+
+
+class NetworkDefinition(ABC):
+    """Parameters, cells and equations of a network, as a frozen dataclass of floats.
+
+    Attributes:
+        name: by which it is chosen.
+        cells: how many.
+        states: names of each cell's variables, the one that legs read first.
+        variables: how many these are.
+        readout: what joints follow: the waveform itself of cells that swing as smoothly as joints
+            can, or the phase, which two variables of a cell tell, of cells that jump.
+        delay_parameter: the one that is the delay, '' for an ordinary differential equation.
+        longest_delay: that may be set at run time, model time.
+        needed: parameter that must not be 0 -> what would be lost.
+        step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
+        ranges: parameter -> range in which it may be set at run time.
+        legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
+            gives the leg's phase; the first assignment is the usual one.
+        family: of a network made for another number of legs, the one it is made after.
+        sides: leg -> left or right; where it is not given, robot files give it.
+        girdles: leg -> fore, middle or hind, the same; of two legs neither.
+        muscles: name -> cell from 1, where cells drive muscles: phases are reported for each, and
+            diagrams draw when it is active. Otherwise both are of legs, which stand while their
+            first cell falls.
+        groups: name -> parameters that can be set together under it.
+        own_of_cells: name in the equations -> the parameter that each cell has for it, where
+            they are not to be set together as a group is.
+        kinks: variables at whose zeros the rates have a kink.
+        couplings: parameters without which no cell hears another.
+        offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
+            are a gait and no symmetry tells them.
+        unnamed: the gait whose phases have no name, of such a network.
+        rests: whether a cell without input has an equilibrium, from which gaits emerge.
+        usual_gait: that it starts with; a gait's own name is that of its usual preset.
+        usual_robot: file that it starts with, or name of a shipped one.
+        free: parameters or groups that are usually fitted to a recording.
+        line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.
+        span: how far, or None: up to a multiple of the delay.
+        searched: parameter or group -> bounds within which weights are usually looked for; those
+            with equal bounds are given. Empty: nothing can be looked for.
+        typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
+            that search starts.
+
+    """
+
+    name: ClassVar[str]
+    family: ClassVar['type[Any] | None'] = None
+    cells: ClassVar[int]
+    states: ClassVar[tuple[str, ...]]
+    variables: ClassVar[int]
+    readout: ClassVar[Literal['waveform', 'phase']]
+    delay_parameter: ClassVar[str] = ''
+    longest_delay: ClassVar[float] = 0.0
+    needed: ClassVar[dict[str, str]] = {}
+    step: ClassVar[float]
+    ranges: ClassVar[dict[str, Range]]
+    legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
+    sides: ClassVar[dict[str, str]] = {}
+    girdles: ClassVar[dict[str, str]] = {}
+    muscles: ClassVar[dict[str, int]] = {}
+    groups: ClassVar[dict[str, tuple[str, ...]]] = {}
+    own_of_cells: ClassVar[dict[str, tuple[str, ...]]] = {}
+    kinks: ClassVar[tuple[str, ...]] = ()
+    couplings: ClassVar[tuple[str, ...]] = ()
+    offsets: ClassVar[dict[str, str]] = {}
+    unnamed: ClassVar[str] = ''
+    rests: ClassVar[bool] = True
+    usual_gait: ClassVar[str]
+    usual_robot: ClassVar[str] = ''
+    free: ClassVar[tuple[str, ...]]
+    line: ClassVar[str]
+    span: ClassVar[tuple[float, float] | None] = None
+    searched: ClassVar[dict[str, tuple[float, float]]] = {}
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if hasattr(cls, 'states'):
+            cls.variables = len(cls.states)
+
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network states for another number of legs: attribute -> value.
+
+        One that takes any even number gives its cells, legs, sides and girdles by a rule, and
+        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
+        legs have of their own are named by ``fields``.
+
+        Raises:
+            ValueError: it takes no such number.
+
+        """
+        raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the parameters by name, in their own order."""
+        return {name: getattr(self, name) for name in self.parameters()}
+
+    @classmethod
+    def parameters(cls) -> tuple[str, ...]:
+        """Names of the parameters, in their own order."""
+        return _names(cls)
+
+    @classmethod
+    def members(cls, name: str) -> tuple[str, ...]:
+        """Return the parameters of a group, or the parameter of this name alone.
+
+        Raises:
+            InputError: a name that is neither a parameter nor a group of the network.
+
+        """
+        members = cls.groups.get(name, (name,))
+        if not set(members) <= set(cls.parameters()):
+            known = ', '.join((*cls.groups, *cls.parameters()))
+            raise InputError(f"'{name}' is not one of {known}")
+        return members
+
+    @property
+    def components(self) -> int:
+        """Length of a state."""
+        return self.cells * self.variables
+
+    @property
+    def delay(self) -> float:
+        """How far back the rates look, model time; 0 for an ordinary differential equation."""
+        return float(getattr(self, self.delay_parameter)) if self.delay_parameter else 0.0
+
+    @staticmethod
+    @abstractmethod
+    def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
+        """Return the rate of each variable of a cell, written once for all cells.
+
+        Args:
+            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
+                cells that each cell hears, ``cell.past(source)`` the same a delay ago. The source
+                is a cell for each cell, or a function that gives it, counted round.
+            p: the parameters, and groups of them that have one for each cell, by name.
+
+        """
+
+    @classmethod
+    @abstractmethod
+    def gaits(cls) -> tuple[str, ...]:
+        """Names of the gaits it knows."""
+
+    @classmethod
+    def by_cell(cls) -> dict[str, tuple[str, ...]]:
+        """Names that stand in the equations for a parameter of each cell -> these parameters."""
+        return {**{name: members for name, members in cls.groups.items()
+                   if len(members) == cls.cells}, **cls.own_of_cells}
+
+
+def leg_count(network: type[NetworkDefinition]) -> int:
+    """Return how many legs a network has."""
+    return len(next(iter(network.legs.values())))
+
+
+@cache
+def _names(network: type[NetworkDefinition]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(network))  # type: ignore[arg-type]

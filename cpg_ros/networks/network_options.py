@@ -1,0 +1,130 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The options --network, --presets, --preset and --set: a network and its parameters."""
+
+from argparse import ArgumentParser, Namespace
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.command_line import assignment, refuse_repeated
+from cpg_ros.common.errors import InputError
+from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.presets import PresetError, read_presets
+from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
+import numpy as np
+
+#: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
+LARGEST = 1e6
+DEFAULT = 'delayed'
+
+
+def add_network_options(parser: ArgumentParser) -> None:
+    """Add the options to a tool's."""
+    parser.add_argument('--network', metavar='NAME',
+                        help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
+                        f'one (default: {DEFAULT}, or that of --presets)')
+    parser.add_argument('--presets', type=Path, metavar='FILE', help='take --preset from this '
+                        'file: preset.yaml of optimize, or the parameter file of inversion')
+    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
+                        'parameters not given by --set, or that of --presets (default: the only '
+                        'one of --presets, or ' + ', '.join(
+                            f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
+    parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
+                        metavar='PARAMETER=VALUE', help='parameter values, such as c=6.5 tau=0.4; '
+                        'w_a sets all four weights of the biped')
+
+
+def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
+    """Return the network, the presets to choose from, and the name of the default one or ''."""
+    name, file = args.network or DEFAULT, args.presets
+    reader = None if file is None else YamlReader(file, 'preset file', PresetError, LARGEST)
+    tree = reader.tree() if reader else {}
+    fitted = tree.get('/**') if isinstance(tree, dict) else None
+    if reader and args.network is None:
+        inner = fitted.get('ros__parameters') if isinstance(fitted, dict) else tree
+        if not isinstance(inner, dict) or 'network' not in inner:
+            raise reader.fail('network', 'is not given')
+        name = reader.text(inner['network'], 'network')
+    try:
+        kind = find_network(name)
+    except NetworkError as error:
+        raise InputError(f'{"--network" if args.network else file or "--network"}: {error}'
+                         ) from error
+    if not reader:
+        return kind, kind.presets(), kind.usual_gait
+    presets = read_presets(file, kind) if fitted is None else _fitted(reader, fitted, kind)
+    return kind, presets, next(iter(presets)) if len(presets) == 1 else ''
+
+
+def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Preset]:
+    """Return what a parameter file of the generator, as inversion writes it, runs: one gait."""
+    inner = reader.keys(tree, '/**', {'ros__parameters'})['ros__parameters']
+    where = '/**.ros__parameters'
+    inner = reader.keys(inner, where, {'gait', kind.name},
+                        {'network', 'robot', 'frequency', 'amplitude'})
+    gait = reader.text(inner['gait'], f'{where}.gait')
+    if gait not in kind.gaits():
+        raise reader.fail(f'{where}.gait', f"'{gait}' is not one of {', '.join(kind.gaits())}")
+    where = f'{where}.{kind.name}'
+    values = reader.keys(inner[kind.name], where, set(kind.parameters()))
+    return {gait: Preset(gait, kind(*(reader.number(values[name], f'{where}.{name}')
+                                      for name in kind.parameters())))}
+
+
+def chosen_network(args: Namespace) -> Network:
+    """Return the network that the options choose; errors as of chosen_preset."""
+    return chosen_preset(args)[1]
+
+
+def chosen_preset(args: Namespace) -> tuple[Preset, Network]:
+    """Return the preset that the options choose, and its parameters, some of them changed.
+
+    Raises:
+        InputError: an unknown name, or a value that makes no sense; the message says which.
+        PresetError: the file of --presets cannot be used.
+
+    """
+    kind, presets, default = _presets(args)
+    name = args.preset or default
+    if name not in presets:
+        wrong = f"'{name}' is not one of" if name else f'{args.presets} has several, choose from'
+        raise InputError(f'--preset: {wrong} {", ".join(presets)}')
+    preset = presets[name]
+    network = preset.network
+    refuse_repeated('--set', [member for key, _ in args.set
+                              for member in kind.groups.get(key, (key,))])
+    for key, value in args.set:
+        if key not in (*kind.parameters(), *kind.groups):
+            known = ', '.join((*kind.groups, *kind.parameters()))
+            raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "
+                             f'{known}')
+        if not np.isfinite(value):
+            raise InputError(f'--set: {key} is {value:g}, it must be finite')
+        if abs(value) > LARGEST:
+            raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
+        members = kind.groups.get(key, (key,))
+        network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
+    delay = kind.delay_parameter
+    if delay and network.delay <= 0.0:
+        raise InputError(f'--set: {delay} is {network.delay:g}, a delay must be positive')
+    if network.delay > kind.longest_delay > 0.0:
+        raise InputError(f'--set: {delay} is {network.delay:g}, delays go up to '
+                         f'{kind.longest_delay:g}: use another unit of time')
+    for key, lost in kind.needed.items():
+        if network.as_dict()[key] == 0.0:
+            raise InputError(f'--set: {key} is 0: {lost}')
+    return preset, network

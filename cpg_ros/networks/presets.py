@@ -1,0 +1,135 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Preset files: named parameter sets with the gait each of them runs and a state on its orbit."""
+
+from dataclasses import dataclass
+from functools import cache
+import inspect
+from pathlib import Path
+from typing import Any, Generic
+
+from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.common.files import resource_folder, write_atomically
+from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.networks.definition import AnyDefinition
+import yaml
+
+#: No number in a preset is larger.
+LARGEST = 1e3
+
+
+@dataclass(frozen=True, repr=False)
+class Preset(ShortRepr, Generic[AnyDefinition]):
+    """A named parameter set and the gait it runs.
+
+    Attributes:
+        gait: one of the network's gaits.
+        network: parameters.
+        start: a state on the gait's orbit, shape (components,), to distinguish it from other
+            orbits and from rest; None where the solver finds it by itself.
+        period: of that orbit, model time, to about a per cent.
+
+    """
+
+    gait: str
+    network: AnyDefinition
+    start: tuple[float, ...] | None = None
+    period: float = 0.0
+
+    def _summary(self) -> str:
+        return f'{self.gait} of {self.network.name}: ' + ', '.join(
+            f'{name} {value:.6g}' for name, value in self.network.as_dict().items())
+
+
+class PresetError(CpgError):
+    """A preset file cannot be used; the message names the file, the key and the reason."""
+
+
+def read_presets(path: str | Path, network: type[AnyDefinition]
+                 ) -> dict[str, Preset[AnyDefinition]]:
+    """Read a preset file of a network: name -> preset.
+
+    Raises:
+        PresetError: the file cannot be read, is for another network, or has a bad value.
+
+    """
+    reader = YamlReader(Path(path), 'preset file', PresetError, LARGEST)
+    tree = reader.keys(reader.tree(), 'file', {'network', 'presets'})
+    if tree['network'] != network.name:
+        raise reader.fail('network', f"is '{tree['network']}', not '{network.name}'")
+    if not isinstance(tree['presets'], dict) or not tree['presets']:
+        raise reader.fail('presets', 'must be a mapping with at least one name')
+    found = {}
+    for name, entry in tree['presets'].items():
+        where = f'presets.{name}'
+        entry = reader.keys(entry, where, {'gait', 'parameters'}, {'start', 'period'})
+        gait = reader.text(entry['gait'], f'{where}.gait')
+        if gait not in network.gaits():
+            raise reader.fail(f'{where}.gait', f"'{gait}' is not one of "
+                              f'{", ".join(network.gaits())}')
+        names = network.parameters()
+        values = reader.keys(entry['parameters'], f'{where}.parameters', set(names))
+        numbers = [reader.number(values[key], f'{where}.parameters.{key}') for key in names]
+        for key, value in zip(names, numbers, strict=True):
+            allowed = network.ranges[key]
+            if not allowed.low <= value <= allowed.high:
+                raise reader.fail(f'{where}.parameters.{key}', f'{value:g} is not from '
+                                  f'{allowed.low:g} to {allowed.high:g}')
+        parameters = network(*numbers)
+        if ('start' in entry) != ('period' in entry):
+            raise reader.fail(where, "'start' and 'period' go together")
+        if 'start' not in entry:
+            found[name] = Preset(gait, parameters)
+            continue
+        if parameters.delay:
+            raise reader.fail(f'{where}.start', f'is not for the network {network.name}, which '
+                              'has a delay')
+        start = [reader.number(value, f'{where}.start[{k}]')
+                 for k, value in enumerate(reader.items(entry['start'], f'{where}.start'))]
+        if len(start) != parameters.components:
+            raise reader.fail(f'{where}.start', f'has {len(start)} numbers, not '
+                              f'{parameters.components}: the first variable of each cell, then '
+                              'the second')
+        period = reader.number(entry['period'], f'{where}.period')
+        if period <= 0.0:
+            raise reader.fail(f'{where}.period', f'{period:g} must be positive')
+        found[name] = Preset(gait, parameters, tuple(start), period)
+    return found
+
+
+@cache
+def own_presets(network: type[AnyDefinition]) -> dict[str, Preset[AnyDefinition]]:
+    """Read a network's own presets: of the file beside its module, or the shipped one.
+
+    Raises:
+        PresetError: as of read_presets.
+
+    """
+    beside = Path(inspect.getfile(network)).with_suffix('.yaml')
+    shipped = resource_folder() / 'config' / 'presets' / f'{network.name}.yaml'
+    return read_presets(beside if beside.is_file() else shipped, network)
+
+
+def write_presets(path: str | Path, network: type[AnyDefinition],
+                  presets: dict[str, Preset[AnyDefinition]], comment: str = '') -> None:
+    """Write a preset file."""
+    tree: dict[str, Any] = {'network': network.name, 'presets': {}}
+    for name, preset in presets.items():
+        tree['presets'][name] = {
+            'gait': preset.gait, 'parameters': preset.network.as_dict(),
+            **({'start': list(preset.start), 'period': preset.period} if preset.start else {})}
+    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
+    write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                                  width=96))

@@ -1,0 +1,561 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The base class of bridges: drives a robot by what a generator publishes.
+
+A bridge adds its robot's messages, limits and numbers: CONTRIBUTING.md, section Add a bridge.
+"""
+
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+import math
+import signal
+import threading
+import time
+from typing import Any, ClassVar
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.bridges.robot_state import BridgeSettings, JointCommand, RobotState
+from cpg_ros.ros.bridges.supervisor import ACTIVE, BridgeState, Supervisor
+from cpg_ros.ros.bridges.watchdog_link import (
+    address,
+    listening,
+    NameTaken,
+    RobotInterface,
+    WatchdogLink,
+)
+from cpg_ros.ros.command_topics import Commands, KINDS, KpScaleSubscription
+from cpg_ros.ros.node.health import Health, HealthPublisher, NAMELESS, others_on, STEADY
+from cpg_ros.ros.node.logging import QUEUE
+from cpg_ros.ros.node.node_base import StartedNode, StartError, termination_signals
+from cpg_ros.ros.node.parameters import fixed, Spec
+from cpg_ros.ros.node.polled import command_qos, latched, PolledSubscription
+from cpg_ros.ros.node.ticker import Ticker
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+# The loop of a bridge: reads states and targets, steps the state machine, sends commands.
+
+#: At the end, the robot is damped for this long, s.
+REST = 1.0
+
+
+class BridgeLoop(StartedNode):
+    """One thread reads states and targets and sends commands; requests wait for it.
+
+    Attributes:
+        interface: topics and messages of the robot.
+        specs: of all parameters, see ``bridge_specs``.
+        robot: of the robot file.
+        supervisor: the state machine.
+        dry: whether nothing is sent.
+        topic: of the commands, resolved.
+        received: number of states so far.
+        sent: number of commands so far.
+        watchdog: connection to the watchdog; None in a dry run.
+
+    """
+
+    interface: ClassVar[type[RobotInterface]]
+    specs: ClassVar[Mapping[str, Spec]]
+
+    def __init__(self, state: RobotState) -> None:
+        """Declare the parameters, check them, and prepare to start.
+
+        Args:
+            state: into which the robot's states are read.
+
+        Raises:
+            CpgError: a parameter, the robot file or the messages cannot be used.
+
+        """
+        interface = self.interface
+        # A real robot has no simulated time.
+        super().__init__(interface.bridge_name(),
+                         parameter_overrides=[Parameter('use_sim_time', value=False)])
+        self._declare(fixed(self.specs))
+        self._one_of('command', KINDS)
+        value, period = self._value, 1.0 / self._value('rate')
+        self.dry: bool = value('dry_run')
+        command_type, state_type = interface.command_type(), interface.state_type()
+        self.robot = load_robot(value('robot'))
+        common = {'period': period, 'target_timeout': value('target_timeout'),
+                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4,
+                  'tracking_error': math.inf if self.dry else value('tracking_error'),
+                  'tracking_time': value('tracking_time')}
+        # Of what some robots do not measure, their bridges have no parameter.
+        if 'tilt' in self.specs:
+            common['tilt'] = math.radians(value('tilt'))
+        if 'hottest' in self.specs:
+            common['hottest'] = value('hottest')
+        settings = self.make_settings(self.robot, common)
+        self._order = np.array([self.robot.order.index(name) for name in settings.names])
+        self._changes: deque[tuple[BridgeState, str]] = deque()
+        self.supervisor = Supervisor(settings, state, self.make_command(),
+                                     lambda *change: self._changes.append(change))
+        self.topic = topic = self.resolve_topic_name(interface.command_topic)
+        domain = self.context.get_domain_id()
+        self._publisher: Publisher | None = None
+        self.watchdog: WatchdogLink | None = None
+        if not self.dry:
+            try:
+                self._lock = listening(address(interface.maker, 'bridge', domain, topic))
+            except NameTaken as error:
+                raise StartError(f'another bridge on this computer commands the robot on {topic} '
+                                 f'in domain {domain} already: {error}') from error
+            self._publisher = self.create_publisher(command_type, topic, command_qos())
+            self.watchdog = WatchdogLink(interface, domain, self.get_namespace(), topic,
+                                         period, value('watchdog_timeout')
+                                         or value('state_timeout'))
+        self._states = PolledSubscription(self, state_type, interface.state_topic,
+                                          raw=interface.raw_states)
+        self._commands = Commands(self, self.robot, value('command'), period,
+                                  settings.stand.take(self._order.argsort()))
+        self._kp_scale = KpScaleSubscription(self)
+        self._every = (max(1, round(value('rate') / value('sensor_rate')))
+                       if 'sensor_rate' in self.specs else 1)
+        self._requests: deque[Callable[[float], None]] = deque()
+        self._ending = self._new = False
+        self.received = self.sent = 0
+        self._state_publisher = self.create_publisher(String, '~/state', latched())
+        self._state_publisher.publish(String(data=BridgeState.IDLE.value))
+        self.ticker = Ticker(self, value('rate'), self._tick, lambda: None, self._fail,
+                             lambda _: None)
+
+    # -- what a bridge adds ---------------------------------------------------------------
+
+    def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
+        """Return joints, gains, torques and poses, with ``common`` as further settings.
+
+        Raises:
+            CpgError: a parameter or the robot file cannot be used.
+
+        """
+        raise NotImplementedError
+
+    def make_command(self) -> JointCommand:
+        """Return a command to be filled; that of the interface, unless joints are configured."""
+        return self.interface.make_command()
+
+    def stop_pressed(self) -> str:
+        """Return which stop button the last state reports as pressed, or ''."""
+        return ''
+
+    def publish_measurements(self, stamp: int) -> None:
+        """Publish the last state, stamp in ns; at most at ``sensor_rate``."""
+
+    # -- the thread -----------------------------------------------------------------------
+
+    def _tick(self, dt: float, stamp: int) -> None:
+        now, supervisor = time.monotonic(), self.supervisor
+        self._take_state(now)
+        self._take_targets(now)
+        supervisor.kp_scale = self._kp_scale.take(now)
+        while self._requests:
+            self._requests.popleft()(now)
+        # Before anything is sent: joints that have given way must not be driven back at once.
+        if self.watchdog is not None and self.watchdog.acted():
+            supervisor.damp(now, 'the watchdog has damped the robot: the bridge was silent')
+        if supervisor.step(now):
+            message = supervisor.command.encode()
+            if self._publisher is not None:
+                self._publisher.publish(message)
+                self.sent += 1
+            if self.watchdog is not None and (
+                    fault := self.watchdog.tick(supervisor.damping, now)):
+                supervisor.sit(now, fault)
+        # The robot comes first.
+        while self._changes:
+            self._report(*self._changes.popleft())
+        if self._new and not self.ticker.ticks % self._every:
+            self.publish_measurements(stamp)
+            self._new = False
+        if self._ending and self._resting(now):
+            self.stop.set()
+            self.ticker.end()
+
+    def _take_state(self, now: float) -> None:
+        last = None
+        for message, _ in self._states.take():
+            last = message
+            self.received += 1
+        if last is not None and self.supervisor.robot.read(last):
+            self._new = True
+            self.supervisor.state_received(now)
+            if reason := self.stop_pressed():
+                self._halt(reason, now)
+
+    def _take_targets(self, now: float) -> None:
+        complete = self._commands.take()
+        if self._commands.refused:
+            self.supervisor.reject_target(self._commands.refused, now)
+        if complete:
+            self._commands.expect(0)
+            self.supervisor.set_target(self._commands.angles[self._order], now)
+
+    def _report(self, state: BridgeState, reason: str) -> None:
+        """Log and publish a new state."""
+        severity = {BridgeState.DAMPING: LoggingSeverity.ERROR,
+                    BridgeState.SITTING: LoggingSeverity.WARN}
+        self.get_logger().log(f'{state.value}: {reason}',
+                              severity.get(state, LoggingSeverity.INFO))
+        self._state_publisher.publish(String(data=state.value))
+
+    def _halt(self, reason: str, now: float) -> None:
+        """Damp at once, and cancel a start under way."""
+        self._cancel_start(reason)
+        self.supervisor.damp(now, reason)
+
+    def _cancel_start(self, reason: str) -> None:
+        """Cancel a start under way."""
+        raise NotImplementedError
+
+    def _resting(self, now: float) -> bool:
+        state = self.supervisor.state
+        return state is BridgeState.IDLE or (state is BridgeState.DAMPING
+                                             and self.supervisor.time_in_state(now) > REST)
+
+
+# The start of a bridge, step by step, in a thread of its own; a step that fails ends it.
+
+#: Sleeps for some seconds; raises StartRefused once the start is cancelled.
+Wait = Callable[[float], None]
+
+
+class StartRefused(CpgError):
+    """The robot is not started; the message is one line for the user."""
+
+
+class StartSequence(threading.Thread):
+    """Carries out steps one after another."""
+
+    def __init__(self, steps: Sequence[Callable[[Wait], None]], on_end: Callable[[str], None]
+                 ) -> None:
+        """Prepare to start.
+
+        Args:
+            steps: each is called with a function that waits, and raises StartRefused to refuse.
+            on_end: called with why the robot was not started, or ''.
+
+        """
+        super().__init__(name='start', daemon=True)
+        self._steps, self._on_end = steps, on_end
+        self._cancelled = threading.Event()
+        self._reason = ''
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether the start was cancelled."""
+        return self._cancelled.is_set()
+
+    def cancel(self, reason: str) -> None:
+        """Cancel the start at its next wait or step."""
+        self._reason = reason
+        self._cancelled.set()
+
+    def run(self) -> None:
+        """Carry out the steps."""
+        reason = ''
+        try:
+            for step in self._steps:
+                self._wait(0.0)
+                step(self._wait)
+        except StartRefused as error:
+            reason = str(error)
+        except Exception as error:
+            # Whatever else goes wrong, the robot has not been touched.
+            reason = f'{type(error).__name__}: {error}'
+        self._on_end(reason)
+
+    def _wait(self, seconds: float) -> None:
+        if self._cancelled.wait(seconds):
+            raise StartRefused(self._reason)
+
+
+#: How often the network is checked for others who command the robot, s.
+CHECK = 0.1
+#: How long a start waits for the first state, s.
+STATE = 10.0
+#: Two programs on a network have discovered each other after this time, s.
+DISCOVERY = 1.0
+#: The network forgets a bridge that was killed after this time, s.
+FORGOTTEN = 25.0
+#: Signals within this time, s, are one: Ctrl-C comes from the terminal and from what launched us.
+ONE_PRESS = 0.5
+
+
+class BridgeNode(BridgeLoop):
+    """Starts, stops and monitors the loop.
+
+    A subclass sets ``interface`` and ``specs`` and overrides ``make_settings``. The other public
+    methods, here and in ``BridgeLoop``, have defaults.
+
+    Attributes:
+        state_hint: what to check if the robot sends no state, added to the message.
+
+    """
+
+    state_hint: ClassVar[str] = ''
+
+    def __init__(self, state: RobotState) -> None:
+        """Declare the parameters, check them, and prepare to start; as the base class does."""
+        super().__init__(state)
+        self._start: StartSequence | None = None
+        self._refusal = self._hazard = self._conflict = ''
+        self._ended_at = 0.0
+        self.create_service(Trigger, '~/stop', self._stop)
+        self.create_service(Trigger, '~/damp', self._damp)
+        self.create_service(Trigger, '~/start', self._start_again)
+        self._before = 0, 0, 0
+        self._health = HealthPublisher(self, 'robot', self.robot.name, self._report_health)
+        self._timer = self.create_timer(CHECK, self._check_network, clock=STEADY)
+        self._warn_of_unknown()
+
+    # -- what a bridge may add ------------------------------------------------------------
+
+    @property
+    def title(self) -> str:
+        """What the robot is called in the log."""
+        return self.robot.name
+
+    def prepare(self, wait: Wait) -> None:
+        """Prepare the robot for commands, such as by ending its own motion modes.
+
+        Called at every start, in a thread of its own; ``wait`` sleeps, s.
+
+        Raises:
+            StartRefused: the robot cannot be commanded, or the start was cancelled.
+
+        """
+
+    def network_hazard(self) -> str:
+        """Return what on the network endangers the robot, and what to do, or ''."""
+        return ''
+
+    def publish_slow_measurements(self, stamp: int) -> None:
+        """Publish what changes slowly, such as the battery, once a second; stamp in ns."""
+
+    def measured_values(self) -> Mapping[str, object]:
+        """Return values for /diagnostics, such as temperatures, by name."""
+        return {}
+
+    def dry_report(self) -> str:
+        """Return what the last command would ask of the motors, for the log of a dry run."""
+        command, robot = self.supervisor.command, self.supervisor.robot
+        torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
+        return f'the largest torque would be {abs(torque).max():.1f} N m'
+
+    # -- start ----------------------------------------------------------------------------
+
+    def _begin_start(self) -> None:
+        self._start = StartSequence(
+            [self._await_state, self._check_publishers, self._start_watchdog, self.prepare,
+             self._check_publishers, self._rise], self._started)
+        self._start.start()
+
+    def _started(self, refusal: str) -> None:
+        self._start, self._refusal = None, refusal
+        if refusal:
+            self.get_logger().error(f'not started: {refusal}')
+
+    def log_step(self, text: str) -> None:
+        """Log a step of the start."""
+        self.get_logger().info(f'start: {text}')
+
+    def _await_state(self, wait: Wait) -> None:
+        end = time.monotonic() + STATE
+        while not self.received:
+            if time.monotonic() > end:
+                name = self.interface.state_type().__name__
+                raise StartRefused(f'no {name} for {STATE:g} s{self.state_hint}')
+            wait(0.02)
+        self.log_step('the robot is heard')
+
+    def _others(self) -> str:
+        """Return who else commands the robot, or ''."""
+        return others_on(self, self.topic, int(not self.dry), self._value('own_publishers'),
+                         f'{self.get_namespace().rstrip("/")}/{self.interface.watchdog_name()}')
+
+    def _check_publishers(self, wait: Wait) -> None:
+        if self._hazard:
+            raise StartRefused(self._hazard)
+        end, logged = time.monotonic() + FORGOTTEN, False
+        while (conflict := self._find_conflict())[0]:
+            text, of_one_name = conflict
+            if not of_one_name or time.monotonic() > end:
+                raise StartRefused(text)
+            if not logged:
+                self.log_step(f'waiting until a node that was killed is forgotten: {text}')
+            logged = True
+            wait(0.1)
+        self.log_step('nobody else commands it')
+
+    def _start_watchdog(self, wait: Wait) -> None:
+        if self.watchdog is not None and (refusal := self.watchdog.start()):
+            raise StartRefused(refusal)
+        # So that the robot knows its publisher, too, before it is needed.
+        wait(DISCOVERY)
+
+    def _rise(self, wait: Wait) -> None:
+        """Let the thread that commands begin to rise."""
+        answer: deque[str] = deque()
+        start = self._start
+
+        def rise(now: float) -> None:
+            wanted = start is not None and not start.cancelled and not self._ending
+            answer.append(self.supervisor.rise(now) if wanted else 'it is stopped')
+
+        self._requests.append(rise)
+        while not answer:
+            if self.stop.wait(0.001):
+                raise StartRefused('the bridge ends')
+        if answer[0]:
+            raise StartRefused(answer[0])
+
+    # -- services and timers --------------------------------------------------------------
+
+    def _stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Sit down, then damp, in any state."""
+        state = self.supervisor.state
+        message = ('it sits down, then damps' if state in ACTIVE else
+                   'the start is cancelled' if self._start is not None else f'it is {state.value}')
+        # Not in the loop's thread: a start that is asked for after this must not be cancelled.
+        self._cancel_start('~/stop')
+        self._requests.append(lambda now: self.supervisor.sit(now, '~/stop'))
+        response.success, response.message = True, message
+        return response
+
+    def _damp(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Damp at once, in any state."""
+        self._cancel_start('~/damp')
+        self._requests.append(lambda now: self.supervisor.damp(now, '~/damp'))
+        response.success, response.message = True, 'damping'
+        return response
+
+    def _start_again(self, request: Trigger.Request, response: Trigger.Response
+                     ) -> Trigger.Response:
+        state = self.supervisor.state
+        if state in ACTIVE or self._start is not None or self._ending:
+            response.message = ('it is being started already' if self._start is not None else
+                                f'it is {state.value}')
+            return response
+        self._begin_start()
+        response.success, response.message = True, 'starting: ~/state and the log say how it goes'
+        return response
+
+    def _check_network(self) -> None:
+        """Look for others who command the robot, and for what endangers it."""
+        if (hazard := self.network_hazard()) and not self._hazard:
+            self._hazard = hazard
+            self.get_logger().error(hazard)
+        before, (self._conflict, _) = self._conflict, self._find_conflict()
+        if self._conflict and self.supervisor.state in ACTIVE:
+            reason = self._conflict
+            self._requests.append(lambda now: self.supervisor.sit(now, reason))
+        # The name of a node may be known later than its publisher.
+        if self._conflict and self._conflict != before and NAMELESS in before:
+            self.get_logger().error(self._conflict)
+
+    def _find_conflict(self) -> tuple[str, bool]:
+        """Return who commands the robot beside the bridge, or sends targets beside a generator.
+
+        The text is '' for nobody. The second value is whether all have one name, as a node has
+        that was killed and started again, until the network forgets it.
+        """
+        if names := self._others():
+            return (f'the robot is commanded by {names}, too',
+                    names == self.get_fully_qualified_name())
+        for topic in self._commands.topics if self._value('exclusive') else ():
+            if names := others_on(self, topic, 0, 1):
+                return (f'{topic} is published by {names}: only one may publish it (exclusive)',
+                        len(set(names.split(', '))) == 1)
+        return '', False
+
+    def _report_health(self) -> Health:
+        """Publish what changes slowly, and return the status.
+
+        ERROR while the robot sits down or is damped, or was not started; WARN while it is silent.
+        """
+        supervisor, ticker, before = self.supervisor, self.ticker, self._before
+        self._before = counts = ticker.ticks, self.received, self.sent
+        ticks, received, sent = (new - old for new, old in zip(counts, before, strict=True))
+        state = supervisor.state
+        if received:
+            self.publish_slow_measurements(self.get_clock().now().nanoseconds)
+        if self.dry and state is not BridgeState.IDLE:
+            self.get_logger().info(f'dry run: {state.value}, {self.dry_report()}')
+        if state in (BridgeState.DAMPING, BridgeState.SITTING):
+            level, text = DiagnosticStatus.ERROR, f'{state.value}: {supervisor.reason}'
+            if self._conflict and self._conflict not in text:
+                text += f'; {self._conflict}'
+        elif self._refusal and state is BridgeState.IDLE:
+            level, text = DiagnosticStatus.ERROR, f'not started: {self._refusal}'
+        elif not received:
+            level, text = DiagnosticStatus.WARN, 'the robot is not heard'
+        else:
+            level, text = DiagnosticStatus.OK, state.value + ' (dry run)' * self.dry
+        return level, text, {
+            'phase': state.value, 'ticks in the last second': ticks,
+            'states in the last second': received, 'commands in the last second': sent,
+            'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
+            'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
+            'largest tracking error [rad]': supervisor.tracking.worst,
+            'log lines dropped': QUEUE.dropped, **self.measured_values()}
+
+    # -- beginning and end ----------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start the thread, and raise the robot to its stand unless that waits for ~/start."""
+        for number in termination_signals():
+            signal.signal(number, self._leave)
+        self.get_logger().info(
+            f"{'dry run: ' * self.dry}a {self.title} at {self._value('rate'):g} Hz; "
+            'commands from ' + ', '.join(self._commands.topics))
+        self.ticker.start()
+        if self._value('autostart'):
+            self._begin_start()
+
+    def _leave(self, number: int, _: Any) -> None:
+        """Sit down, damp, and end; at a signal that was given once more, damp at once."""
+        name, now = signal.Signals(number).name, time.monotonic()
+        again, self._ending = self._ending, True
+        if again and now < self._ended_at + ONE_PRESS:
+            return
+        self._ended_at = now
+        self._requests.append(lambda now: self._halt(f'{name} again', now) if again
+                              else self._sit_down(name, now))
+
+    def _sit_down(self, reason: str, now: float) -> None:
+        self._cancel_start(reason)
+        self.supervisor.sit(now, reason)
+
+    def _cancel_start(self, reason: str) -> None:
+        # Read once: the thread of the start clears it at its end.
+        if (start := self._start) is not None:
+            start.cancel(reason)
+
+    def finish(self) -> None:
+        """End the threads; the watchdog, too, if the robot is at rest."""
+        self.ticker.end()
+        self.ticker.join(timeout=1.0)
+        self._cancel_start('the bridge ends')
+        if self.watchdog is not None and self.failure is None:
+            self.watchdog.end()

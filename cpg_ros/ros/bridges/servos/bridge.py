@@ -1,0 +1,90 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node ``servo_bridge``: drives a robot of servo motors by what a generator publishes."""
+
+import secrets
+import sys
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.motion.robot import Robot
+from cpg_ros.ros.bridges.bridge import BridgeNode
+from cpg_ros.ros.bridges.robot_state import (
+    bridge_specs,
+    BridgeSettings,
+    motor_places,
+    settings_for,
+)
+from cpg_ros.ros.bridges.servos.calibration import load_calibration
+from cpg_ros.ros.bridges.servos.interfaces import ServoCommand, Servos, ServoState
+from cpg_ros.ros.node.node_base import run
+from cpg_ros.ros.node.parameters import fixed, Spec
+import numpy as np
+
+NAME = Servos.bridge_name()
+#: Servos limit their torque themselves and measure no tilt or temperature.
+ABSENT = 'torque_factor', 'tilt', 'hottest', 'sensor_rate'
+SPECS = fixed({
+    **{name: spec for name, spec in bridge_specs('', calibration=Spec(
+        '', 'calibration file of the servos', constraints='the path of a YAML file')).items()
+       if name not in ABSENT},
+    'rate': Spec(50.0, 'commands per second [Hz]', 10.0, 200.0),
+    # Servos that hold their last angle do not mind a computer that is late.
+    'state_timeout': Spec(0.5, 'time without a new state, or without a tick of the bridge, after '
+                          'which the servos are let go [s]', 0.05, 5.0)})
+
+
+class ServoBridge(BridgeNode):
+    """Commands of a generator as angles for ``servo_bus``."""
+
+    interface, specs = Servos, SPECS
+    state_hint = ': is servo_bus running, and do all servos answer?'
+
+    def __init__(self) -> None:
+        """Declare the parameters, check them, and prepare to start."""
+        self._state = ServoState()
+        super().__init__(self._state)
+
+    def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
+        """Return the settings of the robot file, in the order of the calibration file."""
+        if not self._value('calibration'):
+            raise InputError('parameter calibration is empty: name the calibration file')
+        calibration = load_calibration(self._value('calibration'))
+        joints = calibration.joints
+        self._state.expect(joints)
+        ones = np.ones(len(joints))
+        # Infinite torque: a servo goes to its angle with what it has.
+        return settings_for(robot, motor_places(robot, joints, 'these servos'), kp=ones,
+                            kd=0.0 * ones, torque=np.inf * ones, lying=calibration.rest, **common)
+
+    def make_command(self) -> ServoCommand:
+        """Return a command for the joints of the calibration file."""
+        # Two bridges of one name are two senders, too.
+        return ServoCommand(len(self._state.q),
+                            f'{self.get_fully_qualified_name()} {secrets.token_hex(4)}')
+
+    def dry_report(self) -> str:
+        """Return how far the servos would have to go."""
+        away = np.abs(self.supervisor.command.q - self._state.q).max()
+        return f'the largest way to a commanded angle would be {away:.2f} rad'
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until a signal ends it; return the exit code."""
+    return run(ServoBridge, NAME, 'Leads a robot of servos by what a generator publishes.', SPECS,
+               args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

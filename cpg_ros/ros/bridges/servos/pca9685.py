@@ -1,0 +1,118 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Hobby servos on a PCA9685, which makes the pulses: its registers, over Linux's I2C.
+
+Registers, prescaler and the order of switching on are those of NXP's PCA9685 product data sheet,
+revision 4 (16 April 2015), sections 7.3 to 7.3.5.
+"""
+
+import fcntl
+import os
+import time
+from typing import Protocol
+
+from cpg_ros.ros.bridges.servos.serial_board import ServoBoard
+import numpy as np
+
+#: Registers, table 4: LED0_ON_L, four for each channel; the last three are those of all channels.
+MODE1, LED0, ALL_OFF_H, PRE_SCALE = 0x00, 0x06, 0xFD, 0xFE
+#: Bits of MODE1, table 5: auto-increment of the register, and the oscillator off.
+AUTO_INCREMENT, SLEEP = 0x20, 0x10
+#: Bit 4 of an OFF_H register, table 7: no pulses.
+FULL_OFF = 0x10
+#: Of the internal oscillator, Hz, and counts a pulse's period has.
+OSCILLATOR, COUNTS = 25e6, 4096
+#: The oscillator runs this long after it was switched on, s (500 us in section 7.3.1.1).
+STARTED = 0.001
+#: Request of ioctl that sets the address of a device, linux/i2c-dev.h.
+I2C_SLAVE = 0x0703
+
+
+class Bus(Protocol):
+    """Writes to one device on an I2C bus."""
+
+    def write(self, data: bytes) -> None:
+        """Write a register's number and its content."""
+
+    def close(self) -> None:
+        """Give the bus back."""
+
+
+class LinuxI2c:
+    """A device on an I2C bus of Linux, by its character device."""
+
+    def __init__(self, path: str, address: int) -> None:
+        """Open a bus such as ``/dev/i2c-1``; raise an OSError if that fails."""
+        self._file = os.open(path, os.O_RDWR)
+        try:
+            fcntl.ioctl(self._file, I2C_SLAVE, address)
+        except OSError:
+            os.close(self._file)
+            raise
+
+    def write(self, data: bytes) -> None:
+        """Write one message; the kernel raises an OSError if the device does not acknowledge."""
+        os.write(self._file, data)
+
+    def close(self) -> None:
+        """Close the character device."""
+        os.close(self._file)
+
+
+def prescale(frequency: float) -> int:
+    """Return PRE_SCALE for a frequency of pulses, Hz: equation 1 of section 7.3.5."""
+    return round(OSCILLATOR / (COUNTS * frequency)) - 1
+
+
+class Pca9685(ServoBoard):
+    """Up to 16 servos by pulses, in microseconds; where they are cannot be measured."""
+
+    def __init__(self, bus: Bus, channels: tuple[int, ...], frequency: float) -> None:
+        """Switch all pulses off, and set their frequency.
+
+        Args:
+            bus: to the device.
+            channels: of the servos, 0 to 15.
+            frequency: of the pulses, Hz.
+
+        """
+        self._bus, self._channels = bus, channels
+        scale = prescale(frequency)
+        # A count has this many microseconds: what PRE_SCALE was rounded to, not what was wanted.
+        self._count = 1e6 * (scale + 1) / OSCILLATOR
+        self.detach()
+        # PRE_SCALE can be written while the oscillator is off only.
+        for register, value in ((MODE1, AUTO_INCREMENT | SLEEP), (PRE_SCALE, scale),
+                                (MODE1, AUTO_INCREMENT)):
+            bus.write(bytes((register, value)))
+        time.sleep(STARTED)
+
+    def write(self, units: np.ndarray) -> None:
+        """Make pulses of these lengths, us; each begins with its period (ON is 0)."""
+        for channel, length in zip(self._channels, units, strict=True):
+            off = round(length / self._count)
+            self._bus.write(bytes((LED0 + 4 * channel, 0, 0, off & 0xFF, off >> 8)))
+
+    def read(self) -> np.ndarray | None:
+        """Return None: pulses go one way."""
+        return None
+
+    def detach(self) -> None:
+        """Switch all pulses off at once."""
+        self._bus.write(bytes((ALL_OFF_H, FULL_OFF)))
+
+    def close(self) -> None:
+        """Close the bus."""
+        self._bus.close()

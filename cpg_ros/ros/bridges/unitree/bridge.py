@@ -1,0 +1,284 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The node ``unitree_bridge``: drives a Unitree robot by what a generator publishes."""
+
+from collections.abc import Callable, Mapping
+import json
+import sys
+import time
+from typing import Any
+
+from cpg_ros.motion.robot import Robot
+from cpg_ros.ros.bridges.bridge import BridgeNode, StartRefused, Wait
+from cpg_ros.ros.bridges.robot_state import bridge_specs, BridgeSettings
+from cpg_ros.ros.bridges.unitree.interfaces import message, Unitree
+from cpg_ros.ros.bridges.unitree.messages import BUTTONS, FootForces, LowState
+from cpg_ros.ros.bridges.unitree.models import JOINTS, MODELS, PARTS, settings_of
+from cpg_ros.ros.bridges.unitree.participants import Announcements
+from cpg_ros.ros.generator_io import joint_state, labelled
+from cpg_ros.ros.node.message_block import each, MessageBlock, places, Template
+from cpg_ros.ros.node.node_base import run
+from cpg_ros.ros.node.parameters import fixed, one_of, Spec
+from cpg_ros.ros.node.polled import OVERRIDABLE, PolledSubscription
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import BatteryState, Imu
+
+# The parameters of ``unitree_bridge``.
+
+SPECS = fixed(bridge_specs(
+    'unitree_go2',
+    model=Spec('go2', 'robot model, which determines the torque limits',
+               constraints=one_of(MODELS)),
+    kp=Spec([60.0], 'proportional gains [N m / rad]',
+            constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
+    kd=Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
+    foot_scale=Spec(1.0, 'force per unit of a foot sensor [N]', 0.001, 1000.0),
+    foot_offset=Spec([0.0], "what a foot sensor reads in the air, in the robot's units",
+                     constraints="one number, or one for each leg in the robot file's order"),
+    foot_threshold=Spec([0.0], 'force below which a foot is taken to be in the air [N]',
+                        constraints='as foot_offset'),
+    stop_button=Spec('B', 'button of the wireless remote that stops the robot, pressed alone or '
+                     'with others', constraints=one_of(BUTTONS)),
+    motion_switcher=Spec(True, "ask the robot's own service to release its motion modes; set to "
+                         'false for simulators, which have none')))
+
+
+# The measurements of a Unitree robot, on the topics that robot_sim has.
+
+#: Unitree's feet are in the order of its legs.
+FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
+
+
+class Sensors:
+    """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
+
+    def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces) -> None:
+        """Publish the contents of ``state``, joints in ``robot.order``."""
+        self._state, self._forces, self._legs = state, feet, tuple(robot.legs)
+        names = robot.order
+        self._from = [JOINTS.index(name) for name in names]
+        self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
+        n = len(names)
+        sizes = n, n, n, 4, 3, 3, len(self._feet)
+        *joints, orientation, rates, acceleration, forces = places(sizes)
+        imu = Imu()
+        imu.header.frame_id = 'imu'
+        self._block = MessageBlock(node, sizes, [
+            ('joint_states', joint_state(names, *joints)),
+            ('imu', Template(imu, [imu.header.stamp], numbers=[
+                *each(imu.orientation, 'wxyz', orientation),
+                *each(imu.angular_velocity, 'xyz', rates),
+                *each(imu.linear_acceleration, 'xyz', acceleration)])),
+            ('foot_contacts', labelled(tuple(robot.legs), forces))])
+        self._battery = node.create_publisher(BatteryState, 'battery', QoSProfile(depth=100),
+                                              qos_overriding_options=OVERRIDABLE)
+
+    def publish(self, stamp: int) -> None:
+        """Publish the state; stamp in ns."""
+        state, joints = self._state, self._from
+        self._block.publish(stamp, (
+            state.q[joints], state.dq[joints], state.torque[joints], state.quaternion,
+            state.gyroscope, state.accelerometer, self._forces.newtons(state.feet[self._feet])))
+
+    def publish_battery(self, stamp: int) -> None:
+        """Publish the battery's state; stamp in ns."""
+        state = self._state
+        message = BatteryState(
+            voltage=state.voltage, current=state.current, percentage=state.charge,
+            temperature=float('nan'), charge=float('nan'), capacity=float('nan'),
+            design_capacity=float('nan'), cell_voltage=state.cells, present=bool(state.cells),
+            power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+            power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        self._battery.publish(message)
+
+    def values(self) -> dict[str, object]:
+        """Return temperatures in deg C, charge in % and raw foot sensors, for /diagnostics."""
+        state = self._state
+        heat = {f'{name} [deg C]': value
+                for name, value in zip(JOINTS, state.temperature.tolist(), strict=True)}
+        feet = {f'foot {leg} [raw]': raw for leg, raw in zip(
+            self._legs, state.feet[self._feet].tolist(), strict=True)}
+        return {**heat, **feet, 'imu [deg C]': state.imu_temperature,
+                'battery [%]': round(100.0 * state.charge)}
+
+
+# The motion modes of a Unitree robot, which must be off while a bridge commands it.
+
+#: Numbers of unitree_api: of the service motion_switcher, and of sport.
+CHECK_MODE, RELEASE_MODE, STAND_DOWN = 1001, 1003, 1005
+#: How long an answer, and the release of all modes, may take, s.
+ANSWER, RELEASED = 3.0, 30.0
+#: What the robot needs to lie down, s, and then to give up a mode.
+LYING, SETTLING = 4.0, 1.0
+
+
+class RobotService:
+    """One of the robot's own services behind ``unitree_api``."""
+
+    def __init__(self, node: Node, name: str, wait: Wait) -> None:
+        """Connect; ``wait`` sleeps for some seconds, or raises StartRefused."""
+        self._name, self._wait, self._node = name, wait, node
+        self._request = message('unitree_api/Request')
+        self._publisher = node.create_publisher(self._request, f'/api/{name}/request',
+                                                QoSProfile(depth=10))
+        self._answers = PolledSubscription(node, message('unitree_api/Response'),
+                                           f'/api/{name}/response', QoSProfile(depth=10))
+
+    def call(self, number: int) -> dict[str, Any]:
+        """Send a request; return the data of the answer.
+
+        Raises:
+            StartRefused: there is no answer, or the robot refuses.
+
+        """
+        request = self._request()
+        request.header.identity.id = time.monotonic_ns()
+        request.header.identity.api_id = number
+        request.parameter = '{}'
+        end = time.monotonic() + ANSWER
+        while not (self._publisher.get_subscription_count()
+                   and self._node.count_publishers(self._answers.topic)):
+            if time.monotonic() > end:
+                raise StartRefused(f"the robot has no service '{self._name}'; a simulator has "
+                                   'none: motion_switcher:=false')
+            self._wait(0.05)
+        self._publisher.publish(request)
+        while time.monotonic() < end + ANSWER:
+            for answer, _ in self._answers.take():
+                if answer.header.identity.id == request.header.identity.id:
+                    if code := answer.header.status.code:
+                        raise StartRefused(f"the robot's service '{self._name}' refuses request "
+                                           f'{number} with code {code}')
+                    return json.loads(answer.data or '{}')
+            self._wait(0.02)
+        raise StartRefused(f"the robot's service '{self._name}' does not answer request {number}")
+
+
+def release(node: Node, wait: Wait, log: Callable[[str], None]) -> None:
+    """Make the robot lie down and release its motion modes.
+
+    Args:
+        node: the bridge.
+        wait: sleeps for some seconds, or raises StartRefused.
+        log: takes a line for each step.
+
+    Raises:
+        StartRefused: the robot has no such service, or does not release a mode.
+
+    """
+    switcher = RobotService(node, 'motion_switcher', wait)
+    sport, end = None, time.monotonic() + RELEASED
+    while name := switcher.call(CHECK_MODE).get('name', ''):
+        if time.monotonic() > end:
+            raise StartRefused(f"the robot does not release its motion mode '{name}'")
+        if sport is None:
+            sport = RobotService(node, 'sport', wait)
+            log(f"its motion mode '{name}' is active: it is asked to lie down")
+            sport.call(STAND_DOWN)
+            wait(LYING)
+        log(f"its motion mode '{name}' is to be released")
+        switcher.call(RELEASE_MODE)
+        wait(SETTLING)
+    log('no motion mode of its own is active')
+
+
+NAME = Unitree.bridge_name()
+
+
+class UnitreeBridge(BridgeNode):
+    """Commands of a generator as ``LowCmd``; ``LowState`` as the topics that robot_sim has."""
+
+    interface, specs = Unitree, SPECS
+    state_hint = (': is the cable in, the address of this computer in 192.168.123.*, '
+                  'ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET, and ROS_DOMAIN_ID 0 for a robot, 1 for '
+                  "Unitree's simulator?")
+
+    def __init__(self) -> None:
+        """Declare the parameters, check them, and prepare to start.
+
+        Raises:
+            StartError: a parameter, the robot file or the messages cannot be used.
+
+        """
+        self._state = LowState()
+        super().__init__(self._state)
+        self._button = BUTTONS[self._value('stop_button')]
+        self._sensors = Sensors(self, self.robot, self._state, FootForces(
+            len(self.robot.legs), self._value('foot_scale'), self._value('foot_offset'),
+            self._value('foot_threshold')))
+        self._announcements = Announcements(self.context.get_domain_id())
+
+    def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
+        """Return the settings of the robot file and the model."""
+        value = self._value
+        self._one_of('model', tuple(MODELS))
+        self._one_of('stop_button', tuple(BUTTONS))
+        message('unitree_api/Request')
+        return settings_of(robot, MODELS[value('model')], list(value('kp')), list(value('kd')),
+                           value('torque_factor'), **common)
+
+    @property
+    def title(self) -> str:
+        """The model."""
+        return str(self._value('model'))
+
+    def prepare(self, wait: Wait) -> None:
+        """Release the robot's motion modes."""
+        if not self._value('motion_switcher'):
+            return
+        if self.dry:
+            self.get_logger().info('dry run: CheckMode, StandDown and ReleaseMode are not sent')
+        else:
+            release(self, wait, self.log_step)
+
+    def stop_pressed(self) -> str:
+        """Return whether the stop button of the wireless remote is pressed."""
+        pressed = self._state.buttons & self._button
+        return 'the button of the wireless remote' if pressed else ''
+
+    def network_hazard(self) -> str:
+        """Return a participant that crashes the robot's software, or ''."""
+        found = self._announcements.look()
+        return found and (f'{found} is on this network: it crashes the 0.10 in '
+                          "Unitree's firmware; stop it")
+
+    def publish_measurements(self, stamp: int) -> None:
+        """Publish ``joint_states``, ``imu`` and ``foot_contacts``."""
+        self._sensors.publish(stamp)
+
+    def publish_slow_measurements(self, stamp: int) -> None:
+        """Publish ``battery``."""
+        self._sensors.publish_battery(stamp)
+
+    def measured_values(self) -> Mapping[str, object]:
+        """Return temperatures and the charge of the battery."""
+        return self._sensors.values()
+
+    def finish(self) -> None:
+        """End the threads and the watchdog, as the base class does."""
+        super().finish()
+        self._announcements.close()
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until a signal ends it; return the exit code."""
+    return run(UnitreeBridge, NAME, 'Leads a Unitree robot by what a generator publishes.', SPECS,
+               args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,262 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The message ``unitree_go/msg/LowState``, read from its bytes (little-endian CDR)."""
+
+from collections.abc import Sequence
+import zlib
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.ros.bridges.robot_state import JointCommand, RobotState
+from cpg_ros.ros.bridges.unitree.models import JOINTS
+import numpy as np
+
+# The check sum of Unitree's low-level commands: CRC-32/MPEG-2 of the words of a C struct.
+
+#: Every byte with its bits the other way round.
+_MIRRORED = bytes(int(f'{byte:08b}'[::-1], 2) for byte in range(256))
+
+
+def crc32(words: bytes) -> int:
+    """Return the check sum of little-endian 32-bit words.
+
+    Args:
+        words: their bytes, a whole number of words.
+
+    """
+    turned = bytearray(len(words))
+    for k in range(4):
+        turned[k::4] = words[3 - k::4]
+    reflected = zlib.crc32(turned.translate(_MIRRORED)) ^ 0xffffffff
+    return int.from_bytes(reflected.to_bytes(4, 'little').translate(_MIRRORED), 'big')
+
+
+# The message ``unitree_go/msg/LowCmd`` as bytes: made once, filled in place, encoded, sent.
+
+#: CDR's header: little-endian.
+HEADER = b'\x00\x01\x00\x00'
+#: Of the message, without the header, in bytes.
+COMMAND_SIZE = 808
+MOTORS = 20
+#: Angle and speed that mean: not controlled (unitree_sdk2's PosStopF and VelStopF).
+POSITION_STOP, VELOCITY_STOP = 2.146e9, 16000.0
+#: Mode of a motor under control.
+SERVO_MODE = 1
+#: Where the floats of the first motor begin, and from motor to motor.
+_FLOATS, _STRIDE = 24, 36
+#: After the last motor's ``reserve``; ``crc`` is the last word.
+_CRC = 804
+
+
+class LowCmd(JointCommand):
+    """A command for all motors, in the order of Unitree's motors; arrays are views of the bytes.
+
+    The first motors are those of a robot's joints, FR, FL, RR, RL with hip, thigh and calf each;
+    the others are left uncontrolled.
+    """
+
+    def __init__(self, joints: int = 12) -> None:
+        """Make a command under which nothing is driven.
+
+        Args:
+            joints: how many of the motors the robot has.
+
+        """
+        self._bytes = bytearray(HEADER + bytes(COMMAND_SIZE))
+        message = memoryview(self._bytes)[len(HEADER):]
+        self._message = message
+        # As in Unitree's examples: start of frame, low level.
+        message[0:3] = b'\xfe\xef\xff'
+        for motor in range(MOTORS):
+            message[self._mode(motor)] = SERVO_MODE
+        table = np.ndarray((MOTORS, 5), '<f4', message, _FLOATS, (_STRIDE, 4))
+        table[:] = POSITION_STOP, VELOCITY_STOP, 0.0, 0.0, 0.0
+        self.q, self.dq, self.tau, self.kp, self.kd = table[:joints].T
+        self.dq[:] = 0.0
+
+    @staticmethod
+    def _mode(motor: int) -> int:
+        return 22 if motor == 0 else _FLOATS - 4 + _STRIDE * motor
+
+    def encode(self) -> bytes:
+        """Set the checksum, and return the message as it is sent."""
+        m = self._message
+        struct = b''.join((m[:22], b'\0\0', m[22:24], b'\0\0', m[24:_CRC]))
+        m[_CRC:] = crc32(struct).to_bytes(4, 'little')
+        return bytes(self._bytes)
+
+
+# Forces on the feet, from sensors whose unit and zero differ from foot to foot.
+
+class FootForces:
+    """Readings of foot sensors as forces."""
+
+    def __init__(self, feet: int, scale: float, offset: Sequence[float],
+                 threshold: Sequence[float]) -> None:
+        """Convert the readings of some feet.
+
+        Args:
+            feet: number of feet.
+            scale: force per unit of the sensors, N.
+            offset: readings in the air, in the sensors' units; one number or one for each foot.
+            threshold: forces below which a foot is in the air, N; likewise.
+
+        Raises:
+            InputError: a sequence has another length, or a value that is not a finite number.
+
+        """
+        self._scale = scale
+        self._offset, self._threshold = (
+            _per_foot(name, values, feet) for name, values in (
+                ('foot_offset', offset), ('foot_threshold', threshold)))
+
+    def newtons(self, raw: np.ndarray) -> np.ndarray:
+        """Return the forces of raw readings, N, shape (feet,); 0 in the air, never negative."""
+        force = self._scale * (raw - self._offset)
+        return np.where(force >= self._threshold, np.maximum(force, 0.0), 0.0)
+
+
+def _per_foot(name: str, values: Sequence[float], feet: int) -> np.ndarray:
+    if len(values) not in (1, feet):
+        raise InputError(f'parameter {name} has {len(values)} numbers, not 1 or {feet}')
+    if not np.isfinite(values).all():
+        raise InputError(f'parameter {name}: {list(values)} is not finite')
+    return np.broadcast_to(np.array(values, dtype=float), feet)
+
+
+#: Of the message with CDR's header of 4 bytes.
+STATE_SIZE = 1180
+_HEADER = 4
+_LITTLE_ENDIAN = 1
+#: Bits of the wireless remote's bytes 2 and 3, as unitree_sdk2py.utils.joystick reads them.
+BUTTONS = {name: 1 << k for k, name in enumerate((
+    'R1', 'L1', 'start', 'select', 'R2', 'L2', 'F1', 'F2',
+    'A', 'B', 'X', 'Y', 'up', 'right', 'down', 'left'))}
+#: Packets that a motor may lose while the bridge drives it.
+MOST_LOST = 100
+#: From the angle of a motor on: CDR packs the mode of the first one more closely.
+_MOTOR = np.dtype({
+    'names': ['q', 'dq', 'ddq', 'torque', 'temperature', 'lost', 'next_mode'],
+    'formats': ['<f4', '<f4', '<f4', '<f4', 'i1', '<u4', 'u1'],
+    'offsets': [0, 4, 8, 12, 28, 32, 44], 'itemsize': 48})
+_FIELDS = np.dtype({
+    'names': ['quaternion', 'gyroscope', 'accelerometer', 'imu_temperature', 'first_mode',
+              'motors', 'soc', 'current', 'cycle', 'cells', 'feet', 'tick', 'remote', 'ntc',
+              'voltage'],
+    'formats': ['4<f4', '3<f4', '3<f4', 'i1', 'u1', (_MOTOR, 19), 'u1', '<i4', '<u2', '15<u2',
+                '4<i2', '<u4', '<u2', '2i1', '<f4'],
+    'offsets': [24, 40, 52, 76, 77, 80, 1039, 1040, 1044, 1050, 1080, 1096, 1102, 1148, 1152],
+    'itemsize': STATE_SIZE - _HEADER})
+
+
+class LowState(RobotState):
+    """The measured state; arrays are views of one buffer, joints in the order of Unitree's motors.
+
+    Attributes:
+        torque: estimated, N m, shape (joints,).
+        lost: packets that each motor has lost so far.
+        quaternion: orientation, w x y z.
+        gyroscope: rad/s.
+        accelerometer: m/s^2.
+        feet: what the feet feel, in the units of the robot, in the order FR FL RR RL.
+
+    """
+
+    def __init__(self) -> None:
+        """Start with everything at zero."""
+        self._buffer = bytearray(STATE_SIZE)
+        self._all = np.ndarray((), _FIELDS, self._buffer, _HEADER)
+        motors = self._all['motors'][:len(JOINTS)]
+        self.q, self.dq, self.torque, self.temperature, self.lost = (
+            motors[name] for name in ('q', 'dq', 'torque', 'temperature', 'lost'))
+        self._modes = motors['next_mode'][:-1]
+        self.quaternion, self.gyroscope, self.accelerometer, self.feet = (
+            self._all[name] for name in ('quaternion', 'gyroscope', 'accelerometer', 'feet'))
+        self.reset_motor_faults()
+
+    def read(self, message: bytes) -> bool:
+        """Take a message over; return whether it is one of these."""
+        if len(message) < STATE_SIZE or message[1] != _LITTLE_ENDIAN:
+            return False
+        self._buffer[:] = message[:STATE_SIZE]
+        return True
+
+    def _number(self, name: str) -> float:
+        return self._all[name].item()
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """Control modes of the joints' motors."""
+        return int(self._number('first_mode')), *self._modes.tolist()
+
+    def reset_motor_faults(self) -> None:
+        """Compare the motors with their modes and lost packets as they are now."""
+        self._modes_before, self._lost_before = self.modes, self.lost.copy()
+
+    def motor_fault(self) -> str:
+        """Return which motor has left its mode or lost contact with the robot, or ''."""
+        modes, before = self.modes, self._modes_before
+        self._modes_before = modes
+        if modes != before:
+            for name, now, then in zip(JOINTS, modes, before, strict=True):
+                if then == SERVO_MODE != now:
+                    return f'the motor of {name} has stopped by itself: mode {now}'
+        # Unsigned: a counter that began anew is a motor that did.
+        lost = self.lost - self._lost_before
+        if lost.max() > MOST_LOST:
+            worst = int(lost.argmax())
+            return f'the motor of {JOINTS[worst]} does not hear the robot any more'
+        return ''
+
+    @property
+    def tick(self) -> int:
+        """The robot's own counter; simulators leave it at 0."""
+        return int(self._number('tick'))
+
+    @property
+    def buttons(self) -> int:
+        """Buttons of the wireless remote that are pressed, the sum of values of BUTTONS."""
+        return int(self._number('remote'))
+
+    @property
+    def charge(self) -> float:
+        """Of the battery, from 0 to 1."""
+        return self._number('soc') / 100.0
+
+    @property
+    def current(self) -> float:
+        """Into the battery, A."""
+        return self._number('current') / 1000.0
+
+    @property
+    def voltage(self) -> float:
+        """Of the battery, V."""
+        return self._number('voltage')
+
+    @property
+    def cells(self) -> list[float]:
+        """Voltages of the battery's cells that are there, V."""
+        return [value / 1000.0 for value in self._all['cells'].tolist() if value]
+
+    @property
+    def imu_temperature(self) -> int:
+        """Of the IMU, deg C."""
+        return int(self._number('imu_temperature'))
+
+    @property
+    def tilt_cosine(self) -> float:
+        """Cosine of the angle between the body's and the world's vertical; nan without an IMU."""
+        w, x, y, z = self.quaternion.tolist()
+        norm = w * w + x * x + y * y + z * z
+        return 1.0 - 2.0 * (x * x + y * y) / norm if 0.9 < norm < 1.1 else float('nan')

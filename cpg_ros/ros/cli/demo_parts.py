@@ -1,0 +1,386 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The demonstration of a robot of one's own: its robot file is made, and its gaits are tuned.
+
+Each step is an executable of its own, whose files stay in a folder and are used again.
+"""
+
+from argparse import ArgumentParser, Namespace
+import asyncio
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import datetime
+import os
+from pathlib import Path
+import signal
+import subprocess
+import time
+
+from cpg_ros.common.command_line import number, say
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.motion.description import load_urdf
+from cpg_ros.motion.robot import Motion
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.ros.cli.executables import command
+from cpg_ros.ros.kernels import StartProgress
+from cpg_ros.ros.node.client import CallError, NodeClient, RequestRefused, ServiceClients
+from cpg_ros.ros.node.polled import latched
+from cpg_ros.simulation.robot_model import find_model
+from geometry_msgs.msg import Pose, Quaternion
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from std_msgs.msg import String
+
+# The demonstration's node: it sets the gait of the generator, and follows the robot.
+
+class DemoError(CpgError):
+    """The demonstration cannot continue; the message is one line for the user."""
+
+    exit_code = 1
+
+
+class Operator(Node):
+    """Sets the gait of the generator, and follows the robot.
+
+    Attributes:
+        pose: of the robot's base; None until it is known.
+        time: of the robot's simulation, s.
+        taken_over: whether somebody else has set another gait.
+
+    """
+
+    def __init__(self, gait: str) -> None:
+        super().__init__('cpg_demo')
+        self.pose: Pose | None = None
+        self.time = 0.0
+        self._generator = NodeClient(ServiceClients(self), 'cpg_generator')
+        self._wanted, self.taken_over, self._heard = gait, False, False
+        self.create_subscription(Odometry, 'odom', self._odom, 1)
+        # Latched, as it is published: a gait chosen before discovery counts, too.
+        self.create_subscription(String, 'cpg_generator/gait', self._gait, latched(10))
+
+    def _odom(self, message: Odometry) -> None:
+        self.pose = message.pose.pose
+        self.time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+    def _gait(self, message: String) -> None:
+        # Whoever chooses a gait on the page, or by a parameter, ends the tour.
+        self._heard = True
+        self.taken_over |= message.data != self._wanted
+
+    def check_alone(self) -> None:
+        """See that these are the only robot and the only generator.
+
+        Raises:
+            DemoError: there is another one, perhaps from before ours.
+
+        """
+        for topic, who in (('cpg_generator/phase', 'generator'), ('odom', 'robot')):
+            if self.count_publishers(topic) > 1:
+                raise DemoError(f'there is another {who} in this ROS domain: stop it, or set '
+                                'another ROS_DOMAIN_ID')
+
+    def switch(self, gait: str) -> str:
+        """Set the gait; return why the generator refused it, or ''.
+
+        Raises:
+            DemoError: the generator does not answer.
+
+        """
+        self._wanted = gait
+        try:
+            asyncio.run(self._generator.set_parameters({'gait': gait}, 10.0))
+        except RequestRefused as error:
+            return str(error)
+        except CallError as error:
+            raise DemoError('the generator does not answer') from error
+        return ''
+
+    @property
+    def ready(self) -> bool:
+        """Whether the body moves, as it does once it is commanded, and the generator is heard."""
+        return self.pose is not None and self._heard
+
+    @property
+    def place(self) -> tuple[float, float]:
+        """Where the robot is, x and y in m; the origin until that is known."""
+        return (0.0, 0.0) if self.pose is None else (self.pose.position.x, self.pose.position.y)
+
+    @property
+    def upright(self) -> float:
+        """Cosine of the angle by which the base leans."""
+        turn = Quaternion() if self.pose is None else self.pose.orientation
+        return float(1.0 - 2.0 * (turn.x**2 + turn.y**2))
+
+
+# Processes of the demonstration, and what ends it.
+
+@contextmanager
+def running(*arguments: str) -> Iterator[subprocess.Popen]:
+    """Run one of the package's nodes out of reach of Ctrl-C; end it in any case."""
+    executable, *ros = arguments
+    process = subprocess.Popen(
+        [*command(executable), '--ros-args', *ros],
+        # In a session of its own: a terminal's Ctrl-C would reach it beside our own signal.
+        start_new_session=True, stdin=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+class Interruption:
+    """What ends the demonstration from outside: a signal, or the end of a node.
+
+    A signal is only recorded, and acted upon where that is safe: an exception raised while a node
+    starts would leave that node behind.
+
+    Attributes:
+        nodes: the processes to watch.
+
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[subprocess.Popen] = []
+        self._noted = False
+        for signal_number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(signal_number, self._note)
+
+    def _note(self, *_: object) -> None:
+        # Whoever presses Ctrl-C again wants the film to be cut short.
+        for node in self.nodes if self._noted else ():
+            node.terminate()
+        self._noted = True
+
+    def look(self) -> None:
+        """Return if nothing ended it.
+
+        Raises:
+            KeyboardInterrupt: a signal arrived.
+            DemoError: a node ended.
+
+        """
+        if self._noted:
+            raise KeyboardInterrupt
+        for node in self.nodes:
+            if node.poll() is not None:
+                raise DemoError(f'a node ended with exit code {node.returncode}')
+
+
+#: Gaits that a robot is driven in, of those that its network has.
+DRIVEN = ('trot', 'walk', 'tripod', 'wave')
+#: How long a robot file takes, and of a gait's tuning what is done besides designs, and a design
+#: on one core and on all of them, s, on a machine of 2023.
+MADE, BESIDES, PLANNED, SIMULATED = 5.0, 30.0, 0.3, 0.6
+#: Designs that are tried for each gait.
+EVALUATIONS = 120
+#: Options of gains, which the simulation takes as well.
+SERVO_GAINS = 'kp', 'kd'
+#: How long a step that is stopped may take to end, s.
+PATIENCE = 10.0
+
+
+class StepFailed(CpgError):
+    """A step of the way to a driven robot failed, and has said why."""
+
+    def __init__(self, code: int) -> None:
+        super().__init__('a step failed')
+        self.code = code
+
+
+@dataclass(frozen=True)
+class DemoRobot:
+    """A robot that is ready for the demonstration.
+
+    Attributes:
+        file: robot file with tuned gaits.
+        model: for the simulation.
+        name: for files.
+        gaits: that are tuned, the one to begin with first.
+        steered: whether it follows commands of speed in that one.
+        network: that drives it, '' for the generator's own choice.
+        unjudged: whether it is one's own, and its file does not say whether feedback helps.
+
+    """
+
+    file: str
+    model: str
+    name: str
+    gaits: tuple[str, ...]
+    steered: bool
+    network: str = ''
+    unjudged: bool = False
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add what chooses a robot of one's own."""
+    parser.add_argument('--velocity', type=number, metavar='RAD/S', help="with --urdf or --mjcf: "
+                        "velocity limit of all joints instead of the file's")
+    parser.add_argument('--evaluations', type=int, metavar='N', help='with --urdf or --mjcf: '
+                        f'designs to try for each gait (default: {EVALUATIONS})')
+    parser.add_argument('--kp', type=number, metavar='NM', help='with --urdf or --mjcf: '
+                        'proportional gain of the joints, N m/rad, to tune and to drive it with '
+                        "(default: a Go2's, scaled to the robot's mass; servos are stiffer)")
+    parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
+                        'N m s/rad, likewise')
+
+
+def name_of(args: Namespace) -> str:
+    """Return what the files of a robot of one's own are called, '' if none is chosen.
+
+    Raises:
+        CpgError: there is no such file, it is no URDF, or options do not go together.
+
+    """
+    if args.urdf is None and args.mjcf is None:
+        for option in ('velocity', 'evaluations', *SERVO_GAINS):
+            if getattr(args, option) is not None:
+                raise InputError(f'argument --{option}: only with --urdf or --mjcf')
+        return ''
+    if args.evaluations is not None and args.evaluations < 1:
+        raise InputError(f'argument --evaluations: {args.evaluations} is not positive')
+    if args.urdf is None:
+        return find_model(args.mjcf).stem
+    load_urdf(args.urdf)
+    return str(args.urdf.stem)
+
+
+class Steps:
+    """Announces steps, and waits for each while the page shows it."""
+
+    def __init__(self, node: Node, look: Callable[[], None]) -> None:
+        """Prepare.
+
+        Args:
+            node: by which the page knows what is waited for.
+            look: raises what ends the demonstration.
+
+        """
+        self._node, self._look, self._count = node, look, 0
+
+    def take(self, what: str, seconds: float, words: Sequence[str]) -> int:
+        """Run an executable; return its exit code.
+
+        Args:
+            what: it does.
+            seconds: that this takes, about.
+            words: the executable and its arguments.
+
+        """
+        self._count += 1
+        say(f'step {self._count}: {what}, about {seconds:.0f} s (Ctrl-C stops it)')
+        progress = StartProgress(self._node, what, seconds)
+        process = subprocess.Popen([*command(words[0]), *words[1:]], stdin=subprocess.DEVNULL,
+                                   start_new_session=True)
+        try:
+            while process.poll() is None:
+                self._look()
+                time.sleep(0.1)
+        finally:
+            progress.end()
+            _end(process)
+        say(f'step {self._count}: took {progress.passed:.0f} s')
+        return process.returncode
+
+
+def _end(process: subprocess.Popen) -> None:
+    """Stop a step as Ctrl-C would, so that it ends its workers and leaves no half files."""
+    for number_of in (signal.SIGINT, signal.SIGKILL):
+        if process.poll() is None:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, number_of)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(PATIENCE)
+
+
+def prepare(args: Namespace, steps: Steps) -> DemoRobot:
+    """Make a robot's file and tune it, or use again what the folder has.
+
+    Args:
+        args: options of the demonstration.
+        steps: what runs them.
+
+    Raises:
+        StepFailed: a step failed.
+        RobotError: a file that is there already cannot be used.
+
+    """
+    name = name_of(args)
+    source = ['--urdf', str(args.urdf)] if args.urdf is not None else ['--mjcf', args.mjcf]
+    file, tuned = (args.out / f'{name}{end}.yaml' for end in ('', '_tuned'))
+    say(f'the files of the robot go into {args.out}')
+    if file.exists():
+        _again(file, find_model(source[1]), 'velocity', args)
+    else:
+        limit = [] if args.velocity is None else ['--velocity', f'{args.velocity:g}']
+        code = steps.take(f'making {file} from {source[1]}', MADE,
+                          ['check_robot', *source, '--make', str(file), *limit])
+        if not file.exists():
+            raise StepFailed(code)
+    robot = load_robot(str(file))
+    if tuned.exists():
+        _again(tuned, file, 'evaluations', args)
+    else:
+        own = NETWORKS[robot.networks[0]].gaits()
+        gaits = args.tour or [gait for gait in DRIVEN if gait in own]
+        _tune(args, steps, (file, tuned), gaits)
+    robot = load_robot(str(tuned))
+    gaits, steered = _ranked(robot.motions)
+    return DemoRobot(str(tuned.absolute()), source[1], name, gaits, steered,
+                     unjudged=robot.feedback is None)
+
+
+def _again(file: Path, source: Path, option: str, args: Namespace) -> None:
+    """Say that a file is used again; refuse an option that would have changed it."""
+    if getattr(args, option) is not None:
+        raise InputError(f'argument --{option}: {file} is there already; delete it, or give '
+                         'another folder with --out')
+    made = file.stat().st_mtime
+    later = f', though {source} has changed since' if source.stat().st_mtime > made else ''
+    say(f'{file} of {datetime.fromtimestamp(made):%Y-%m-%d %H:%M} is used again{later}; delete it '
+        'to make it anew')
+
+
+def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequence[str]) -> None:
+    """Tune gaits one by one: each on all cores, and with a progress of its own."""
+    file, tuned = files
+    source, evaluations = str(args.urdf or args.mjcf), args.evaluations or EVALUATIONS
+    gains = [word for name in SERVO_GAINS if (gain := getattr(args, name)) is not None
+             for word in (f'--{name}', f'{gain:g}')]
+    seconds = BESIDES + evaluations * (PLANNED + SIMULATED / (os.cpu_count() or 1))
+    codes = []
+    for gait in gaits:
+        codes.append(steps.take(
+            f'tuning the {gait} in simulation', seconds,
+            ['tune', '--robot', str(tuned if tuned.exists() else file), '--model', source,
+             '--gaits', gait, '--evaluations', str(evaluations), '--out', str(tuned), *gains]))
+        if codes[-1] not in (0, 1):
+            break
+    if not tuned.exists():
+        raise StepFailed(codes[-1])
+    if 0 not in codes:
+        say(f'no gait is good: delete {tuned}, and --evaluations {2 * evaluations} searches for '
+            'longer, --kp and --kd give stiffer joints')
+
+
+def _ranked(motions: dict[str, Motion]) -> tuple[tuple[str, ...], bool]:
+    """Return gaits, those that go fastest when steered first, and whether the first can be."""
+    fastest = {gait: motion.steering.speed[-1] if motion.steering is not None else 0.0
+               for gait, motion in motions.items()}
+    gaits = sorted(fastest, key=lambda gait: -fastest[gait])
+    return tuple(gaits), bool(gaits) and fastest[gaits[0]] > 0.0

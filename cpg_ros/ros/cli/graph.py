@@ -1,0 +1,291 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The topics of a graph: their list, messages and rates."""
+
+from array import array
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+import sys
+import time
+from typing import Any
+
+from cpg_ros.common.command_line import note, progress_bar, say
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.fitting.inversion.gait_schedule import Entry, GaitSchedule, read_schedule
+from cpg_ros.fitting.recordings.bag_storage import opened
+from cpg_ros.fitting.recordings.recording import RecordingError
+from cpg_ros.ros.bag_recorder import BagRecorder, EVERY
+from cpg_ros.ros.node.client import NodeClient, SILENCE
+from cpg_ros.ros.node.message_block import message_class
+from cpg_ros.ros.node.polled import best_effort, PolledSubscription
+import numpy as np
+import rclpy
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.interfaces import Connection, QosDurability
+import yaml
+
+# Publishing the messages of a bag, as ``ros2 bag play`` does.
+
+#: How long a player waits for listeners, s.
+PATIENCE = 1.0
+
+
+def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
+    """Publish a bag's messages at the pace at which they were received.
+
+    Args:
+        node: publishes.
+        path: of the bag.
+        wanted: topics; all, if empty.
+        rate: recorded seconds per second.
+
+    Returns:
+        Topic -> messages published.
+
+    Raises:
+        RecordingError: the bag cannot be read, or a topic is not in it.
+
+    """
+    counts: Counter[str] = Counter()
+    with opened(path) as bag:
+        there = {one.topic: one for one in bag.connections}
+        args = [node.resolve_topic_name(one) for one in wanted] or list(there)
+        for topic in args:
+            if topic not in there:
+                raise RecordingError(f'{path}: no topic {topic!r}; there are {", ".join(there)}')
+        publishers = {topic: _publisher(node, there[topic]) for topic in args}
+        _wait_for_listeners(node, list(publishers.values()))
+        expected = bag.expected()
+        with progress_bar(f'playing {path.name}', max(1, sum(expected[one] for one in args))
+                          ) as bar:
+            start, began = None, time.monotonic()
+            for done, (topic, received, message) in enumerate(bag.messages(args)):
+                start = received if start is None else start
+                while (left := began + (received - start) * 1e-9 / rate - time.monotonic()) > 0.0:
+                    rclpy.spin_once(node, timeout_sec=min(left, 0.05))
+                publishers[topic].publish(message)
+                counts[topic] += 1
+                bar(done + 1)
+    return counts
+
+
+def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
+    """Wait briefly for subscribers, so that they receive the first messages."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end and not all(one.get_subscription_count() for one in publishers):
+        rclpy.spin_once(node, timeout_sec=0.02)
+
+
+def _publisher(node: Node, connection: Connection) -> Publisher:
+    offered = getattr(connection.ext, 'offered_qos_profiles', ())
+    kept = any(one.durability == QosDurability.TRANSIENT_LOCAL for one in offered)
+    return node.create_publisher(message_class(connection.msgtype), connection.topic, QoSProfile(
+        depth=1 if kept else 100, durability=DurabilityPolicy.TRANSIENT_LOCAL if kept
+        else DurabilityPolicy.VOLATILE))
+
+
+# Recording the topics of a graph into a bag, as ``ros2 bag record`` does.
+
+#: How often the graph is searched for new topics, s.
+SEARCH_PERIOD = 0.5
+#: Topics that come with every node and that nobody wants.
+USUAL = ('/rosout', '/parameter_events')
+
+
+def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
+    """Record until Ctrl-C.
+
+    Args:
+        node: subscribes.
+        path: of the bag, a folder that does not exist yet.
+        wanted: topics; if empty, all that exist or appear.
+
+    Raises:
+        BagError: something is there already, or the folder cannot be written to.
+
+    """
+    recorder, looked = BagRecorder(node, path), 0.0
+    names = [node.resolve_topic_name(one) for one in wanted]
+    try:
+        while True:
+            if time.monotonic() > looked + SEARCH_PERIOD:
+                looked = time.monotonic()
+                for topic in _subscribed(node, recorder, names):
+                    print(f'recording {topic}', file=sys.stderr, flush=True)
+            recorder.take()
+            time.sleep(EVERY)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        recorder.close()
+    return recorder
+
+
+def _subscribed(node: Node, recorder: BagRecorder, wanted: Sequence[str]) -> list[str]:
+    """Record topics that are new on the graph; return them."""
+    return [topic for topic, kinds in node.get_topic_names_and_types()
+            if topic not in recorder.counts and topic not in recorder.passed_over
+            and (topic in wanted if wanted else topic not in USUAL)
+            and node.count_publishers(topic) and recorder.subscribe(topic, kinds[0])]
+
+
+# A running generator set to what a schedule says, when it says it.
+
+#: How long a setting may take: a network may have to be compiled, s.
+ANSWER = 60.0
+
+
+async def play_schedule(path: Path, other: NodeClient, rate: float) -> str:
+    """Set a generator's parameters at the times of a schedule; return what was done.
+
+    Args:
+        path: of the schedule.
+        other: the generator.
+        rate: seconds of the schedule per second.
+
+    Raises:
+        ScheduleError: the file cannot be used.
+        InputError: the generator does not run the schedule's network.
+        CallError: the generator does not answer, or refuses a value.
+
+    """
+    schedule = read_schedule(path)
+    await _check(schedule, other, path)
+    began = time.monotonic()
+    for entry in schedule.entries:
+        # Nothing else happens on this loop.
+        await asyncio.sleep(max(began + entry.at / rate - time.monotonic(), 0.0))
+        await other.set_parameters(entry.parameters, ANSWER)
+        say(f'{entry.at:8.2f} s  {_words(entry)}')
+    return f'{other.name} goes on with the last entry'
+
+
+async def _check(schedule: GaitSchedule, other: NodeClient, path: Path) -> None:
+    network, robot = await other.values(['network', 'robot'])
+    start = (f'generator --ros-args -p network:={schedule.network} -p robot:={schedule.robot}')
+    if network != schedule.network:
+        raise InputError(f'{path}: is for the network {schedule.network}, and {other.name} runs '
+                         f'{network}; start it with: {start}')
+    if robot != schedule.robot:
+        note('cpg', f'{other.name} moves the robot {robot}, so joints will not move as recorded; '
+             f'they would with: {start}')
+
+
+def _words(entry: Entry) -> str:
+    return ', '.join(f'{name} {value:.4g}' if isinstance(value, float) else f'{name} {value}'
+                     for name, value in entry.parameters.items())
+
+
+#: How long the graph is looked at before its topics are listed, s: discovery takes a moment.
+DISCOVERY = 1.0
+#: How long messages are counted, s, how often they are taken, s, and how many may wait until then.
+COUNT, COUNT_PERIOD, DEPTH = 3.0, 0.02, 1000
+
+
+class SilentTopic(CpgError):
+    """A topic has no publisher, or no message arrived."""
+
+    exit_code = 1
+
+
+def topics(node: Node) -> dict[str, str]:
+    """Return the topics that have publishers or subscribers, and their types, sorted."""
+    time.sleep(DISCOVERY)
+    return {name: ' '.join(kinds) for name, kinds in sorted(node.get_topic_names_and_types())}
+
+
+class Topic:
+    """A topic, subscribed to."""
+
+    def __init__(self, node: Node, name: str, wait: float,
+                 late: Callable[[str], None] = lambda name: None) -> None:
+        """Find a topic's type and subscribe.
+
+        Args:
+            node: subscribes.
+            name: relative names are of the namespace /.
+            wait: for a publisher and for the first message, s.
+            late: called once with the topic's name if neither has come within ``SILENCE``.
+
+        Raises:
+            SilentTopic: it has no publisher.
+
+        """
+        began = time.monotonic()
+        self._end, self._silence = began + wait, began + SILENCE
+        self._late = late
+        self._name = topic = node.resolve_topic_name(name)
+        while not (kinds := dict(node.get_topic_names_and_types()).get(topic)):
+            if time.monotonic() > self._end:
+                raise SilentTopic(f'nobody publishes on {topic}')
+            self._pause()
+        self._subscription = PolledSubscription(node, message_class(kinds[0]), name,
+                                                best_effort(DEPTH), overridable=False)
+
+    def messages(self) -> Iterator[Any]:
+        """Yield messages as they arrive.
+
+        Raises:
+            SilentTopic: none arrives.
+
+        """
+        silent = True
+        while True:
+            for message, _ in self._subscription.take():
+                silent = False
+                yield message
+            if silent and time.monotonic() > self._end:
+                raise SilentTopic(f'nothing came on {self._name}')
+            if silent:
+                self._pause()
+            else:
+                time.sleep(COUNT_PERIOD)
+
+    def _pause(self) -> None:
+        if time.monotonic() > self._silence:
+            self._late(self._name)
+            self._silence = np.inf
+        time.sleep(COUNT_PERIOD)
+
+    def rate(self) -> float:
+        """Count messages for a while; return their rate, Hz."""
+        count, end = 0, time.monotonic() + COUNT
+        while time.monotonic() < end:
+            time.sleep(COUNT_PERIOD)
+            count += sum(1 for _ in self._subscription.take())
+        return count / COUNT
+
+
+def as_yaml(message: Any) -> str:
+    """Return a message as YAML, as ``ros2 topic echo`` prints it, with a line break at its end."""
+    dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+    return str(yaml.dump(_plain(message), Dumper=dumper, sort_keys=False, allow_unicode=True,
+                         default_flow_style=False, width=2**31 - 1))
+
+
+def _plain(value: Any) -> Any:
+    """Return a message or a field of one as YAML has it."""
+    if hasattr(value, 'get_fields_and_field_types'):
+        return {field: _plain(getattr(value, field))
+                for field in value.get_fields_and_field_types()}
+    if isinstance(value, (np.ndarray, array)):
+        return value.tolist()
+    if isinstance(value, bytes):  # one octet; those of a list are integers, too
+        return value[0]
+    return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value

@@ -1,0 +1,248 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Joint commands taken from topics, as a robot's controllers would take them."""
+
+from collections.abc import Sequence
+from functools import partial
+import math
+from typing import Any
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.feedback.laws.stiffen import LAW
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import LARGEST
+from cpg_ros.ros.generator_io import COMMAND_TOPICS, joint_state
+from cpg_ros.ros.node.message_block import MessageBlock, places
+from cpg_ros.ros.node.polled import PolledSubscription
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64, Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+# The topic ``kp_scale``: the factor of the servos' proportional gain that the feedback wants.
+
+KP_SCALE_TOPIC = 'kp_scale'
+#: While it is not 1, it is repeated this often; without a message for STALE it is 1 again, s.
+REPEAT, STALE = 0.02, 0.1
+LARGEST_SCALE = LAW.gains['stiffen_kp'].high
+
+
+class KpScalePublisher:
+    """Publishes the factor when it changes, and repeats it while it is not 1."""
+
+    def __init__(self, node: Node) -> None:
+        self._publisher = node.create_publisher(Float64, KP_SCALE_TOPIC, 1)
+        self._message, self._elapsed = Float64(data=1.0), 0.0
+
+    def publish(self, dt: float, scale: float) -> None:
+        """Publish the factor if it is time; dt since the last call, s."""
+        self._elapsed += dt
+        if scale != self._message.data or (scale != 1.0 and self._elapsed >= REPEAT):
+            self._message.data, self._elapsed = scale, 0.0
+            self._publisher.publish(self._message)
+
+
+class KpScaleSubscription:
+    """Takes the factor from the topic."""
+
+    def __init__(self, node: Node) -> None:
+        self._subscription = PolledSubscription(node, Float64, KP_SCALE_TOPIC)
+        self._scale, self._received = 1.0, 0.0
+
+    def take(self, now: float) -> float:
+        """Return the factor, from 1 to LARGEST; 1 if the last message is out of range or old.
+
+        Args:
+            now: s, from any origin.
+
+        """
+        if (message := self._subscription.newest()) is not None:
+            valid = 1.0 <= message.data <= LARGEST_SCALE
+            self._scale, self._received = message.data if valid else 1.0, now
+        if self._scale != 1.0 and not 0.0 <= now - self._received < STALE:
+            self._scale = 1.0
+        return self._scale
+
+
+# The topic ``held/joint_states``: where the joints that are no leg's are to be driven.
+
+HELD_TOPIC = 'held/joint_states'
+
+
+class HeldPublisher:
+    """Publishes where held joints are to be driven."""
+
+    def __init__(self, node: Node, robot: Robot) -> None:
+        sizes = [len(robot.held)]
+        self._block = MessageBlock(node, sizes, [
+            (HELD_TOPIC, joint_state(tuple(robot.held), *places(sizes)))])
+
+    def publish(self, stamp: int, angles: np.ndarray) -> None:
+        """Publish angles in rad, in the order of ``robot.held``; stamp in ns."""
+        self._block.publish(stamp, (angles,))
+
+
+class HeldSubscription:
+    """Takes where held joints are to be driven from the topic."""
+
+    def __init__(self, node: Node, robot: Robot) -> None:
+        self._subscription = PolledSubscription(node, JointState, HELD_TOPIC)
+        self._names = list(robot.held)
+
+    def take(self) -> np.ndarray | None:
+        """Return the newest angles, rad, shape (joints,); None without a new message that fits."""
+        message = self._subscription.newest()
+        if (message is None or list(message.name) != self._names
+                or len(message.position) != len(self._names)
+                or not all(map(math.isfinite, message.position))):
+            return None
+        return np.array(message.position)
+
+
+KINDS = ('joint_states', *COMMAND_TOPICS)
+#: Least time between two warnings about commands, s.
+QUIET = 10.0
+
+
+class _Bad(CpgError):
+    """A message that cannot be used."""
+
+
+class Commands:
+    """The angles of the last valid messages.
+
+    ``take`` reads the messages that have arrived, in the thread that uses them. A message is used
+    as a whole or, if anything in it is invalid, not at all.
+
+    Attributes:
+        angles: rad, in ``robot.order``; before the first command, those passed to __init__.
+        topics: the names of the topics, resolved.
+        refused: why the last ``take`` rejected a message; '' if it did not.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, kind: str, period: float, angles: np.ndarray
+                 ) -> None:
+        """Subscribe to the topics of one kind of command.
+
+        Args:
+            node: that subscribes.
+            robot: whose joints are commanded.
+            kind: one of KINDS.
+            period: between two calls of ``take``, s.
+            angles: before the first command, rad.
+
+        """
+        self._node, self._robot, self._period = node, robot, period
+        self.angles = np.array(angles, dtype=float)
+        self._index = {name: k for k, name in enumerate(robot.order)}
+        # One for each topic: the subscription, what reads a message, and names -> places.
+        self._sources: list[tuple[PolledSubscription, Any]] = []
+        self._known: dict[str, tuple[list[str], np.ndarray]] = {}
+        self._fresh: list[bool] = []
+        self._since = 0
+        self.refused = ''
+        if kind == 'joint_states':
+            for leg, joints in robot.legs.items():
+                topic = f'{leg}/joint_states'
+                self._listen(JointState, topic, self._states, tuple(one.name for one in joints))
+        elif kind == 'joint_trajectory':
+            self._listen(JointTrajectory, COMMAND_TOPICS[kind], self._trajectory)
+        else:
+            self._listen(Float64MultiArray, COMMAND_TOPICS[kind], self._array)
+        self.topics = [subscription.topic for subscription, _ in self._sources]
+
+    def _listen(self, kind: type, topic: str, read: Any, *known: Any) -> None:
+        subscription = PolledSubscription(self._node, kind, topic, QoSProfile(depth=10))
+        self._sources.append((subscription, partial(read, topic, *known)))
+        self._fresh.append(False)
+
+    @property
+    def connected(self) -> bool:
+        """Whether every topic has a publisher."""
+        return all(self._node.count_publishers(topic) for topic in self.topics)
+
+    def expect(self, since: int) -> None:
+        """Expect commands that are not stamped before an instant, ns."""
+        self._since = since
+        self._fresh = [False] * len(self._fresh)
+
+    def take(self) -> bool:
+        """Read what has arrived; return whether every topic has brought an expected command."""
+        self.refused = ''
+        for k, (subscription, read) in enumerate(self._sources):
+            # All of them: an invalid one is reported even if a valid one has followed.
+            for message, _ in subscription.take():
+                try:
+                    self._fresh[k] |= read(message)
+                except _Bad as error:
+                    self.refused = str(error)
+                    self._node.get_logger().warning(f'ignored: {error}',
+                                                    throttle_duration_sec=QUIET)
+        return all(self._fresh)
+
+    def _states(self, topic: str, wanted: tuple[str, ...], message: JointState) -> bool:
+        self._apply(topic, wanted, message.name, message.position)
+        stamp = message.header.stamp
+        nanoseconds = 1_000_000_000 * stamp.sec + stamp.nanosec
+        return not nanoseconds or nanoseconds >= self._since
+
+    def _trajectory(self, topic: str, message: JointTrajectory) -> bool:
+        if not message.points:
+            raise _Bad(f'{topic}: no points')
+
+        def apart(point: JointTrajectoryPoint) -> float:
+            time = point.time_from_start
+            return abs(time.sec + 1e-9 * time.nanosec - self._period)
+
+        # A controller would interpolate; here it is the point next to the coming instant.
+        point = min(message.points, key=apart)
+        self._apply(topic, self._robot.order, message.joint_names, point.positions)
+        return True
+
+    def _array(self, topic: str, message: Float64MultiArray) -> bool:
+        if len(message.data) != len(self.angles):
+            raise _Bad(f'{topic}: {len(message.data)} numbers for {len(self.angles)} joints')
+        self._write(topic, self._robot.order, slice(None), message.data)
+        return True
+
+    def _apply(self, topic: str, wanted: tuple[str, ...], names: list[str],
+               positions: Sequence[float]) -> None:
+        known = self._known.get(topic)
+        if known is None or known[0] != names:
+            known = list(names), self._places(topic, wanted, names)
+            self._known[topic] = known
+        if len(positions) != len(names):
+            raise _Bad(f'{topic}: {len(positions)} positions for {len(names)} joints')
+        self._write(topic, names, known[1], positions)
+
+    def _places(self, topic: str, wanted: tuple[str, ...], names: list[str]) -> np.ndarray:
+        for name in names:
+            if name not in wanted:
+                raise _Bad(f"{topic}: joint '{name}' is not one of {', '.join(wanted)}")
+        for name in wanted:
+            if names.count(name) != 1:
+                raise _Bad(f"{topic}: joint '{name}' is "
+                           f"{'there twice' if name in names else 'missing'}")
+        return np.array([self._index[name] for name in names])
+
+    def _write(self, topic: str, names: Sequence[str], places: Any, values: Sequence[float]
+               ) -> None:
+        for name, value in zip(names, values, strict=True):
+            if not abs(value) <= LARGEST:
+                raise _Bad(f"{topic}: joint '{name}' at {value}")
+        self.angles[places] = values

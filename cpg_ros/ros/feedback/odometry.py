@@ -1,0 +1,113 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Publishes the leg odometry of a generator's feedback, and its transform."""
+
+from importlib import import_module, util
+
+from cpg_ros.feedback.estimate import INSTANT, Odometry, RATE
+from cpg_ros.ros.node.message_block import each, MessageBlock, places, Template
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry as OdometryMessage
+import numpy as np
+from rclpy.node import Node
+
+# Messages of odometry: nav_msgs/Odometry and, where tf2_msgs is installed, the transform.
+
+#: Numbers of a position, an orientation w x y z, a twist, and the covariances of pose and twist.
+POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
+#: Time between two estimates of the pose that are published, and between two transforms, s.
+PERIOD = 0.02
+
+
+def has_transforms() -> bool:
+    """Return whether transforms can be published: PyPI has no tf2_msgs."""
+    return util.find_spec('tf2_msgs') is not None
+
+
+def odometry(topic: str, frames: tuple[str, str], *places: np.ndarray) -> tuple[str, Template]:
+    """Return topic and message; places are those of its numbers in the block.
+
+    Args:
+        topic: to be published on.
+        frames: of the pose, and of the twist and of what moves.
+        places: of position, orientation, twist and, if they change, both covariances.
+
+    """
+    message = OdometryMessage(child_frame_id=frames[1])
+    message.header.frame_id = frames[0]
+    pose, moving = message.pose.pose, message.twist.twist
+    numbers = [*each(pose.position, 'xyz', places[0]), *each(pose.orientation, 'wxyz', places[1]),
+               *each(moving.linear, 'xyz', places[2][:3]),
+               *each(moving.angular, 'xyz', places[2][3:])]
+    numbers += [(part, 'covariance', where) for part, where in zip(
+        (message.pose, message.twist), places[3:], strict=False)]
+    return topic, Template(message, [message.header.stamp], numbers=numbers)
+
+
+def transform(frames: tuple[str, str], position: np.ndarray, orientation: np.ndarray
+              ) -> tuple[str, Template]:
+    """Return the topic /tf and the message with the same pose."""
+    message = TransformStamped(child_frame_id=frames[1])
+    message.header.frame_id = frames[0]
+    return '/tf', Template(
+        import_module('tf2_msgs.msg').TFMessage(transforms=[message]), [message.header.stamp],
+        numbers=[*each(message.transform.translation, 'xyz', position),
+                 *each(message.transform.rotation, 'wxyz', orientation)])
+
+
+class OdometryPublisher:
+    """Publishes where the base is, 50 times a second."""
+
+    def __init__(self, node: Node, source: Odometry, topic: str, frames: tuple[str, str],
+                 transforms: bool) -> None:
+        """Prepare.
+
+        Args:
+            node: that publishes.
+            source: of what is published.
+            topic: of the nav_msgs/Odometry.
+            frames: the one in which the robot moves, and that of its base.
+            transforms: whether to publish the transform between them, too.
+
+        """
+        sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
+        parts = places(sizes)
+        messages = [odometry(topic, frames, *parts)]
+        if transforms and has_transforms():
+            messages.append(transform(frames, *parts[:2]))
+        elif transforms:
+            node.get_logger().warning(
+                f'no transform from {frames[0]} to {frames[1]}: tf2_msgs is not installed '
+                "('make messages' or ros-jazzy-tf2-msgs)")
+        self._source, self._elapsed = source, 0.0
+        self._block = MessageBlock(node, sizes, messages)
+        self._pose = np.zeros((6, 6))
+        self._values = [np.zeros(size) for size in sizes]
+        self._values[4][::7] = np.square([*INSTANT, RATE, RATE, RATE])
+
+    def publish(self, dt: float, stamp: int) -> None:
+        """Publish if it is time; dt since the last call in s, stamp in ns."""
+        self._elapsed += dt
+        # A hair less: ticks are not exact.
+        if self._elapsed < 0.99 * PERIOD:
+            return
+        self._elapsed = 0.0
+        position, orientation, twist, pose, _ = self._values
+        source = self._source
+        position[:] = source.pose[:3]
+        source.orientation(orientation)
+        twist[:] = source.twist
+        pose[:] = source.pose_covariance(self._pose).ravel()
+        self._block.publish(stamp, self._values)

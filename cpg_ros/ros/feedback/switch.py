@@ -1,0 +1,410 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Switches the feedback of a generator on and off, as its parameters say."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, cast
+
+from cpg_ros.dynamics.integration.compilation import COMPILED
+from cpg_ros.feedback.biped.feedback import BalancedPattern
+from cpg_ros.feedback.biped.gains import BipedGains
+from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
+from cpg_ros.feedback.estimate import Odometry, SCALE
+from cpg_ros.feedback.feedback import warm_up
+from cpg_ros.feedback.gains import GAINS as GAIN_OF
+from cpg_ros.feedback.gains import Gains, LAWS, robot_gains
+from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
+from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
+from cpg_ros.motion.body_file import GAIT_SPEEDS
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.ros.command_topics import HeldPublisher, KpScalePublisher
+from cpg_ros.ros.feedback.loop import BalanceLoop, FeedbackLoop, Motion
+from cpg_ros.ros.feedback.odometry import OdometryPublisher
+from cpg_ros.ros.feedback.sensor_input import CONTACTS, SensorInput
+from cpg_ros.ros.kernels import announced, BALANCE, compile_apart, FEEDBACK
+from cpg_ros.ros.node.node_base import StartError
+from cpg_ros.ros.node.parameters import fixed, one_of, Spec
+import numpy as np
+from rclpy.parameter import Parameter
+
+# The parameters of the feedback: its laws, their gains, and the topics that it listens to.
+
+PREFIX = 'feedback.'
+#: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
+#: ``ros2 param dump`` could not nest them.
+ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
+#: Its default is false where the feedback cannot be on.
+SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
+              'is not calibrated, if the generator itself publishes the topic joint_states '
+              "that it would measure from, or if it commands a robot's controllers (command)")
+
+#: Topics, read when the feedback is first switched on.
+TOPICS = fixed({
+    f'{PREFIX}imu_topic': Spec('imu', "topic of the robot's sensor_msgs/Imu, which must have an "
+                               'orientation'),
+    f'{PREFIX}joint_states_topic': Spec('joint_states', "topic of the robot's measured "
+                                        'sensor_msgs/JointState, which must have velocities'),
+    f'{PREFIX}contacts': Spec('foot_contacts', 'source of the loads on the feet: one message '
+                              'with all of them, a geometry_msgs/WrenchStamped for each leg, or '
+                              'the efforts of the measured joints', constraints=one_of(CONTACTS)),
+    f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
+                                    'with the loads on the feet in N; with wrenches, the name of '
+                                    "each leg's own topic, as in lh/foot_contacts"),
+    f'{PREFIX}imu_mount': Spec([0.0, 0.0, 0.0], "roll, pitch and yaw of the IMU's frame in that "
+                               'of the base [rad], as in the origin of its URDF joint; by default '
+                               'that of the robot file'),
+    f'{PREFIX}max_delay': Spec(LATE, 'largest age of measurements when they are used, by their '
+                               'stamps, low-passed over 0.1 s [s]: feedback fades out above it; '
+                               f'by default {LATE:g}, and {LATE_BALANCE:g} for a robot with soles',
+                               0.001, DELAYED),
+    f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, where the base is by the '
+                                    "robot's legs and IMU, such as odom; none by default"),
+    f'{PREFIX}odometry_scale': Spec(1.0, 'true way over the way by odometry, of the robot and its '
+                                    'ground', 0.5, 2.0),
+    f'{PREFIX}odometry_scale_error': Spec(SCALE, 'standard deviation of that scale, for the '
+                                          'covariance: about 0.015 where it was measured', 0.0,
+                                          0.5),
+    f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),
+    f'{PREFIX}base_frame': Spec('base_link', "frame of the robot's base"),
+    f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '
+                                 'where tf2_msgs is installed')})
+#: Switches of the laws and gains, all of which can be set at any time.
+
+
+def of_gains(usual: Gains) -> dict[str, Spec]:
+    """Return the parameters of the laws, whose defaults are these gains."""
+    return {**{f'{PREFIX}{law.name}': Spec(getattr(usual, law.name), law.text) for law in LAWS},
+            **{f'{PREFIX}{name}': Spec(getattr(usual, name), f'{gain.text} [{gain.unit}]'
+                                       if gain.unit else gain.text, gain.low, gain.high)
+               for name, gain in GAIN_OF.items()}}
+
+
+#: Those of a Go2.
+GAINS = of_gains(Gains())
+SPECS = {**TOPICS, **GAINS}
+#: The same of bipeds with soles; the generator's parameter ``frequency`` is their clock's.
+BIPED_GAINS = {f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
+                                       else gain.text, gain.low, gain.high)
+               for name, gain in BIPED_GAIN_OF.items() if name != 'frequency'}
+
+
+def specs(robot: Robot) -> dict[str, Spec]:
+    """Return all parameters of a robot's feedback but its switch.
+
+    Raises:
+        InputError: the robot file has gains of a biped that cannot be used.
+
+    """
+    mount = robot.feedback.imu_mount if robot.feedback is not None else ()
+    balanced = robot.biped is not None
+    topics = {**TOPICS, **{f'{PREFIX}{name}': replace(TOPICS[f'{PREFIX}{name}'], default=value)
+                           for name, value in (('imu_mount', list(mount) or [0.0] * 3),
+                                               ('max_delay', LATE_BALANCE if balanced else LATE))}}
+    if robot.biped is None:
+        return {**topics, **of_gains(robot_gains(robot))}
+    own = BipedGains.of_body(robot.biped)
+    return {**topics, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
+                         for name, spec in BIPED_GAINS.items()}}
+
+
+def gains(value: Callable[[str], Any]) -> Gains:
+    """Return the gains; ``value`` returns that of a parameter, by its name behind PREFIX."""
+    return Gains(*map(value, Gains._fields))
+
+
+def biped_gains(value: Callable[[str], Any]) -> BipedGains:
+    """Return a biped's gains in its walk, the same way."""
+    return BipedGains(**{name: value(name) for name in BIPED_GAIN_OF if name != 'frequency'})
+
+
+def missing_requirements(robot: Robot) -> str:
+    """Return what feedback needs, and this machine or the robot file lacks, or ''."""
+    if not COMPILED:
+        return 'it needs numba, which is not installed'
+    if robot.biped is not None:
+        return ''
+    if robot.geometry is None:
+        return f"robot file '{robot.name}' has no geometry of the legs (part geometry)"
+    if all(motion.efference is None for motion in robot.motions.values()):
+        return f"robot file '{robot.name}' has no gait with an efference copy (gaits.*.efference)"
+    return ''
+
+
+def partial_legs(robot: Robot) -> list[str]:
+    """Return a line for each leg that gets only some of the corrections."""
+    known = robot.geometry.legs if robot.geometry is not None else {}
+    return [f'feedback moves the leg {leg} forward and up only: it has no hip that abducts'
+            if leg in known else
+            f'feedback leaves the leg {leg} alone: the robot file has no geometry of it'
+            for leg in robot.legs if leg not in known or len(known[leg].joints) == 2]
+
+
+def default_enabled(node: Any, robot: Robot, combined: str, commands: bool) -> Spec:
+    """Return the parameter that enables the feedback, by default true where nothing prevents it.
+
+    On a robot's controllers the user enables it, who has checked the signs of its sensors.
+
+    Args:
+        node: that has declared the feedback's topics.
+        robot: to be corrected.
+        combined: topic of all joints that the node publishes, or ''.
+        commands: whether the node commands controllers.
+
+    """
+    measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
+    own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
+    helps = robot.feedback is None or robot.feedback.enabled
+    able = helps and not (own or missing_requirements(robot))
+    if able and commands and ENABLED not in node._parameter_overrides:
+        node.get_logger().info("feedback is off, as by default with a robot's controllers: set "
+                               f'{ENABLED} to true once its sensors are checked')
+    return replace(SWITCH, default=able and not commands)
+
+
+class FeedbackSwitch:
+    """The feedback of a generator, made when it is first switched on.
+
+    Attributes:
+        loop: a FeedbackLoop; None as long as it has not been on.
+
+    """
+
+    def __init__(self, node: Any, pattern: Pattern, motion: Motion, own: Sequence[str]) -> None:
+        """Switch the feedback on if the node's parameters say so.
+
+        Args:
+            node: a StartedNode.
+            pattern: to be corrected.
+            motion: returns the wanted motion of the robot.
+            own: topics that the node publishes itself, resolved.
+
+        Raises:
+            StartError: the feedback is enabled, and cannot be on.
+
+        """
+        self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
+        self.loop: Any = None
+        self._delays_logged = False
+        self._odometry: OdometryPublisher | None = None
+        if refusal := self.judge([node.get_parameter(ENABLED)]):
+            raise StartError(refusal)
+        self._hindrance = ''
+        #: Whether the robot may move meanwhile.
+        self._started = False
+        self.apply()
+        self._started = True
+
+    def _value(self, name: str) -> Any:
+        return self._node.get_parameter(PREFIX + name).value
+
+    def obstacle(self) -> str:
+        """Return why the feedback cannot be on, or ''."""
+        if missing := missing_requirements(self._pattern.robot):
+            return missing
+        topic = self._node.resolve_topic_name(self._value('joint_states_topic'))
+        if topic in self._own:
+            return (f"feedback.joint_states_topic '{topic}' is the generator's own: set "
+                    "combined_topic to '', or name the robot's topic")
+        return ''
+
+    def judge(self, parameters: Sequence[Parameter]) -> str:
+        """Return why a batch of changes is rejected, or ''."""
+        switched_on = any(one.name == ENABLED and one.value is True for one in parameters)
+        obstacle = self.obstacle() if switched_on else ''
+        return f'no feedback: {obstacle}' if obstacle else ''
+
+    def refuses(self, plan: GaitPlan) -> str:
+        """Return why a gait cannot be run, or '': feedback without an efference copy waits."""
+        return ''
+
+    def apply(self) -> None:
+        """Apply the parameters."""
+        wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()
+        if wanted and self.loop is None:
+            self.loop = self._make()
+        if self.loop is not None:
+            self._set_gains()
+            self.loop.wanted = wanted and not self._hindrance
+
+    def hinder(self, reason: str) -> None:
+        """Fade the feedback out as long as there is a reason, '' for none."""
+        self._hindrance = reason
+        if self.loop is not None:
+            self.loop.wanted = (self._node.get_parameter(ENABLED).value and not self.obstacle()
+                                and not reason)
+
+    def _make(self) -> Any:
+        """Return the loop, its kernels compiled."""
+        robot, pattern = self._pattern.robot, self._pattern
+        geometry = geometry_of(robot)
+        if self._started:
+            compile_apart(self._node, 'feedback', FEEDBACK)
+        with announced(self._node, 'the feedback', FEEDBACK):
+            warm_up(geometry, len(robot.joints))
+        loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)
+        if pattern.drive is None:
+            # Speed and heading are closed by the strides.
+            pattern.attach(StrideCommand(len(robot.legs)))
+        for line in partial_legs(robot):
+            self._node.get_logger().warning(line)
+        self._kp_scale = KpScalePublisher(self._node)
+        if topic := self._value('odometry_topic'):
+            loop.odometry = Odometry(geometry, self._value('odometry_scale'),
+                                     self._value('odometry_scale_error'))
+            self._odometry = OdometryPublisher(
+                self._node, loop.odometry, topic,
+                (self._value('odom_frame'), self._value('base_frame')),
+                self._value('odometry_tf'))
+        return loop
+
+    def _inputs(self, geometry: Geometry | float) -> SensorInput:
+        mount = self._value('imu_mount')
+        if len(mount) != 3 or not np.isfinite(mount).all():
+            raise StartError(f'feedback.imu_mount is {list(mount)}: it must be roll, pitch and '
+                             'yaw in rad')
+        return SensorInput(self._node, self._pattern.robot, geometry, *map(self._value, (
+            'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic', 'imu_mount',
+            'max_delay')))
+
+    def _set_gains(self) -> None:
+        self.loop.feedback.gains = gains(self._value)
+
+    def learn(self, plan: GaitPlan) -> None:
+        """Tabulate a gait before the pattern changes to it."""
+        if self.loop is not None:
+            self.loop.learn(plan)
+
+    def sense(self, dt: float, stamp: int) -> None:
+        """Correct the coming tick by the sensors; dt in s, stamp in ns."""
+        if self.loop is not None:
+            self.loop.sense(dt, 1e-9 * stamp)
+            if self.loop.fraction > 0.0 and not self._delays_logged:
+                self._delays_logged = True
+                self._log_delays()
+
+    def _log_delays(self) -> None:
+        delays = [f'{name} {1e3 * delay:.1f} ms' for name, delay in self.loop.latencies().items()]
+        self._node.get_logger().info(
+            'feedback: age of the measurements when they are used: '
+            f'{", ".join(delays) or "unknown, messages have no stamps"} '
+            f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
+
+    def targets(self, position: np.ndarray) -> np.ndarray:
+        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        return position if self.loop is None else self.loop.targets(position)
+
+    def publish(self, dt: float, stamp: int) -> None:
+        """Publish what is due; dt since the last call, s, and stamp, ns."""
+        if self.loop is not None:
+            self._kp_scale.publish(dt, self.loop.kp_scale)
+            if self._odometry is not None and self.loop.fraction > 0.0:
+                self._odometry.publish(dt, stamp)
+
+    def restart(self) -> None:
+        """Start again, as where simulated time jumps back."""
+        if self.loop is not None:
+            self.loop.restart()
+
+    @property
+    def active(self) -> bool:
+        """Whether the gait is being corrected."""
+        return self.loop is not None and self.loop.fraction > 0.0
+
+    @property
+    def out(self) -> str:
+        """What interrupts feedback that has been active, or ''."""
+        loop = self.loop
+        return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
+
+    def _text(self) -> str:
+        return f'{100.0 * self.loop.fraction:.0f} %'
+
+    def state(self, now: float) -> dict[str, str]:
+        """Return its state and the ages of its inputs, for /diagnostics; now in s."""
+        loop = self.loop
+        if loop is None or not loop.wanted:
+            text = 'off'
+        elif loop.faults:
+            text = f'{"waiting" if loop.waiting else "out"}: {loop.faults}'
+        else:
+            text = self._text()
+        if loop is None:
+            return {'feedback': text}
+        return {'feedback': text,
+                **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
+                   for name, age in loop.ages(now).items()},
+                **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'
+                   for name, delay in loop.latencies().items()},
+                'largest delay [ms]': f'{1e3 * self._value("max_delay"):.1f}'}
+
+
+# Switches the balance of a biped on and off, as the generator's parameters say.
+
+class BalanceSwitch(FeedbackSwitch):
+    """The feedback of a generator of a biped with soles.
+
+    Attributes:
+        loop: a BalanceLoop; None as long as it has not been on.
+
+    """
+
+    _held: HeldPublisher | None = None
+
+    def obstacle(self) -> str:
+        """Return why the feedback cannot be on, or ''."""
+        if self._value('contacts') == 'efforts':
+            return ("feedback.contacts 'efforts' is for feet that are points: a robot with soles "
+                    'needs foot_contacts or wrenches')
+        return super().obstacle()
+
+    def hinder(self, reason: str) -> None:
+        """Do nothing: without its balance the robot falls."""
+
+    def _make(self) -> BalanceLoop:
+        pattern = cast(BalancedPattern, self._pattern)
+        biped = pattern.robot.biped
+        assert biped is not None
+        if self._started:
+            compile_apart(self._node, 'balance', BALANCE)
+        inputs = self._inputs(GRAVITY * biped.total)
+        if self._value('odometry_topic'):
+            self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
+        with announced(self._node, 'the feedback', BALANCE):
+            return BalanceLoop(pattern, inputs, self._motion)
+
+    def refuses(self, plan: GaitPlan) -> str:
+        """Return why a gait cannot be run, or ''."""
+        if plan.balanced or not self._value('enabled'):
+            return ''
+        return f'no law balances the {plan.gait}: {", ".join(GAIT_SPEEDS)} are those there are'
+
+    def _set_gains(self) -> None:
+        self.loop.feedback.set_gains('walk', biped_gains(self._value))
+
+    def publish(self, dt: float, stamp: int) -> None:
+        """Publish where joints of no leg go; log what became of the balance."""
+        if self.loop is not None and self.loop.feedback.arms.swing:
+            if self._held is None:
+                self._held = HeldPublisher(self._node, self._pattern.robot)
+            self._held.publish(stamp, cast(BalancedPattern, self._pattern).held_angles)
+        if self.loop is not None and (news := self.loop.news()):
+            self._node.get_logger().warning(news)
+
+    def _text(self) -> str:
+        return str(self.loop.state)

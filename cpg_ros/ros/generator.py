@@ -1,0 +1,550 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The generator node: a central pattern generator that publishes joint states in real time."""
+
+from collections.abc import Callable
+from functools import partial
+import sys
+import time
+from typing import Any
+
+from cpg_ros.dynamics.integration.c_kernel import KERNELS
+from cpg_ros.feedback.biped.feedback import BalancedPattern
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import PlanError
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.networks.registry import find_network, NetworkError
+from cpg_ros.ros.feedback import switch
+from cpg_ros.ros.feedback.sensor_input import CONTACTS
+from cpg_ros.ros.feedback.switch import (
+    BalanceSwitch,
+    default_enabled,
+    ENABLED,
+    FeedbackSwitch,
+    FORMER,
+    PREFIX,
+)
+from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, MeasuredPose, Outputs
+from cpg_ros.ros.generator_parameters import (
+    COMMANDS,
+    exclusive,
+    gait_spec,
+    KERNEL,
+    NETWORK,
+    network_for,
+    Planner,
+    presets_of,
+    specs,
+)
+from cpg_ros.ros.joint_tracking import JointTracking
+from cpg_ros.ros.kernels import compile_kernels
+from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers, STEADY
+from cpg_ros.ros.node.logging import QUEUE
+from cpg_ros.ros.node.node_base import Lifecycle, run, StartedNode, StartError
+from cpg_ros.ros.node.polled import latched, OVERRIDABLE
+from cpg_ros.ros.node.ticker import RealTime, SPECS, Ticker
+from diagnostic_msgs.msg import DiagnosticStatus
+import numpy as np
+from rcl_interfaces.msg import ParameterType, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.timer import Timer
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+# The generator's health, once a second on /diagnostics.
+
+#: Time between two warnings of jumps of simulated time in the log, s.
+QUIET = 5.0
+
+
+class Diagnostics:
+    """Reports ERROR on a fault until the pattern is back, and on other publishers and joints that
+    do not follow; else WARN.
+
+    A warning is for lateness, and for silence: what is not published is not OK.
+    """
+
+    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
+                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch,
+                 awaited: Callable[[], str], lag: Callable[[], str]) -> None:
+        self._lag = lag
+        self._feedback, self._awaited = feedback, awaited
+        self._node, self._pattern, self._ticker = node, pattern, ticker
+        self._others, self._cmd_vel = others, cmd_vel
+        self._before = self._counts()
+        self._silent = 0
+        self._publisher = HealthPublisher(node, 'pattern', pattern.robot.name, self._status)
+
+    def _counts(self) -> dict[str, int]:
+        ticker, pattern = self._ticker, self._pattern
+        return {'ticks': ticker.ticks, 'late ticks': ticker.late,
+                'dropped ticks': ticker.dropped, 'jumps back of simulated time': ticker.jumps,
+                'watchdog re-seeds': pattern.faults, 'ticks held by limits': pattern.held}
+
+    def _status(self) -> Health:
+        """Return the status of the last second."""
+        counts, before, pattern = self._counts(), self._before, self._pattern
+        self._before = counts
+        new = {key: counts[key] - before[key] for key in counts}
+        plan = pattern.plan
+        self._silent = 0 if new['ticks'] and not self._ticker.paused else self._silent + 1
+        misfit = self._cmd_vel.look_for_misfits() if self._cmd_vel else ''
+        if new['watchdog re-seeds'] or pattern.recovering:
+            level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
+            if plan.gain == 0.0:
+                text += ' (symmetry_gain is 0: no gait is stable)'
+        elif self._others.text:
+            level, text = DiagnosticStatus.ERROR, self._others.text
+        elif lag := self._lag():
+            level, text = DiagnosticStatus.ERROR, lag
+        elif new['jumps back of simulated time']:
+            level = DiagnosticStatus.WARN
+            text = self._why_anew(new['jumps back of simulated time'])
+            self._node.get_logger().warning(text, throttle_duration_sec=QUIET)
+        elif self._silent > 1.0 / self._ticker.rate:
+            level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
+        elif 100 * new['dropped ticks'] > new['ticks']:
+            level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
+        elif misfit:
+            level, text = DiagnosticStatus.WARN, misfit
+        elif self._feedback.out:
+            level, text = DiagnosticStatus.WARN, f'no feedback: {self._feedback.out}'
+        elif new['ticks held by limits'] and not self._feedback.active:
+            level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'
+        elif 100 * new['late ticks'] > new['ticks']:
+            level, text = DiagnosticStatus.WARN, f'{new["late ticks"]} late ticks'
+        else:
+            level, text = DiagnosticStatus.OK, self._state()
+        values: dict[str, object] = {
+            'gait': plan.name, 'character': plan.character, 'state': self._state(),
+            'network': plan.orbit.network.name,
+            'frequency [Hz]': f'{plan.frequency:.6g}',
+            'period [model time]': f'{plan.orbit.period:.8g}',
+            'symmetry gain [1/model time]': f'{plan.gain:.4g}',
+            'rate wanted [Hz]': f'{self._ticker.rate:.6g}', 'ticks in the last second':
+            new['ticks'], **counts,
+            'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
+            'log lines dropped': QUEUE.dropped}
+        if self._cmd_vel:
+            values['cmd_vel'] = self._cmd_vel.state
+        values |= self._feedback.state(1e-9 * self._node.get_clock().now().nanoseconds)
+        return level, text, values
+
+    def _why_anew(self, jumps: int) -> str:
+        publishers = self._node.count_publishers('/clock')
+        text = ('simulated time jumped back: starting again from the stand' if jumps == 1 else
+                f'simulated time jumped back {jumps} times in a second')
+        if publishers > 1:
+            text += f'; /clock has {publishers} publishers, stop all but one'
+        return text
+
+    def _why_silent(self) -> str:
+        clock: Any = self._node.get_clock()
+        now = clock.now().nanoseconds
+        if self._ticker.waiting:
+            return f'waiting for {self._awaited()}'
+        if not clock.ros_time_is_active:
+            return f'no tick for {self._silent} s'
+        return f'simulated time is still {1e-9 * now:.3f} s' if now else 'no /clock yet'
+
+    def _state(self) -> str:
+        pattern = self._pattern
+        if self._ticker.waiting:
+            return f'waiting for {self._awaited()}'
+        if pattern.standing:
+            return 'standing'
+        if pattern.level < 1.0:
+            return 'ramping up' if pattern.enabled else 'ramping down'
+        return 'changing gait' if pattern.in_transition else 'running'
+
+
+NAME = 'cpg_generator'
+#: When a signal ends the node, the ramp takes this long, and the node ends by the later time, s.
+LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
+#: A biped that balances slows down, stands and crouches first: by this time, s.
+LAST_CROUCH = 8.0
+#: Two nodes know of one another this long after the later one joined the graph, s: they are
+#: announced every 3 s, and the first announcements of a busy machine are lost at times.
+DISCOVERY = 3.5
+#: How often the pose to begin from is searched for, s.
+SEARCH = 0.05
+
+
+class Generator(StartedNode):
+    """Parameters, topics and services around one moving pattern."""
+
+    def __init__(self) -> None:
+        """Declare the parameters, check them, and prepare to start.
+
+        Raises:
+            CpgError: a parameter or the robot file cannot be used.
+
+        """
+        super().__init__(NAME)
+        joined = time.monotonic()
+        given = {name: one.value for name, one in self._parameter_overrides.items()}
+        self._parameter_overrides['network'] = Parameter('network', value=network_for(
+            given.get('network', NETWORK.default), given.get('robot')))
+        self._declare({'network': NETWORK, 'kernel': KERNEL})
+        self._one_of('kernel', KERNELS)
+        try:
+            network = find_network(self._value('network'))
+        except NetworkError as error:
+            raise StartError(f'network {error}') from error
+        compile_kernels(self._value('network'), self._value('kernel'), self)
+        self._declare(specs(network))
+        self._declare({'exclusive': exclusive(self._value('command'))})
+        presets = presets_of(network, self._value('presets'))
+        self._one_of('gait', tuple(presets))
+        self._one_of('command', COMMANDS)
+        robot = load_robot(self._value('robot'))
+        if network.name not in robot.networks:
+            raise StartError(f"robot file '{robot.name}' is for the network "
+                             f"{' or '.join(robot.networks)}, not '{network.name}'")
+        self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
+        # Its descriptor lists those of the file, too.
+        descriptor = gait_spec(network, self._planner.offered).descriptor()
+        descriptor.type = ParameterType.PARAMETER_STRING
+        self.set_descriptor('gait', descriptor)
+        self._declare(switch.specs(robot))
+        if FORMER in self._parameter_overrides:
+            raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
+        self._declare({ENABLED: default_enabled(self, robot, self._value('combined_topic'),
+                                      self._value('command') != 'none')})
+        self._one_of('feedback.contacts', CONTACTS)
+        for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
+            self._parameter_overrides[parameter.name] = parameter
+        self._declare(self._planner.specs(self._value('gait')))
+        plan = self._planner.plan(self._values())
+        self._planner.prepare()
+
+        steered, managed = self._value('cmd_vel'), self._value('managed')
+        autostart = self._value('autostart') and not managed
+        soled = robot.biped is not None
+        self.pattern = (BalancedPattern if soled else Pattern)(
+            plan, self._value('ramp'), autostart and not steered,
+            StrideCommand(len(robot.legs)) if steered and not soled else None)
+        self._cmd_vel = CmdVel(self, self.pattern, plan, autostart,
+                               lambda: self._value('cmd_vel_timeout'),
+                               lambda: self._value('ramp'),
+                               lambda: self._feedback.active) if steered else None
+        self._outputs = Outputs(self, robot, self._value('combined_topic'),
+                                self._value('command'))
+        self._feedback = (BalanceSwitch if soled else FeedbackSwitch)(
+            self, self.pattern, self._motion, self._outputs.topics)
+        self._cells = CellsPublisher(self, network)
+        self._measured = self._measured_pose(robot)
+        #: What was sent last, rad; of the ticks.
+        self._sent: np.ndarray | None = None
+        self._tracking = JointTracking(self, robot, self._measured, self._commanded,
+                                       self._lag) if self._measured else None
+        #: Searches for the pose to begin from, and why it has not begun.
+        self._search: Timer | None = None
+        self._unmeasured = ''
+        self._gait = self.create_publisher(String, '~/gait', latched(),
+                                           qos_overriding_options=OVERRIDABLE)
+        self.create_service(SetBool, '~/enable', self._enable)
+        real_time = RealTime.of(*map(self._value, SPECS))
+        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
+                             self.pattern.resume, partial(real_time.request, self.get_logger()))
+        self._others = OtherPublishers(self, self._outputs.topics)
+        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
+                                        self._cmd_vel, self._feedback, lambda: self._awaited,
+                                        lambda: self._tracking.text if self._tracking else '')
+        self.add_on_set_parameters_callback(self._judge)
+        self.add_post_set_parameters_callback(self._apply)
+        self._warn_of_unknown()
+        if self._value('exclusive') and self._others.seek(joined + DISCOVERY - time.monotonic()):
+            raise StartError(f'{self._others.text}: stop that publisher, rename the topic, '
+                             'or set exclusive to false')
+        self._lifecycle = Lifecycle(self, {
+            'configure': lambda: self._begin_at_the_stand()[0],
+            'activate': lambda: self._walk(True), 'deactivate': lambda: self._walk(False),
+            'cleanup': self._fall_silent, 'shutdown': self._shut_down}) if managed else None
+
+    # -- parameters -----------------------------------------------------------------------
+
+    def _values(self, changes: list[Parameter] | None = None) -> dict:
+        values = {name: self._value(name) for name in self._planner.names}
+        values.update({p.name: p.value for p in changes or [] if p.name in values})
+        return values
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        return self._planner.complete(super()._complete(parameters), self._values())
+
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Return whether a batch can run as a whole; change nothing."""
+        if any(p.name in self._planner.names for p in parameters):
+            try:
+                plan = self._planner.plan(self._values(parameters))
+            except PlanError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+            if reason := self._feedback.refuses(plan):
+                return SetParametersResult(successful=False, reason=reason)
+        reason = self._feedback.judge(parameters)
+        return SetParametersResult(successful=not reason, reason=reason)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        """Apply a batch that has been accepted and stored."""
+        for parameter in parameters:
+            if parameter.name == 'rate':
+                self.ticker.rate = parameter.value
+        if any(p.name in self._planner.names for p in parameters):
+            plan = self._planner.plan(self._values())
+            self._feedback.learn(plan)
+            self.pattern.apply(plan, self._value('transition'))
+            if self._cmd_vel:
+                self._cmd_vel.follow(plan)
+            self._announce()
+        if any(p.name.startswith(PREFIX) for p in parameters):
+            self._feedback.apply()
+
+    def _announce(self) -> None:
+        plan = self._planner.plan(self._values())
+        self._gait.publish(String(data=plan.name))
+        self.get_logger().info(f'{plan.name} at {plan.frequency:.4g} Hz')
+        self.get_logger().debug(f'period {plan.orbit.period:.6f} model time, symmetry gain '
+                                f'{plan.gain:.3g}')
+        enough = plan.stability.enough
+        if plan.gain < enough:
+            self.get_logger().warning(
+                f'symmetry_gain {plan.gain:g} may be too low for the gait to attract '
+                f'({enough:.3g} is enough): the watchdog may have to put it back again and again')
+
+    # -- the robot ------------------------------------------------------------------------
+
+    def _motion(self) -> tuple[float, float, float]:
+        """Return the speeds forward and to the left, m/s, and the yaw rate, rad/s, wanted."""
+        if self._cmd_vel:
+            return self._cmd_vel.motion
+        return self.pattern.plan.own_speed, 0.0, 0.0
+
+    def _measured_pose(self, robot: Robot) -> MeasuredPose | None:
+        topic = self._value('measured_topic')
+        if topic and self.resolve_topic_name(topic) not in self._outputs.topics:
+            return MeasuredPose(self, robot, topic)
+        if self._leads:
+            raise StartError(
+                f"command '{self._value('command')}' begins at the measured pose, but "
+                + (f"measured_topic '{topic}' is the generator's own: set combined_topic to ''"
+                   if topic else "measured_topic is ''")
+                + ', or set assume_stand to true if nothing measures the joints')
+        return None
+
+    @property
+    def _leads(self) -> bool:
+        """Whether it must know where the joints are before it moves them."""
+        return self._value('command') != 'none' and not self._value('assume_stand')
+
+    def _find_pose(self) -> tuple[str, np.ndarray | None]:
+        """Return why it cannot begin, or '', and the measured pose, None for the stand."""
+        if self._measured is None:
+            return '', None
+        angles = self._measured.take()
+        lacking = self._measured.lacks(angles)
+        if not lacking:
+            return '', angles
+        if self._leads:
+            return f'the pose is not known, and the joints must not jump: {lacking}', None
+        if np.isfinite(angles).any():
+            self.get_logger().warning(f'the pose is not known, starting at the stand: {lacking}')
+        return '', None
+
+    def _begin_at_the_stand(self) -> tuple[str, str]:
+        """Start publishing; return why not, or '', and the name of the pose to start from."""
+        if self._value('exclusive') and self._others.look():
+            return self._others.text, ''
+        refusal, pose = self._find_pose()
+        if refusal:
+            return refusal, ''
+        self._end_search()
+        if self.ticker.paused:
+            self.pattern.restart(self._value('ramp'), False)
+            self._feedback.restart()
+        if pose is not None:
+            self.pattern.start_from(pose, self._value('ramp'))
+        if self.ticker.is_alive():
+            self.ticker.paused = False
+        else:
+            self.ticker.start()
+        return '', 'the stand' if pose is None else 'the measured pose'
+
+    def _look_for_pose(self) -> None:
+        """Start publishing as soon as the pose is measured; log news of why it is not."""
+        refusal, pose = self._begin_at_the_stand()
+        if not refusal:
+            self.get_logger().info(f'beginning from {pose}')
+        elif refusal != self._unmeasured:
+            self.get_logger().warning(f'waiting: {refusal}')
+        self._unmeasured = refusal
+
+    def _end_search(self) -> None:
+        """Wait for the pose no longer."""
+        if self._search is not None:
+            self._search.cancel()
+            self._search, self._unmeasured = None, ''
+
+    @property
+    def _awaited(self) -> str:
+        """What publishing waits for."""
+        if self._search is not None and self._measured is not None:
+            return f'the measured pose on {self._measured.topic}'
+        return '~/enable' if self._lifecycle is None else 'configure'
+
+    def _walk(self, wanted: bool) -> str:
+        """Ramp into the gait, or down to the stand; return ''."""
+        if wanted:
+            self.ticker.stopping = False
+        if self._cmd_vel:
+            self._cmd_vel.enable(wanted)
+        else:
+            self.pattern.enable(wanted, self._value('ramp'))
+        if not wanted:
+            self.ticker.stop_moving()
+        return ''
+
+    def _fall_silent(self) -> str:
+        """Stop publishing; return why not, or ''."""
+        if not self.pattern.standing:
+            return 'it is still ramping down to the stand'
+        self.ticker.paused = True
+        return ''
+
+    def _shut_down(self) -> str:
+        """End the node as a signal does, with a ramp down; return ''."""
+        self.stop.set()
+        return ''
+
+    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success = True
+        response.message = (f'ramping {"up" if request.data else "down"} over '
+                            f'{self._value("ramp"):g} s')
+        if self._lifecycle is not None and request.data:
+            response.success = False
+            response.message = 'this node is managed: activate it instead'
+            return response
+        if self._lifecycle is not None and self._lifecycle.active:
+            self._lifecycle.trigger_deactivate()
+            return response
+        if self.ticker.waiting:
+            if not request.data:
+                self._end_search()
+                response.message = 'nothing is published yet'
+                return response
+            refusal, pose = self._begin_at_the_stand()
+            if refusal:
+                response.success, response.message = False, refusal
+                return response
+            response.message += f' from {pose}'
+        self._walk(request.data)
+        if self._cmd_vel and request.data and not self._cmd_vel.walking:
+            response.message = 'enabled: standing until cmd_vel asks for motion'
+        self.get_logger().info(response.message)
+        return response
+
+    def _commanded(self) -> np.ndarray | None:
+        """Return the angles that were sent last, rad, or None while none are sent."""
+        return None if self.ticker.waiting or self._sent is None else self._sent.copy()
+
+    def _lag(self, reason: str) -> None:
+        """Switch the feedback off while a joint does not follow: it would correct by it."""
+        self._feedback.hinder(reason)
+        if reason:
+            self.get_logger().error(reason)
+        else:
+            self.get_logger().info('all joints follow again')
+
+    def _tick(self, dt: float, stamp: int) -> None:
+        if self.ticker.paused:
+            return
+        self._feedback.sense(dt, stamp)
+        self.pattern.advance(dt)
+        self._sent = self._feedback.targets(self.pattern.position)
+        self._outputs.publish(stamp, dt, self._sent, self.pattern.velocity, self.pattern.phases)
+        self._feedback.publish(dt, stamp)
+        self._cells.publish(dt, self.pattern.state)
+        if self.ticker.stopping and self.pattern.standing:
+            self.ticker.stopping = False
+
+    def _restart(self) -> None:
+        """Start again where simulated time jumped back, which the diagnostics log."""
+        ramp = self._value('ramp')
+        # At the end there is no time for a longer one.
+        self.pattern.restart(min(ramp, LAST_RAMP) if self.stop.is_set() else ramp,
+                             self.pattern.enabled)
+        self._feedback.restart()
+
+    def begin(self) -> None:
+        """Start publishing, unless that waits for ~/enable."""
+        self._announce()
+        names = len(self.pattern.robot.joints)
+        at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
+        if self._lifecycle is not None:
+            self.get_logger().info(f'publishing nothing until it is configured, then {at}')
+        elif self._value('autostart') and self._leads and self._measured is not None:
+            self.get_logger().info('publishing nothing until the pose is measured on '
+                                   f'{self._measured.topic}, then {at}')
+            self._search = self.create_timer(SEARCH, self._look_for_pose, clock=STEADY)
+        elif self._value('autostart'):
+            self.get_logger().info(f'publishing {at}')
+            self.ticker.start()
+        else:
+            self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
+
+    def finish(self) -> None:
+        """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.
+
+        A biped that balances goes into a crouch instead, within LAST_CROUCH; a second signal that
+        comes later than LAST_DEADLINE ends that at once.
+        """
+        began = time.monotonic()
+        crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()
+        deadline = began + (LAST_CROUCH if crouches else LAST_DEADLINE)
+        if self.failure is None and self.ticker.ticks and not self.pattern.standing:
+            self.get_logger().info('coming to a stand and crouching before the end' if crouches
+                                   else f'ramping down over {LAST_RAMP:g} s before the end')
+            if self._cmd_vel:
+                self._cmd_vel.end()
+            self.pattern.enable(False, LAST_RAMP)
+            self.ticker.stop_moving()
+            early = 0
+            while not self.pattern.standing and time.monotonic() < deadline:
+                time.sleep(0.005)
+                # Launched from a terminal, a process gets the same Ctrl-C twice.
+                if time.monotonic() < began + LAST_DEADLINE:
+                    early = len(self.signals)
+                elif len(self.signals) > early:
+                    self.get_logger().warning('a second signal: ending at once')
+                    break
+            time.sleep(min(0.05, 1.0 / self.ticker.rate))
+        self.ticker.end()
+        if self.ticker.is_alive():
+            self.ticker.join(timeout=0.2)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until a signal ends it; return the exit code."""
+    known = {'network': NETWORK, 'kernel': KERNEL, **specs(find_network(NETWORK.default)),
+             ENABLED: switch.SWITCH, **switch.TOPICS}
+    return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
+               "networks and the feedback's gains are listed by ros2 param describe.", known, args,
+               'generator')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

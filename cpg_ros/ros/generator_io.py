@@ -1,0 +1,361 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Walking by the topic cmd_vel: speed, turning, and standing without a command."""
+
+from collections.abc import Callable, Sequence
+import math
+import threading
+import time
+from typing import Any
+
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.networks.network import Network
+from cpg_ros.ros.node.health import node_of, STEADY
+from cpg_ros.ros.node.message_block import MessageBlock, places, Template
+from cpg_ros.ros.node.node_base import StartError
+from cpg_ros.ros.node.polled import best_effort, OVERRIDABLE, PolledSubscription
+from geometry_msgs.msg import Twist, TwistStamped
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+# The generator's messages: joint states, phases and commands every tick, and cells.
+
+#: Names under which ros2_control's controllers listen by default.
+COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',
+                  'forward_position': 'forward_position_controller/commands'}
+#: The cells are published at most this many times a second, as often as people can see.
+FASTEST = 50.0
+
+
+class Outputs:
+    """Per-leg and combined joint states, leg phases, and commands for ros2_control.
+
+    Attributes:
+        topics: those that move joints, resolved.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, combined_topic: str, command: str) -> None:
+        """Prepare all messages.
+
+        Raises:
+            StartError: the combined topic is one of the others.
+
+        """
+        own = [*(f'{leg}/joint_states' for leg in robot.legs), *COMMAND_TOPICS.values()]
+        if combined_topic:
+            name = node.resolve_topic_name(combined_topic)
+            for topic in (*own, '~/phase'):
+                if name == node.resolve_topic_name(topic):
+                    raise StartError(f"combined_topic '{combined_topic}' is the generator's own "
+                                     f'{topic}: it would be published twice on one topic')
+        count, legs = len(robot.joints), len(robot.legs)
+        sizes = count, count, legs
+        positions, velocities, phases = places(sizes)
+        messages: list[tuple[str, Template]] = []
+        start = 0
+        for leg, joints in robot.legs.items():
+            part = slice(start, start + len(joints))
+            messages.append((f'{leg}/joint_states', joint_state(
+                [joint.name for joint in joints], positions[part], velocities[part])))
+            start = part.stop
+        order = list(robot.places)
+        positions, velocities = positions[order], velocities[order]
+        if combined_topic:
+            messages.append((combined_topic, joint_state(robot.order, positions, velocities)))
+        messages.append(('~/phase', labelled(tuple(robot.legs), phases)))
+        if command == 'joint_trajectory':
+            # One point a message, reached a period after it: stamp 0 means from now.
+            point = JointTrajectoryPoint()
+            messages.append((COMMAND_TOPICS[command], Template(
+                JointTrajectory(joint_names=list(robot.order), points=[point]),
+                durations=[point.time_from_start],
+                numbers=[(point, 'positions', positions), (point, 'velocities', velocities)])))
+        elif command == 'forward_position':
+            array = Float64MultiArray()
+            messages.append((COMMAND_TOPICS[command],
+                             Template(array, numbers=[(array, 'data', positions)])))
+        self._block = MessageBlock(node, sizes, messages)
+        phase = node.resolve_topic_name('~/phase')
+        self.topics = [topic for topic in self._block.topics if topic != phase]
+
+    def publish(self, stamp: int, dt: float, position: np.ndarray, velocity: np.ndarray,
+                phases: np.ndarray) -> None:
+        """Publish everything: stamp in ns, dt in s, rad and rad/s by joint, phases in cycles."""
+        self._block.publish(stamp, (position, velocity, phases), round(1e9 * dt))
+
+
+class CellsPublisher:
+    """Publishes the network on ``~/cells``: a row for each variable of a cell, one for each rate.
+
+    Rates are in model time.
+    """
+
+    def __init__(self, node: Node, network: type[Network]) -> None:
+        rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
+        count = len(rows) * network.cells
+        message = Float64MultiArray()
+        message.layout.dim = [
+            MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
+            MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
+        self._block = MessageBlock(node, [count], [
+            ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))])
+        self._elapsed = 1.0 / FASTEST
+
+    def publish(self, dt: float, state: np.ndarray) -> None:
+        """Publish a state and its rate, if one is due.
+
+        Args:
+            dt: since the last call, s.
+            state: and its rate, shape (2, variables * cells).
+
+        """
+        self._elapsed += dt
+        if self._elapsed >= (1.0 - 1e-6) / FASTEST:
+            self._elapsed = 0.0
+            self._block.publish(0, (state.ravel(),))
+
+
+def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
+    """Return a template of joint states.
+
+    Args:
+        names: of the joints.
+        parts: which of a block's numbers are their positions, velocities and, if there are any,
+            efforts.
+
+    """
+    message = JointState(name=list(names))
+    fields = zip(('position', 'velocity', 'effort'), parts, strict=False)
+    return Template(message, [message.header.stamp],
+                    numbers=[(message, name, part) for name, part in fields])
+
+
+def labelled(names: tuple[str, ...], places: np.ndarray) -> Template:
+    """Return a template of an array with a number for each name; its label lists the names."""
+    message = Float64MultiArray()
+    message.layout.dim = [MultiArrayDimension(label=','.join(names), stride=1, size=len(names))]
+    return Template(message, numbers=[(message, 'data', places)])
+
+
+# The joint angles that the robot's own driver publishes.
+
+#: Older joint states say nothing about where the joints are now, s.
+FRESH = 1.0
+
+
+class MeasuredPose:
+    """The newest angles of the joints on a topic of joint states, read on demand.
+
+    Attributes:
+        topic: its resolved name.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, topic: str) -> None:
+        self._index = {joint.name: k for k, joint in enumerate(robot.joints)}
+        self._angles = np.full(len(self._index), math.nan)
+        self._arrived = np.zeros(len(self._index), dtype=np.int64)
+        # Several publishers may share the topic.
+        self._subscription = PolledSubscription(node, JointState, topic, best_effort(8))
+        self.topic = self._subscription.topic
+
+    def take(self, fresh: float = FRESH) -> np.ndarray:
+        """Return the angle of each joint, rad, leg by leg; NaN where none is ``fresh``, in s."""
+        for message, arrived in self._subscription.take():
+            for name, angle in zip(message.name, message.position, strict=False):
+                if (k := self._index.get(name)) is not None and math.isfinite(angle):
+                    self._angles[k], self._arrived[k] = angle, arrived
+        return np.where(self._arrived > time.time_ns() - fresh * 1e9, self._angles, math.nan)
+
+    def lacks(self, angles: np.ndarray) -> str:
+        """Return why angles that were taken are not the robot's pose, or ''."""
+        missing = [name for name, k in self._index.items() if math.isnan(angles[k])]
+        if len(missing) == len(self._index):
+            return f'no joint states on {self.topic}'
+        return f'{self.topic} has no angle of {missing[0]}' if missing else ''
+
+
+#: How often the age of the last command is checked, s.
+LOOK = 0.02
+#: Time between two warnings of a kind, s.
+QUIET = 5.0
+#: Frames that are the robot's base by name, beside the parameter ``feedback.base_frame``; '' is
+#: that of a publisher without frames.
+BASES = '', 'base', 'base_link', 'base_footprint'
+#: Largest speed to the side, m/s, which needs feedback.
+ASIDE = 0.2
+
+
+class CmdVel:
+    """Steers a pattern by the newest command; other threads may change the gait meanwhile."""
+
+    def __init__(self, node: Node, pattern: Pattern, plan: GaitPlan, enabled: bool,
+                 timeout: Callable[[], float], ramp: Callable[[], float],
+                 closed: Callable[[], bool]) -> None:
+        """Follow the commands on ``cmd_vel``.
+
+        Args:
+            node: that subscribes; its parameter ``stamped_cmd_vel`` says which type.
+            pattern: to be steered.
+            plan: gait that it walks.
+            enabled: whether the robot may walk.
+            timeout: returns how long a command counts, s.
+            ramp: returns the duration of the ramp between stand and gait, s.
+            closed: returns whether feedback is active.
+
+        """
+        self._program, self._enabled = plan, enabled
+        self._deciding = threading.Lock()
+        self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
+        self._closed = closed
+        # Speeds forward and to the left, m/s, and yaw rate, rad/s.
+        self._target, self._when, self._stale = (0.0, 0.0, 0.0), -math.inf, True
+        self._up = False
+        self._log = node.get_logger()
+        self._stamped = node.get_parameter('stamped_cmd_vel').value
+        # What is published under another type: it does not arrive.
+        self._misfit = ''
+        node.create_subscription(
+            TwistStamped if self._stamped else Twist, 'cmd_vel',
+            self._take_stamped if self._stamped else self._take, QoSProfile(depth=10),
+            qos_overriding_options=OVERRIDABLE)
+        # A system clock that is set must not stop the robot, nor keep it going.
+        node.create_timer(LOOK, self._look, clock=STEADY)
+
+    @property
+    def walking(self) -> bool:
+        """Whether a fresh command demands motion."""
+        return self._enabled and not self._stale and self._target != (0.0, 0.0, 0.0)
+
+    @property
+    def motion(self) -> tuple[float, float, float]:
+        """The current speeds forward and to the left, m/s, and yaw rate, rad/s."""
+        if not self.walking:
+            return 0.0, 0.0, 0.0
+        speed, aside, turn = self._target
+        slowest, fastest = self._program.speeds
+        return min(max(speed, slowest), fastest), aside, turn
+
+    @property
+    def state(self) -> str:
+        """The command as text, for diagnostics."""
+        if self._stale:
+            return 'none'
+        speed, aside, turn = self._target
+        return f'{speed:.3g} m/s, {turn:.3g} rad/s' + (f', {aside:.3g} m/s to the left'
+                                                       if aside else '')
+
+    def _now(self) -> float:
+        clock: Any = self._node.get_clock()
+        return (clock if clock.ros_time_is_active else STEADY).now().nanoseconds * 1e-9
+
+    def look_for_misfits(self) -> str:
+        """Return who publishes commands of the other type, which do not arrive; log news."""
+        own, other = ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist')[
+            ::1 if self._stamped else -1]
+        names = sorted({node_of(one) for one in self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name('cmd_vel')) if one.topic_type == other})
+        text = '' if not names else (
+            f'cmd_vel is published as {other} by {", ".join(names)}, but this generator takes '
+            f'{own}: set stamped_cmd_vel to {str(not self._stamped).lower()}')
+        if text and text != self._misfit:
+            self._log.warning(text)
+        self._misfit = text
+        return text
+
+    def _take_stamped(self, message: TwistStamped) -> None:
+        """Take a command in the base's frame and of this time; a stamp of 0 is none."""
+        stamp, frame = message.header.stamp, message.header.frame_id
+        base = self._node.get_parameter('feedback.base_frame').value
+        if frame not in (*BASES, base):
+            self._log.warning(f"cmd_vel ignored: it is in the frame '{frame}', not in the base's "
+                              f"'{base}' (feedback.base_frame)", once=True)
+            return
+        age = self._node.get_clock().now().nanoseconds * 1e-9 - stamp.sec - 1e-9 * stamp.nanosec
+        if (stamp.sec or stamp.nanosec) and abs(age) > self._timeout():
+            side = 'old' if age > 0.0 else 'ahead'
+            self._log.warning(f'cmd_vel ignored: its stamp is {abs(age):.3g} s {side}; the clocks '
+                              'of sender and generator must agree', throttle_duration_sec=QUIET)
+            return
+        self._take(message.twist)
+
+    def _take(self, message: Twist) -> None:
+        speed, turn, aside = message.linear.x, message.angular.z, message.linear.y
+        if not all(math.isfinite(value) for value in (speed, turn, aside)):
+            self._log.warning(f'cmd_vel ignored: {speed} m/s forward, {aside} m/s to the left, '
+                              f'{turn} rad/s are not all finite',
+                              throttle_duration_sec=QUIET)
+            return
+        if aside and not self._closed():
+            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: without feedback this '
+                              'robot walks forward, backward and in curves only',
+                              throttle_duration_sec=QUIET)
+            aside = 0.0
+        elif abs(aside) > ASIDE:
+            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: the range is '
+                              f'{-ASIDE:g} to {ASIDE:g} m/s', throttle_duration_sec=QUIET)
+            aside = math.copysign(ASIDE, aside)
+        with self._deciding:
+            self._target, self._when, self._stale = (speed, aside, turn), self._now(), False
+            self._act()
+
+    def _look(self) -> None:
+        age = self._now() - self._when
+        stale = not 0.0 <= age <= self._timeout()
+        if stale == self._stale:
+            return
+        if stale and self.walking:
+            self._log.warning(f'no cmd_vel for {age:.2g} s: stopping')
+        with self._deciding:
+            self._stale = stale
+            self._act()
+
+    def follow(self, plan: GaitPlan) -> None:
+        """Steer a new gait."""
+        with self._deciding:
+            self._program = plan
+            self._act()
+
+    def enable(self, enabled: bool) -> None:
+        """Set whether the robot may walk at all."""
+        with self._deciding:
+            self._enabled = enabled
+            self._act()
+
+    def _act(self) -> None:
+        walking = self.walking
+        if walking:
+            speed, _, turn = self._target
+            slowest, fastest = self._program.speeds
+            if not slowest <= speed <= fastest:
+                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._program.name}'s "
+                                  f'range is {slowest:g} to {fastest:g} m/s',
+                                  throttle_duration_sec=QUIET)
+            self._pattern.steer(*self._program.steer(speed, turn))
+        if walking != self._up:
+            self._up = walking
+            self._pattern.enable(walking, self._ramp())
+
+    def end(self) -> None:
+        """Leave the pattern alone: it is being ramped down for the last time."""
+        with self._deciding:
+            self._enabled = self._up = False

@@ -1,0 +1,86 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether the joints follow the generator, by the joint states that the robot measures."""
+
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from cpg_ros.motion.robot import Robot
+from cpg_ros.ros.bridges.supervisor import TrackingMonitor
+from cpg_ros.ros.generator_io import MeasuredPose
+from cpg_ros.ros.node.health import STEADY
+import numpy as np
+from rclpy.node import Node
+
+#: How often commanded and measured angles are compared, s, and how old measured ones may be.
+PERIOD, FRESH = 0.1, 0.2
+#: Joints follow again once they have done so for this long, s.
+AGAIN = 3.0
+
+
+class TrackingLimits(NamedTuple):
+    """What a TrackingMonitor needs of a robot's settings: names, rad and s."""
+
+    names: tuple[str, ...]
+    tracking_error: float
+    tracking_time: float
+
+
+class JointTracking:
+    """Compares the commanded with the measured angles in the executor, beside the ticks.
+
+    Attributes:
+        text: which joint does not follow, and how far it is; '' while all of them do.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, measured: MeasuredPose,
+                 commanded: Callable[[], np.ndarray | None], news: Callable[[str], None]) -> None:
+        """Begin to compare.
+
+        Args:
+            node: whose parameters tracking_error and tracking_time are the limits.
+            robot: whose joints are compared.
+            measured: where they are.
+            commanded: returns the angles that were sent last, rad, leg by leg; None for none.
+            news: called with each new text.
+
+        """
+        limits: Any = TrackingLimits(
+            tuple(joint.name for joint in robot.joints),
+            *(node.get_parameter(name).value for name in ('tracking_error', 'tracking_time')))
+        self._monitor = TrackingMonitor(limits)
+        self._measured, self._commanded, self._news = measured, commanded, news
+        self._well, self.text = 0.0, ''
+        self._timer = node.create_timer(PERIOD, self._compare, clock=STEADY)
+
+    def _compare(self) -> None:
+        commanded = self._commanded()
+        if commanded is None:
+            self._monitor.reset()
+            reason = ''
+        else:
+            angles = self._measured.take(FRESH)
+            # A joint that is not measured says nothing.
+            reason = self._monitor.update(
+                commanded, np.where(np.isnan(angles), commanded, angles), PERIOD)
+        self._well = 0.0 if reason else self._well + PERIOD
+        if reason and not self.text:
+            self.text = reason
+            self._news(reason)
+        elif self.text and self._well >= AGAIN:
+            self.text = ''
+            self._news('')

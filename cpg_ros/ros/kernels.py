@@ -1,0 +1,169 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Compilation before a node moves anything, announced before it begins."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+import subprocess
+import sys
+import threading
+import time
+from typing import Any
+
+from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
+from cpg_ros.motion.pattern import precompile
+from cpg_ros.ros.node.health import START
+from cpg_ros.ros.node.node_base import StartError
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.node import Node
+
+# What a node that starts waits for, on /diagnostics, where pages find it.
+
+#: How often it says so, s.
+EVERY = 1.0
+
+
+class StartProgress:
+    """A thread that publishes how long something has taken, until its end."""
+
+    def __init__(self, node: Node, what: str, seconds: float) -> None:
+        """Begin to publish.
+
+        Args:
+            node: that starts.
+            what: it waits for.
+            seconds: that this takes, about.
+
+        """
+        self._node, self._what, self._seconds, self._began = node, what, seconds, time.monotonic()
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._publish, name='progress', daemon=True)
+        self._thread.start()
+
+    def _publish(self) -> None:
+        name = self._node.get_fully_qualified_name()
+        while not self._ended.wait(EVERY):
+            message = DiagnosticArray(status=[DiagnosticStatus(
+                level=DiagnosticStatus.OK, name=f'{name}: {START}', message=f'{self._what}, '
+                f'{self.passed:.0f} of about {self._seconds:.0f} s')])
+            message.header.stamp = self._node.get_clock().now().to_msg()
+            self._publisher.publish(message)
+
+    @property
+    def passed(self) -> float:
+        """How long it has taken, s."""
+        return time.monotonic() - self._began
+
+    def end(self) -> None:
+        """Publish no more."""
+        self._ended.set()
+        self._thread.join()
+        self._node.destroy_publisher(self._publisher)
+
+
+#: How long a network's kernels, those of the feedback and those of a biped's take, on one core of
+#: 2023, s.
+NETWORK, FEEDBACK, BALANCE = 20.0, 25.0, 15.0
+#: How often it is seen whether a compiling process has ended, s.
+LOOK = 0.05
+
+
+def compile_kernels(network: str, kernel: str, node: Node) -> None:
+    """Compile or load the kernels of a network, named as for find_network.
+
+    Args:
+        network: its name.
+        kernel: one of KERNELS, by which they are made.
+        node: that waits for them.
+
+    Raises:
+        CpgError: what they are made by is not installed.
+
+    """
+    choose(kernel)
+    if not COMPILED:
+        node.get_logger().info('numba is not installed: the network is stepped in C, and there is '
+                               'no feedback')
+    with announced(node, f"the network '{network}'", NETWORK):
+        precompile(network)
+
+
+@contextmanager
+def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
+    """Announce compilations, if there are any: in the log, and as they go on on /diagnostics.
+
+    Args:
+        node: that waits for them.
+        what: is compiled.
+        seconds: that it takes, s.
+
+    """
+    begun: list[StartProgress] = []
+
+    def compiling() -> None:
+        if not begun:
+            node.get_logger().info(f'compiling {what}: about {seconds:g} s, only at its first '
+                                   'start on this installation')
+            begun.append(StartProgress(node, f'compiling {what}', seconds))
+    try:
+        with on_compile(compiling):
+            yield
+        for progress in begun:
+            node.get_logger().info(f'compiled in {progress.passed:.1f} s')
+    finally:
+        for progress in begun:
+            progress.end()
+
+
+def compile_apart(node: Any, part: str, seconds: float) -> None:
+    """Compile in a process of its own, whose results this one then loads from the disk.
+
+    The compiler keeps the interpreter's lock for up to seconds, and the ticks of a robot that
+    moves would wait for it.
+
+    Args:
+        node: a StartedNode that moves a robot meanwhile.
+        part: of cpg_ros.ros.cli.executables.
+        seconds: that this takes at its first time, s.
+
+    Raises:
+        StartError: the node ends.
+
+    """
+    node.get_logger().info(f'making the {part} ready in a process of its own: about {seconds:g} s '
+                           'at its first start on this installation')
+    progress = StartProgress(node, f'compiling the {part}', seconds)
+    # Ctrl-C in the terminal is for the node.
+    child = subprocess.Popen(
+        ['nice', sys.executable, '-P', '-m', 'cpg_ros.ros.cli.executables', part],
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        start_new_session=True)
+    try:
+        while child.poll() is None:
+            if node.stop.wait(LOOK):
+                raise StartError(f'the node ends while it makes the {part} ready')
+        if child.returncode:
+            assert child.stderr is not None
+            lines = child.stderr.read().decode(errors='replace').split('\n')
+            node.get_logger().warning(f'the process that compiles the {part} failed, and the node '
+                                      f'does it: {next(filter(None, lines[::-1]), "no reason")}')
+        else:
+            node.get_logger().info(f'ready after {progress.passed:.1f} s')
+    finally:
+        child.kill()
+        child.wait()
+        progress.end()

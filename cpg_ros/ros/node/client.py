@@ -1,0 +1,259 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Services and parameters of other nodes, called from asyncio.
+
+Responses are polled: the calling node need not be spun; if it is, its executor ignores them.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import contextlib
+from dataclasses import dataclass
+import time
+from typing import Any
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.node.polled import PolledGroup
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParametersAtomically,
+)
+from rclpy.client import Client
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+# The nodes and topics that a page can show or use, recognised by topics and services.
+
+#: Topics and services of each kind of node: name below the node's own -> type.
+GENERATOR = {'phase': 'std_msgs/msg/Float64MultiArray', 'gait': 'std_msgs/msg/String',
+             'enable': 'std_srvs/srv/SetBool'}
+SIMULATION = {'push': 'geometry_msgs/msg/Wrench', 'reset': 'std_srvs/srv/Trigger'}
+INVERSION = {'fit': 'std_srvs/srv/Trigger'}
+BRIDGE = {'state': 'std_msgs/msg/String', 'stop': 'std_srvs/srv/Trigger',
+          'damp': 'std_srvs/srv/Trigger'}
+#: Levels of /diagnostics, as pages name them.
+LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
+
+
+def level(status: Any) -> str:
+    """Return the level of a diagnostic status, which rclpy has as bytes, as pages name it."""
+    number = status.level if isinstance(status.level, int) else ord(status.level)
+    return LEVELS.get(number, 'stale')
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Full names of the nodes of each kind, sorted, and the type of each topic."""
+
+    generators: tuple[str, ...] = ()
+    simulations: tuple[str, ...] = ()
+    inversions: tuple[str, ...] = ()
+    bridges: tuple[str, ...] = ()
+    topics: frozenset[tuple[str, str]] = frozenset()
+
+    def beside(self, generator: str, kind: tuple[str, ...]) -> str:
+        """Return the first of a kind in a generator's namespace, '' if there is none."""
+        space = namespace(generator)
+        return next((name for name in kind if namespace(name) == space), '')
+
+
+def namespace(node: str) -> str:
+    """Return a node's namespace as a prefix of names: '' or '/robot'."""
+    return node.rpartition('/')[0]
+
+
+def look(node: Node) -> Graph:
+    """Return the graph as a node sees it."""
+    topics = {(name, kind) for name, kinds in node.get_topic_names_and_types() for kind in kinds}
+    services = {(name, kind) for name, kinds in node.get_service_names_and_types()
+                for kind in kinds}
+    known = topics | services
+
+    def having(what: dict[str, str]) -> tuple[str, ...]:
+        first = next(iter(what))
+        owners: Iterable[str] = (name.removesuffix(f'/{first}') for name, kind in known
+                                 if name.endswith(f'/{first}') and kind == what[first])
+        return tuple(sorted(owner for owner in owners if owner and all(
+            there(f'{owner}/{end}', kind) for end, kind in what.items())))
+
+    def there(name: str, kind: str) -> bool:
+        # The panel's own clients keep the name of a service on the graph.
+        return (name, kind) in known and ('/srv/' not in kind or node.count_services(name) > 0)
+
+    return Graph(having(GENERATOR), having(SIMULATION), having(INVERSION), having(BRIDGE),
+                 frozenset(topics))
+
+
+#: How long a service may take to be found, and a node to answer, s.
+PATIENCE = 5.0
+#: How long a node is waited for in silence, s.
+SILENCE = 1.0
+#: How often it is seen whether a service is there or has answered, s.
+POLL = 0.01
+
+
+class CallError(CpgError):
+    """A node refused, or did not answer; one line for the user."""
+
+    exit_code = 1
+
+
+class NoService(CallError):
+    """A service is not on the graph.
+
+    Attributes:
+        service: its name.
+
+    """
+
+    def __init__(self, service: str) -> None:
+        super().__init__(f'there is no service {service}')
+        self.service = service
+
+
+class RequestRefused(CallError):
+    """A node refused; the message is its reason."""
+
+
+class ServiceClients:
+    """Calls services through one node."""
+
+    def __init__(self, node: Node, total: float | None = None, search: float = PATIENCE,
+                 late: Callable[[], None] | None = None) -> None:
+        """Call through a node.
+
+        Args:
+            node: makes the clients.
+            total: limit of all calls together, s.
+            search: how long a service is looked for, s, where ``total`` sets no limit.
+            late: called once if a service has not been found within ``SILENCE``.
+
+        """
+        self._node, self._total, self._search, self._late = node, total, search, late
+        self._end = None if total is None else time.monotonic() + total
+        self._clients: dict[str, Client] = {}
+
+    async def call(self, kind: Any, name: str, request: Any, patience: float = PATIENCE) -> Any:
+        """Call a service and return its response; ``patience`` is that for the response, s.
+
+        Raises:
+            NoService: it is not there in time.
+            CallError: it does not answer in time.
+
+        """
+        client = self.client(kind, name)
+        try:
+            await self._found(client, name)
+            end = self._end or time.monotonic() + patience
+            answer = client.call_async(request)
+            while not answer.done():
+                if time.monotonic() > end:
+                    client.remove_pending_request(answer)
+                    raise CallError(f'{name} did not answer within {self._total or patience:g} s')
+                await asyncio.sleep(POLL)
+                _take_response(client)
+        except InvalidHandle:  # it was forgotten meanwhile
+            raise NoService(name) from None
+        return answer.result()
+
+    def client(self, kind: Any, name: str) -> Client:
+        """Return the client of a service; made early, the service knows it before a call."""
+        if name not in self._clients:
+            self._clients[name] = self._node.create_client(kind, name,
+                                                           callback_group=PolledGroup())
+        return self._clients[name]
+
+    async def _found(self, client: Client, name: str) -> None:
+        began = time.monotonic()
+        end = self._end or began + self._search
+        while not client.service_is_ready():
+            now = time.monotonic()
+            if now > end:
+                raise NoService(name)
+            if self._late is not None and now > began + SILENCE:
+                self._late()
+                self._late = None
+            await asyncio.sleep(POLL)
+
+    def forget(self, node: str) -> None:
+        """Destroy the clients of a node's services."""
+        for name in [name for name in self._clients if name.startswith(f'{node}/')]:
+            self._node.destroy_client(self._clients.pop(name))
+
+
+def _take_response(client: Any) -> None:
+    """Take a response, if one has arrived, for the call that waits for it."""
+    with client.handle:
+        header, response = client.handle.take_response(client.srv_type.Response)
+    if header is not None:
+        with contextlib.suppress(KeyError):  # it came too late
+            client.get_pending_request(header.request_id.sequence_number).set_result(response)
+
+
+class NodeClient:
+    """Parameters and services of another node; its methods raise CallError."""
+
+    def __init__(self, services: ServiceClients, name: str) -> None:
+        self._services, self.name = services, name
+
+    async def call(self, kind: Any, service: str, patience: float = PATIENCE, **fields: Any
+                   ) -> Any:
+        """Call a service below the node's name with a request's fields; return the response."""
+        return await self._services.call(kind, f'{self.name}/{service}', kind.Request(**fields),
+                                         patience)
+
+    async def command(self, kind: Any, service: str, patience: float = PATIENCE, **fields: Any
+                      ) -> str:
+        """Call a service of a type such as SetBool or Trigger; return the message.
+
+        Raises:
+            RequestRefused: it was not successful.
+
+        """
+        answer = await self.call(kind, service, patience, **fields)
+        if not answer.success:
+            raise RequestRefused(answer.message or f'{self.name}/{service} refused')
+        return str(answer.message)
+
+    async def set_parameters(self, values: Mapping[str, Any], patience: float = PATIENCE) -> None:
+        """Set parameters, all or none.
+
+        Raises:
+            RequestRefused: the node refuses.
+
+        """
+        answer = await self.call(SetParametersAtomically, 'set_parameters_atomically', patience,
+                                 parameters=[Parameter(name, value=value).to_parameter_msg()
+                                             for name, value in values.items()])
+        if not answer.result.successful:
+            raise RequestRefused(answer.result.reason)
+
+    async def parameters(self) -> list[str]:
+        """Return the names of all parameters, sorted."""
+        return sorted((await self.call(ListParameters, 'list_parameters')).result.names)
+
+    async def descriptors(self, names: Sequence[str]) -> list[ParameterDescriptor]:
+        """Return the descriptors of parameters."""
+        return list((await self.call(DescribeParameters, 'describe_parameters', names=names)
+                     ).descriptors)
+
+    async def values(self, names: Sequence[str]) -> list[Any]:
+        """Return the values of parameters, None for one that the node does not have."""
+        found = (await self.call(GetParameters, 'get_parameters', names=names)).values
+        return [parameter_value_to_python(one) for one in found] or [None] * len(names)

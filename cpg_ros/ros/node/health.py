@@ -1,0 +1,141 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Other nodes that publish on the topics that move the robot."""
+
+from collections.abc import Callable, Mapping, Sequence
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+# A node's health, once a second on /diagnostics, and the clock of such timers.
+
+#: For timers that must not stop with simulated time, nor follow a system clock that is set.
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+#: The part of a node whose status says what its start waits for.
+START = 'start'
+#: Level, message and values of a status.
+Health = tuple[bytes, str, Mapping[str, object]]
+
+
+class HealthPublisher:
+    """Publishes the status of a part of a node once a second."""
+
+    def __init__(self, node: Node, part: str, hardware: str, status: Callable[[], Health]) -> None:
+        """Start publishing.
+
+        Args:
+            node: that publishes.
+            part: of the node, for the name of the status.
+            hardware: name of the robot.
+            status: called for each message.
+
+        """
+        self._node, self._status = node, status
+        self._name, self._hardware = f'{node.get_fully_qualified_name()}: {part}', hardware
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._timer = node.create_timer(1.0, self._publish, clock=STEADY)
+
+    def _publish(self) -> None:
+        level, text, values = self._status()
+        message = DiagnosticArray(status=[DiagnosticStatus(
+            level=level, name=self._name, message=text, hardware_id=self._hardware,
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()])])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+
+#: How often they are searched for, s.
+LOOK = 0.25
+#: A publisher may be known this long before the name of its node, s.
+NAMING = 1.0
+#: What a node is called whose name the graph does not know.
+NAMELESS = 'a node of unknown name'
+#: Names that the graph gives to a node until it learns the name, and to any program without ROS.
+PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,
+                '_CREATED_BY_BARE_DDS_APP_': 'a program without ROS'}
+
+
+def node_of(endpoint: TopicEndpointInfo) -> str:
+    """Return the full name of an endpoint's node, or what to call it if it is not known."""
+    return PLACEHOLDERS.get(endpoint.node_name,
+                            f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
+
+
+def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companion: str = ''
+              ) -> str:
+    """Return the names of the others that publish on a topic, or ''.
+
+    Args:
+        node: whose others they are.
+        topic: resolved.
+        own: number of the node's own publishers.
+        tolerated: number of others that may publish, too.
+        companion: full name of a node that may publish, such as a watchdog, '' for none.
+
+    """
+    if node.count_publishers(topic) <= own + tolerated:
+        return ''
+    names = [node_of(one) for one in node.get_publishers_info_by_topic(topic)]
+    expected = [node.get_fully_qualified_name()] * own
+    if companion:
+        # On a busy machine, its name is known later than its publisher.
+        expected.append(companion if companion in names else NAMELESS)
+    for name in expected:
+        if name in names:
+            names.remove(name)
+    return ', '.join(sorted(names)) if len(names) > tolerated else ''
+
+
+class OtherPublishers:
+    """Warns as soon as another node publishes on one of a node's own topics.
+
+    Attributes:
+        text: who publishes where; '' for nobody.
+
+    """
+
+    def __init__(self, node: Node, topics: Sequence[str]) -> None:
+        """Monitor topics, given by resolved names, on each of which the node publishes once."""
+        self._node, self._topics = node, topics
+        self.text = self._warned = ''
+        self._since = 0.0
+        self._timer = node.create_timer(LOOK, self.look, clock=STEADY)
+
+    def seek(self, seconds: float) -> str:
+        """Search until one is found, or for some time in s; return the text."""
+        end = time.monotonic() + seconds
+        while not self.look() and time.monotonic() < end:
+            time.sleep(LOOK / 5)
+        while NAMELESS in self.text and time.monotonic() < self._since + NAMING:
+            time.sleep(LOOK / 5)
+            self.look()
+        return self.text
+
+    def look(self) -> str:
+        """Search now; return the text. The warning waits up to NAMING for a name."""
+        text = '; '.join(f'{topic} is published by {names}, too'
+                         for topic in self._topics if (names := others_on(self._node, topic)))
+        if text != self.text:
+            self.text, self._since = text, time.monotonic()
+        if text != self._warned and (NAMELESS not in text
+                                     or time.monotonic() >= self._since + NAMING):
+            self._warned = text
+            if text:
+                self._node.get_logger().warning(text)
+        return text

@@ -1,0 +1,434 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How nodes declare parameters, start, serve and end."""
+
+from collections.abc import Callable, Iterator, Mapping
+import contextlib
+import gc
+import os
+from pathlib import Path
+import signal
+import sys
+import threading
+import traceback
+from typing import Any
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.node.logging import NO_FILE, QUEUE, QueuedLogger
+from cpg_ros.ros.node.parameters import as_doubles, as_list, kind_of, Spec, StrictParameterService
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
+import rclpy
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    NameValidationException,
+    ParameterException,
+)
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import get_rmw_implementation_identifier, remove_ros_args
+
+# The signals that end a node, and the end of the process while a thread is still at work.
+
+#: How long to wait for the end of a thread, s.
+PATIENCE = 0.2
+
+
+def termination_signals() -> list[signal.Signals]:
+    """Return the signals that end a node; SIGHUP does not if it was ignored at the start."""
+    return [number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
+
+
+def exit_code(code: int, *threads: threading.Thread | None) -> int:
+    """Return the exit code once the threads have ended; if one does not, end the process with it.
+
+    An interpreter that winds up under a thread which then returns from compiled C++ code is
+    aborted by the C++ runtime.
+    """
+    for thread in filter(None, threads):
+        thread.join(PATIENCE)
+        if thread.is_alive():
+            QUEUE.drain()
+            os._exit(code)
+    return code
+
+
+# The transport of a process that moves a robot: UDP alone, as shared memory can hold it up.
+
+#: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
+TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
+#: Discovery range of ROS 2, and its predecessor, which goes first.
+RANGE, LOCAL_ONLY = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
+#: Files with profiles of Fast DDS, by both names of the variable.
+PROFILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
+#: What a participant with the range LOCALHOST is, but without shared memory.
+LOCALHOST = Path(__file__).with_name('localhost.xml')
+
+
+def leave_shared_memory() -> None:
+    """Make this process use UDP alone, also on this computer; call it before rclpy.init.
+
+    A participant that joins the graph on the same computer has a port of shared memory, and the
+    first to send there checks whether it is alive. If its listener is not waiting at that instant,
+    Fast DDS sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every
+    publisher of the process needs: a robot would be without commands for that time.
+
+    With the discovery range LOCALHOST the middleware of ROS adds shared memory itself. A profile
+    of Fast DDS then restricts the process to the loopback interface in its place. A transport,
+    profiles or static peers that the user has chosen stay.
+    """
+    environment = os.environ
+    name, udp = TRANSPORT
+    args = (environment.setdefault(name, udp) != udp
+              or any(environment.get(one) for one in ('ROS_STATIC_PEERS', *PROFILES)))
+    local = (environment.get(LOCAL_ONLY) == '1' or (
+        LOCAL_ONLY not in environment and environment.get(RANGE) == 'LOCALHOST'))
+    if local and not args and 'fastrtps' in get_rmw_implementation_identifier():
+        environment.pop(LOCAL_ONLY, None)
+        environment.update({RANGE: 'SYSTEM_DEFAULT', PROFILES[1]: str(LOCALHOST)})
+
+
+# ROS's life cycle beside a node that is no LifecycleNode: a step for each transition.
+
+class Lifecycle(LifecycleNodeMixin):
+    """The states and services of https://design.ros2.org/articles/node_lifecycle.html.
+
+    rclpy decides at the creation of a node whether it is managed, before there are parameters:
+    this takes of a node what the mixin needs, so that a parameter can decide it.
+    """
+
+    def __init__(self, node: Node, steps: Mapping[str, Callable[[], str]]) -> None:
+        """Serve ``~/change_state`` and the others.
+
+        Args:
+            node: in whose name.
+            steps: configure, activate, deactivate, cleanup and shutdown -> what does it, and
+                returns why it cannot be done, or ''. The state stays as it was then.
+
+        """
+        self._logger, self._steps = node.get_logger(), steps
+        self.handle = node.handle
+        self.default_callback_group = node.default_callback_group
+        self._services = node._services
+        super().__init__()
+        service: Any = self._service_change_state
+        self._change, service.callback = service.callback, self._answered_change
+
+    @property
+    def active(self) -> bool:
+        """Whether the state is active."""
+        return self._state_machine.current_state[1] == 'active'
+
+    def _answered_change(self, request: ChangeState.Request, response: ChangeState.Response
+                         ) -> ChangeState.Response:
+        """Change the state; refuse a transition that the state does not have.
+
+        rclpy raises an exception for that one, and the client waits for ever.
+        """
+        try:
+            return self._change(request, response)
+        except rclpy_implementation.RCLError:
+            wanted, state = request.transition, self._state_machine.current_state[1]
+            self._logger.warning(f'{wanted.label or f"transition {wanted.id}"}: refused: the '
+                                 f"state '{state}' does not have it")
+            response.success = False
+            return response
+
+    def _step(self, name: str) -> TransitionCallbackReturn:
+        if reason := self._steps[name]():
+            self._logger.warning(f'{name}: refused: {reason}')
+            return TransitionCallbackReturn.FAILURE
+        self._logger.info(f'{name}: done')
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do its step."""
+        return self._step('configure')
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do its step."""
+        return self._step('activate')
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do its step."""
+        return self._step('deactivate')
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do its step."""
+        return self._step('cleanup')
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do its step."""
+        return self._step('shutdown')
+
+
+#: Domains above it have ports that are too high for UDP.
+LAST_DOMAIN = 232
+
+
+class StartError(CpgError):
+    """The node cannot start; the message is one line for the user."""
+
+
+class StartedNode(Node):
+    """A node with parameters declared by specs, and with a thread of its own.
+
+    Attributes:
+        stop: set to end the node.
+        signals: that have come to end it, by their numbers.
+        failure: exception that ended the thread, or None.
+        thread: one that may still be at work when the node ends, or None.
+        parameter_service: services of the parameters, which have a thread of their own.
+
+    """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, start_parameter_services=False, enable_rosout=False, **options)
+        self._logger = QueuedLogger.of(self)
+        self.parameter_service = StrictParameterService(self)
+        self._doubles: set[str] = set()
+        self._lists: dict[str, list] = {}
+        # Its clock cannot change under a thread at work.
+        self.set_descriptor('use_sim_time', ParameterDescriptor(
+            description='follow /clock; set at start', type=ParameterType.PARAMETER_BOOL,
+            read_only=True))
+        self.add_pre_set_parameters_callback(self._complete)
+        self.failure: BaseException | None = None
+        self.thread: threading.Thread | None = None
+        self.stop = threading.Event()
+        self.signals: list[int] = []
+
+    def _declare(self, specs: Mapping[str, Spec]) -> None:
+        """Declare parameters by name.
+
+        Raises:
+            StartError: the value that one was given at the start has the wrong type, or is out of
+                range.
+
+        """
+        overrides = self._parameter_overrides
+        for name, spec in specs.items():
+            override = overrides.get(name)
+            if isinstance(spec.default, float):
+                self._doubles.add(name)
+                if override is not None:
+                    overrides[name], = as_doubles([override], {name})
+            elif isinstance(spec.default, list):
+                self._lists[name] = spec.default
+                if override is not None:
+                    overrides[name] = as_list(override, spec.default)
+            try:
+                self.declare_parameter(name, spec.default, spec.descriptor())
+            except InvalidParameterTypeException as error:
+                raise StartError(f'parameter {name} must be {kind_of(spec.default)}, not '
+                                 f'{overrides[name].value!r}') from error
+            except InvalidParameterValueException as error:
+                raise StartError(f'parameter {name}: {overrides[name].value} is not from '
+                                 f'{spec.low:g} to {spec.high:g}') from error
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Return a batch of changes with the types and the further changes that it implies."""
+        return [as_list(one, self._lists[one.name]) if one.name in self._lists else one
+                for one in as_doubles(parameters, self._doubles)]
+
+    def resolve_topic_name(self, topic: str, **options: Any) -> str:
+        """Do as the base class does; errors as of create_publisher."""
+        with _topic(topic):
+            return super().resolve_topic_name(topic, **options)
+
+    def create_publisher(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
+                         **options: Any) -> Any:
+        """Do as the base class does.
+
+        Raises:
+            StartError: the topic's name or a QoS override of it cannot be used.
+
+        """
+        with _topic(topic):
+            return super().create_publisher(kind, topic, *rest, **options)
+
+    def create_subscription(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
+                            **options: Any) -> Any:
+        """Do as the base class does; errors as of create_publisher."""
+        with _topic(topic):
+            return super().create_subscription(kind, topic, *rest, **options)
+
+    def _value(self, name: str) -> Any:
+        return self.get_parameter(name).value
+
+    def _one_of(self, name: str, allowed: tuple[str, ...]) -> None:
+        if self._value(name) not in allowed:
+            raise StartError(f"{name} '{self._value(name)}' is not one of {', '.join(allowed)}")
+
+    def _warn_of_unknown(self) -> None:
+        for name in self._parameter_overrides:
+            if not self.has_parameter(name):
+                self.get_logger().warning(f"there is no parameter '{name}': ignored")
+
+    def _fail(self, error: BaseException) -> None:
+        """End the node because of an exception in its thread."""
+        self.failure = error
+        self.get_logger().fatal('the publishing thread failed:\n'
+                                + ''.join(traceback.format_exception(error)))
+        self.stop.set()
+
+    def begin(self) -> None:
+        """Start the thread."""
+
+    def finish(self) -> None:
+        """End the thread."""
+
+
+@contextlib.contextmanager
+def _topic(name: str) -> Iterator[None]:
+    """Add the topic to an error of its name or of an override of its QoS."""
+    try:
+        yield
+    except (NameValidationException, ParameterException, RuntimeError) as error:
+        raise StartError(f"topic '{name}': {_first(error)}") from error
+
+
+def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
+    """Serve parameters, services and timers until the executor is shut down."""
+    while not node.stop.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            return
+        except Exception:
+            # One bad request must not end a node that moves a robot.
+            node.get_logger().error('a request failed:\n' + traceback.format_exc())
+
+
+def _help_or_error(executable: str, text: str, known: Mapping[str, Spec],
+                   args: list[str] | None) -> int | None:
+    """Answer ``--help`` and reject unknown arguments; return the exit code, None to start."""
+    try:
+        words = remove_ros_args(sys.argv[1:] if args is None else args)
+    except RuntimeError as error:
+        print(f'{executable}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
+    wrong = [word for word in words if word not in ('-h', '--help')]
+    if wrong:
+        print(f'{executable}: not understood: {" ".join(wrong)} (parameters: --ros-args -p '
+              'NAME:=VALUE; see --help)', file=sys.stderr)
+        return 2
+    if not words:
+        return None
+    parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
+                  for name, spec in known.items())
+    print(f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
+          f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters, sep='\n')
+    return 0
+
+
+def _first(error: Exception) -> str:
+    """Return the reason of an error of rclpy on one line, without the place in its sources."""
+    reason = str(error).replace('. Error: error not set', '').partition(', at /')[0]
+    return ' '.join(reason.replace('. Error: ', ': ').split())
+
+
+def _domain() -> str:
+    """Return what is wrong with the domain, or ''; with a wrong one Fast DDS aborts."""
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    return (f'ROS_DOMAIN_ID {domain} is not from 0 to {LAST_DOMAIN}'
+            if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
+
+
+def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[str, Spec],
+        args: list[str] | None = None, executable: str = '') -> int:
+    """Run a node until a signal ends it, or until it stops itself; return the exit code.
+
+    Args:
+        make: returns the node; a CpgError that it raises ends the start with one line.
+        name: of the node.
+        text: what it does, a sentence for ``--help``.
+        known: its parameters, listed by ``--help``.
+        args: from the command line, without the program's name; None for those of the process.
+        executable: the program's name, '' if it is that of the node.
+
+    """
+    code = _help_or_error(executable or name, text, known, args)
+    if code is not None:
+        return code
+
+    signals: list[int] = []
+
+    def leave(number: int, _: object) -> None:
+        # What Python calls while it cleans up, such as a weak reference's callback, drops what is
+        # raised in it.
+        signals.append(number)
+        raise SystemExit(0)
+
+    ending = termination_signals()
+    for number in ending:
+        signal.signal(number, leave)
+    # The publishing thread must not wait long for one that computes in Python.
+    sys.setswitchinterval(2e-4)
+    if wrong := _domain():
+        print(f'{name}: {wrong}', file=sys.stderr)
+        return 2
+    leave_shared_memory()
+    words = sys.argv if args is None else args
+    try:
+        QUEUE.start(name, words)
+    except OSError as error:
+        print(f'{name}: no process that writes the log can be started: {error.strerror}',
+              file=sys.stderr)
+        return 1
+    try:
+        rclpy.init(args=[*words, '--ros-args', NO_FILE],
+                   signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
+    try:
+        node = make()
+    except (CpgError, NameValidationException, ParameterException) as error:
+        QueuedLogger(name).fatal(' '.join(str(error).split()))
+        rclpy.shutdown()
+        return 1
+    # An Event may not be set here: a signal that comes while it is being waited for, or while
+    # another one sets it, would wait for ever for the lock that its own thread holds.
+    for number in ending:
+        signal.signal(number, lambda number, _: signals.append(number))
+    node.signals = signals
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
+    gc.collect()
+    gc.freeze()
+    node.begin()
+    serving.start()
+    node.parameter_service.thread.start()
+    # A bare wait() can miss a signal that another thread received, and a stop must not wait.
+    while not signals and not node.stop.wait(0.02):
+        pass
+    node.stop.set()
+    node.parameter_service.end()
+    node.finish()
+    for number in ending:
+        # It ends already: a second one, while the interpreter winds up, would kill it.
+        signal.signal(number, signal.SIG_IGN)
+    executor.shutdown(timeout_sec=0.1)
+    rclpy.shutdown()
+    return exit_code(0 if node.failure is None else 1, node.thread, node.parameter_service.thread,
+                 serving)

@@ -1,0 +1,381 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Parameter services that process requests in a thread of their own and survive malformed ones."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+import ctypes
+from dataclasses import dataclass, replace
+from functools import partial
+import re
+import threading
+import traceback
+from typing import Any
+import weakref
+
+from cpg_ros.ros.node.polled import PolledGroup
+from rcl_interfaces import srv
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_service import ParameterService
+from rclpy.qos import qos_profile_parameters
+from rclpy.service import Service
+from rclpy.type_support import check_for_type_support
+
+# Descriptions of a node's parameters, and conversions of their values.
+
+#: Name of a value of each type, for messages.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
+
+
+#: In the constraints of a gait: what follows are presets whose names are not those of gaits.
+PRESETS = '; presets: '
+
+
+def one_of(words: Iterable[str], further: str = '') -> str:
+    """Return the constraints of a parameter that is one of some words; ``further`` is added."""
+    return 'one of: ' + ', '.join(words) + further
+
+
+def choices(constraints: str) -> list[str]:
+    """Return the words that a descriptor's constraints list, if they are those of one_of."""
+    found = re.search(r'one of: (.*)', constraints)
+    words = re.split(f', |{PRESETS}', found[1]) if found else []
+    return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
+
+
+def presets_among(constraints: str) -> list[str]:
+    """Return those of the choices that the constraints list as presets with other names."""
+    return choices(f'one of: {constraints.partition(PRESETS)[2]}')
+
+
+@dataclass(frozen=True)
+class Spec:
+    """One parameter: default, description, range of a number, whether it is read-only."""
+
+    default: Any
+    text: str
+    low: float | None = None
+    high: float | None = None
+    read_only: bool = False
+    constraints: str = ''
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return it as a ROS descriptor."""
+        made = ParameterDescriptor(description=self.text, read_only=self.read_only,
+                                   additional_constraints=self.constraints)
+        if self.low is not None and self.high is not None:
+            if isinstance(self.default, int):
+                made.integer_range = [IntegerRange(from_value=int(self.low),
+                                                   to_value=int(self.high), step=1)]
+            else:
+                made.floating_point_range = [FloatingPointRange(from_value=self.low,
+                                                                to_value=self.high)]
+        return made
+
+
+def fixed(specs: Mapping[str, Spec]) -> dict[str, Spec]:
+    """Return the same parameters, which can be set at the start only."""
+    return {name: replace(spec, read_only=True) for name, spec in specs.items()}
+
+
+def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
+    """Turn whole numbers given for floating-point parameters into doubles.
+
+    ``ros2 param set /cpg_generator frequency 2`` sends an integer; refusing it would be pedantry.
+    """
+    return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
+            if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
+            for p in parameters]
+
+
+def as_list(parameter: Parameter, default: list) -> Parameter:
+    """Turn one value, or whole numbers, given for a list of such values into the list."""
+    value = parameter.value
+    given = value if parameter.type_.name.endswith('_ARRAY') else [value]
+    wanted = type(default[0]) if default else str
+    if wanted is float and all(type(one) in (int, float) for one in given):
+        return Parameter(parameter.name, Parameter.Type.DOUBLE_ARRAY, [float(x) for x in given])
+    return Parameter(parameter.name, value=[value]) if type(value) is wanted else parameter
+
+
+def kind_of(default: Any) -> str:
+    """Return what a parameter with a default must be, for messages."""
+    if isinstance(default, list):
+        return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
+    return KINDS[type(default)]
+
+
+# Requests of a service whose first field is a sequence, bounded in length.
+
+#: PyObject * convert(void * message), as the type support of every message has it.
+_CONVERT = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p)
+_pointer, _capsule = ctypes.pythonapi.PyCapsule_GetPointer, ctypes.pythonapi.PyCapsule_New
+_pointer.restype, _pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+_capsule.restype = ctypes.py_object
+_capsule.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
+#: A capsule must not outlive what it points to.
+_kept: list[Any] = []
+
+
+def bounded(service: type, most: int) -> type:
+    """Return a type to take instead of a service's Request.
+
+    Taken is a Request or, if its first field has more than ``most`` elements, their number.
+
+    Args:
+        service: type of a service whose requests begin with a sequence.
+        most: largest number of elements.
+
+    """
+    check_for_type_support(service)
+    kind: Any = type(service.Request)  # type: ignore[attr-defined]
+    usual = _CONVERT(_pointer(kind._CONVERT_TO_PY, None))
+
+    def convert(message: int) -> object:
+        # In C a sequence is a pointer to its elements, then how many there are.
+        length = ctypes.c_size_t.from_address(message + ctypes.sizeof(ctypes.c_void_p)).value
+        return length if length > most else usual(message)
+
+    own = _CONVERT(convert)
+    _kept.append(own)
+    names = '_CREATE_ROS_MESSAGE', '_DESTROY_ROS_MESSAGE', '_CONVERT_FROM_PY', '_TYPE_SUPPORT'
+    support = type('Support', (type,), {
+        **{name: getattr(kind, name) for name in names},
+        '_CONVERT_TO_PY': _capsule(ctypes.cast(own, ctypes.c_void_p), None, None)})
+    bound: type = support('Request', (), {})
+    return bound
+
+
+#: Limit of the names or values in a request; no node has nearly as many parameters.
+MOST = 1000
+#: How often to check whether the node ends, ns.
+LOOK = 100_000_000
+
+
+#: Stand-ins for the requests, bounded in length.
+_BOUNDED = {kind: bounded(kind, MOST)
+            for kind in (srv.SetParameters, srv.SetParametersAtomically)}
+
+
+def _too_many(count: int) -> str:
+    return f'{count} parameters in one request: at most {MOST} are allowed'
+
+
+def _refused(reason: str) -> SetParametersResult:
+    return SetParametersResult(successful=False, reason=reason)
+
+
+class _Batch:
+    """Changes that are accepted as a whole or not at all, and what takes the result."""
+
+    def __init__(self, parameters: list[Parameter],
+                 answer: Callable[[SetParametersResult], None]) -> None:
+        self.parameters, self.answer = parameters, answer
+        self.names = frozenset(parameter.name for parameter in parameters)
+        #: Earlier ones that this one replaces if it is accepted.
+        self.replaced: list[_Batch] = []
+
+
+class StrictParameterService(ParameterService):
+    """rclpy's services, with changes applied in a thread of their own.
+
+    The executor stays free for what must not wait, such as a stop. Of several waiting changes of
+    the same parameters, only the last one that is valid is applied. Values of no known type,
+    unknown names and more than MOST of them are rejected with a reason: in rclpy 7.1 a value of no
+    known type raises an exception in the executor, so that one request ends the node, and an
+    unknown name is rejected without naming it.
+
+    Attributes:
+        thread: applies the changes, once it is started.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        # Not rclpy's own: its services are in the group of all that must not wait for them.
+        self._node_weak_ref = weakref.ref(node)
+        group = ReentrantCallbackGroup()
+        for kind, answer in (
+                (srv.DescribeParameters, self._describe_parameters_callback),
+                (srv.GetParameters, self._get_parameters_callback),
+                (srv.GetParameterTypes, self._get_parameter_types_callback),
+                (srv.ListParameters, self._list_parameters_callback)):
+            self._serve(kind, partial(self._counted, answer), group)
+        own = PolledGroup()
+        self._each = self._serve(srv.SetParameters, _untaken, own)
+        self._together = self._serve(srv.SetParametersAtomically, _untaken, own)
+        self._ending = False
+        self.thread = threading.Thread(target=self._work, name='parameters', daemon=True)
+
+    def _serve(self, kind: Any, answer: Callable, group: Any) -> Service:
+        node = self._get_node()
+        name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
+        return node.create_service(kind, f'{node.get_name()}/{name[1:]}', answer,
+                                   qos_profile=qos_profile_parameters, callback_group=group)
+
+    def _counted(self, answer: Callable, request: Any, response: Any) -> Any:
+        """Answer a request; return an empty response if it has too many names."""
+        names = request.prefixes if hasattr(request, 'prefixes') else request.names
+        if len(names) <= MOST:
+            return answer(request, response)
+        self._get_node().get_logger().warning(
+            f'{type(request).__name__}: {_too_many(len(names))}', throttle_duration_sec=1.0)
+        return response
+
+    def end(self) -> None:
+        """Stop after the change that is being applied."""
+        self._ending = True
+
+    def _work(self) -> None:
+        waiting: list[_Batch] = []
+        try:
+            while not self._ending:
+                if not waiting:
+                    self._wait()
+                waiting = _thinned(waiting + self._taken())
+                if waiting and not self._ending:
+                    batch = waiting.pop(0)
+                    result = self._judged(batch)
+                    batch.answer(result)
+                    if not result.successful:
+                        waiting[:0] = batch.replaced
+                        continue
+                    for one in batch.replaced:
+                        one.answer(_refused('superseded: a later request that came while this '
+                                            'one was waiting sets the same'))
+        except rclpy_implementation.RCLError:
+            # The graph is gone when the node ends while this thread is at work.
+            if not self._ending:
+                raise
+
+    def _wait(self) -> None:
+        """Wait for a request, or a while."""
+        handles = [one.handle for one in (self._each, self._together)]
+        context = self._get_node().context.handle
+        with handles[0], handles[1], context:
+            waiting = rclpy_implementation.WaitSet(0, 0, 0, 0, len(handles), 0, context)
+            waiting.clear_entities()
+            for handle in handles:
+                waiting.add_service(handle)
+            waiting.wait(LOOK)
+
+    def _taken(self) -> list[_Batch]:
+        """Take all requests that have arrived; reject at once those that cannot be read."""
+        batches = []
+        for service in (self._each, self._together):
+            bounds = _BOUNDED[service.srv_type]
+            while True:
+                with service.handle:
+                    request, header = service.handle.service_take_request(bounds)
+                if header is None:
+                    break
+                respond = partial(_respond, service, header)
+                if isinstance(request, int):
+                    respond([_refused(_too_many(request))])
+                    continue
+                batches += self._batches(
+                    [request.parameters] if service is self._together else
+                    [[one] for one in request.parameters], respond)
+        return batches
+
+    def _batches(self, parts: Sequence[Sequence[ParameterMessage]],
+                 respond: Callable[[list[SetParametersResult]], None]) -> list[_Batch]:
+        """Read the parts of a request, which is answered once all of them are processed."""
+        results: list[Any] = [None] * len(parts)
+        left = set(range(len(parts)))
+
+        def answer(k: int, result: SetParametersResult) -> None:
+            results[k] = result
+            left.discard(k)
+            if not left:
+                respond(results)
+
+        if not parts:
+            respond(results)
+        batches = []
+        for k, messages in enumerate(parts):
+            try:
+                batches.append(_Batch(self._read(messages), partial(answer, k)))
+            except ValueError as error:
+                answer(k, _refused(str(error)))
+        return batches
+
+    def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
+        """Read parameters that the node has and that may be set while it runs.
+
+        Raises:
+            ValueError: a value of no known type, an unknown name, or a read-only parameter.
+
+        """
+        parameters = []
+        for message in messages:
+            try:
+                parameters.append(Parameter.from_parameter_msg(message))
+            except (ValueError, TypeError, RuntimeError) as error:
+                raise ValueError(f'{message.name}: {error}') from error
+        for parameter in parameters:
+            if not self._get_node().has_parameter(parameter.name):
+                switch = f'{parameter.name}.enabled'
+                raise ValueError(f"there is no parameter '{parameter.name}'" + (
+                    f": it is '{switch}'" if self._get_node().has_parameter(switch) else ''))
+            if self._get_node().describe_parameter(parameter.name).read_only:
+                raise ValueError(f'{parameter.name} is read-only: set it when the node starts')
+        return parameters
+
+    def _judged(self, batch: _Batch) -> SetParametersResult:
+        node = self._get_node()
+        try:
+            return node.set_parameters_atomically(batch.parameters)
+        except Exception as error:
+            # One bad request must not end a node that moves a robot.
+            if not self._ending:
+                node.get_logger().error('a request failed:\n' + traceback.format_exc())
+            return _refused(f'{type(error).__name__}: {error}')
+
+
+def _untaken(request: object, response: Any) -> Any:
+    """Stand in for a callback: the thread takes the requests."""
+    return response
+
+
+def _respond(service: Service, header: object, results: list[SetParametersResult]) -> None:
+    kind: Any = service.srv_type
+    response = kind.Response()
+    if kind is srv.SetParametersAtomically:
+        response.result, = results
+    else:
+        response.results = results
+    service.send_response(response, header)
+
+
+def _thinned(batches: list[_Batch]) -> list[_Batch]:
+    """Put batches whose parameters a later one sets, too, behind that one; return the others."""
+    left: list[_Batch] = []
+    for batch in reversed(batches):
+        later = next((one for one in left if batch.names <= one.names), None)
+        if later is None:
+            left.append(batch)
+        else:
+            later.replaced[:0] = [*batch.replaced, batch]
+            batch.replaced = []
+    return left[::-1]

@@ -1,0 +1,114 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Subscriptions, services and clients that no executor serves: messages wait to be taken.
+
+No code of the process runs when a message arrives, however many there are; the middleware drops
+those that are not taken in time.
+"""
+
+from collections.abc import Iterator
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+# Qualities of service that more than one node uses.
+
+#: For topics whose QoS can be overridden by parameters of the node.
+OVERRIDABLE = QoSOverridingOptions.with_default_policies()
+
+
+def latched(depth: int = 1) -> QoSProfile:
+    """Return the QoS of a topic whose last messages wait for later subscribers."""
+    return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def command_qos() -> QoSProfile:
+    """Return the QoS of commands: only the newest one matters."""
+    return QoSProfile(depth=1)
+
+
+def best_effort(depth: int = 1) -> QoSProfile:
+    """Return the QoS of a subscription that matches every publisher and delays none."""
+    return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class PolledGroup(CallbackGroup):
+    """Keeps subscriptions, services and clients from the executor."""
+
+    def can_execute(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        """Never."""
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        """None has begun."""
+
+
+class PolledSubscription:
+    """A topic whose messages are taken, without a callback.
+
+    Attributes:
+        topic: its resolved name.
+
+    """
+
+    def __init__(self, node: Node, kind: type, topic: str, quality: QoSProfile | None = None,
+                 raw: bool = False, overridable: bool = True) -> None:
+        """Subscribe.
+
+        Args:
+            node: that subscribes.
+            kind: type of the messages.
+            topic: its name.
+            quality: of service; best effort and the newest message by default.
+            raw: take messages as bytes: decoding whole ones costs far more.
+            overridable: let parameters of the node override the quality of service.
+
+        """
+        self._node = node
+        self._subscription: Any = node.create_subscription(
+            kind, topic, lambda _: None, quality or best_effort(), callback_group=PolledGroup(),
+            raw=raw, qos_overriding_options=OVERRIDABLE if overridable else None)
+        self.topic: str = self._subscription.topic_name
+        self._kind, self._raw = kind, raw
+        self._depth: int = self._subscription.qos_profile.depth
+
+    def take(self) -> Iterator[tuple[Any, int]]:
+        """Take what has arrived: each message, and its time of arrival, ns of system time."""
+        handle = self._subscription.handle
+        with handle:
+            while (found := handle.take_message(self._kind, self._raw)) is not None:
+                yield found[0], found[1]['received_timestamp']
+
+    def newest(self) -> Any:
+        """Return the newest message since the last call, None if none has come."""
+        newest, handle = None, self._subscription.handle
+        with handle:
+            # No more than these can wait.
+            for _ in range(self._depth):
+                if (found := handle.take_message(self._kind, self._raw)) is None:
+                    break
+                newest = found[0]
+        return newest
+
+    def close(self) -> None:
+        """End the subscription."""
+        self._node.destroy_subscription(self._subscription)

@@ -1,0 +1,374 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A thread that ticks on absolute deadlines, by the steady clock or by simulated time."""
+
+from collections.abc import Callable, Sequence
+import contextlib
+import ctypes
+from dataclasses import dataclass
+import os
+import threading
+import time
+from typing import Any
+
+from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.node.parameters import fixed, Spec
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.node import Node
+
+# Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's.
+
+#: Of mlockall: the pages that are there, and those to come.
+MCL_CURRENT, MCL_FUTURE = 1, 2
+LIMITS = 'in /etc/security/limits.conf, and log in again'
+
+SPECS = fixed({
+    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread; the '
+                            'other threads then get 1; 0 for none', 0, 99),
+    'cpu_affinity': Spec([-1], 'cores on which the publishing thread may run, one or a list; -1 '
+                         'for any'),
+    'lock_memory': Spec(False, 'lock all memory of the process in RAM, so that no tick waits for '
+                        'a page')})
+
+
+class NoSuchCore(CpgError):
+    """The process may not run on a requested core."""
+
+
+@dataclass(frozen=True)
+class RealTime:
+    """What is requested of the scheduler.
+
+    Attributes:
+        priority: of SCHED_FIFO, 0 for none.
+        cores: on which the thread may run, empty for any.
+        lock: whether to lock the memory of the process.
+
+    Raises:
+        NoSuchCore: this process cannot run on one of the cores.
+
+    """
+
+    priority: int = 0
+    cores: tuple[int, ...] = ()
+    lock: bool = False
+
+    def __post_init__(self) -> None:
+        usable = sorted(os.sched_getaffinity(0))
+        for core in self.cores:
+            if core not in usable:
+                raise NoSuchCore(f'cpu_affinity: {core} is not one of the cores that this process '
+                                 f'may run on ({", ".join(map(str, usable))})')
+
+    @classmethod
+    def of(cls, priority: int, cores: Sequence[int], lock: bool) -> 'RealTime':
+        """Return the request of the parameters' values; errors as of the class."""
+        return cls(priority, () if list(cores) == [-1] else tuple(cores), lock)
+
+    def claim(self) -> tuple[list[str], list[str]]:
+        """Request it for the calling thread; return what is granted and what is refused.
+
+        Each refusal is one line with the reason and what to set.
+        """
+        granted, refused = [], []
+        if self.lock:
+            if reason := _lock_memory():
+                refused.append(f'lock_memory refused: {reason}. Raise the limit memlock '
+                               f'(@realtime - memlock unlimited) {LIMITS}')
+            else:
+                granted.append('memory locked')
+        if self.cores:
+            os.sched_setaffinity(0, self.cores)
+            granted.append(f'core {", ".join(map(str, self.cores))}')
+        if self.priority:
+            try:
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self.priority))
+                _raise_others()
+                granted.append(f'SCHED_FIFO, priority {self.priority}')
+            except OSError as error:
+                refused.append(f'thread_priority {self.priority} refused: {error.strerror}. Raise '
+                               f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
+                               f'{LIMITS}')
+        return granted, refused
+
+    def request(self, logger: RcutilsLogger) -> None:
+        """Request it for the calling thread, log the result, and continue in any case."""
+        granted, refused = self.claim()
+        for line in refused:
+            logger.warning(line)
+        if granted:
+            logger.info(f'real time: {", ".join(granted)}')
+
+
+def _raise_others() -> None:
+    """Schedule the other threads before all ordinary processes, and after the calling one.
+
+    Any of them may hold the interpreter lock or one of the middleware's, and would keep it while
+    an ordinary process runs in its place. Stops are served by one of them, too.
+    """
+    own = threading.get_native_id()
+    # Once more for what has been started meanwhile by one that was still an ordinary thread.
+    for thread in (int(name) for _ in range(2) for name in os.listdir('/proc/self/task')):
+        if thread != own:
+            # It may have ended.
+            with contextlib.suppress(ProcessLookupError):
+                os.sched_setscheduler(thread, os.SCHED_RR, os.sched_param(1))
+
+
+def _lock_memory() -> str:
+    """Lock the memory of the process; return why not, or ''."""
+    with contextlib.suppress(AttributeError):
+        if ctypes.CDLL(None, use_errno=True).mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+            return ''
+        return os.strerror(ctypes.get_errno())
+    return 'this system has no mlockall'
+
+
+#: A ticker that is this many periods behind, as after a suspension, leaves them out: a robot must
+#: not be driven through the motion it missed, and never gets more than two ticks at once.
+STALL = 2
+#: Steps of simulated time that are no stall, s: /clock may be that coarse, or lose a message.
+COARSE = 0.05
+#: A ticker that makes up for lost time, as a simulation may, makes up for no more than this, s.
+MOST_BEHIND = 1.0
+#: Simulated time that steps back by no more than this (messages out of order, two publishers of
+#: /clock) is waited for until it is past where it was; further back is a jump, s.
+JITTER = 0.1
+#: A stop does not wait for a /clock that has stood still for this long by the steady clock, s.
+STOPPED = 0.2
+
+
+def system_offset() -> int:
+    """Return system time minus steady time, ns.
+
+    It is read between two readings of the steady clock, and again if they are far apart: a thread
+    switch in between would add its length to the offset.
+    """
+    narrowest, offset = 1 << 62, 0
+    for _ in range(5):
+        before = time.monotonic_ns()
+        system = time.time_ns()
+        width = time.monotonic_ns() - before
+        if width < narrowest:
+            narrowest, offset = width, system - before
+        if width < 20_000:
+            break
+    return offset
+
+
+class TickThread(threading.Thread):
+    """A thread of ticks that counts them, and reports the exception that ends it.
+
+    Attributes:
+        rate: of the ticks, Hz.
+        ticks: ticks so far.
+        late: those that were late.
+        dropped: periods left out.
+
+    """
+
+    def __init__(self, name: str, rate: float, failed: Callable[[BaseException], None]) -> None:
+        super().__init__(name=name, daemon=True)
+        self.rate = rate
+        self.ticks = self.late = self.dropped = 0
+        self._worst, self._failed = 0.0, failed
+        self._ending = threading.Event()
+
+    @property
+    def worst(self) -> float:
+        """Longest delay of a tick since this was last read, s."""
+        worst, self._worst = self._worst, 0.0
+        return worst
+
+    def end(self) -> None:
+        """Stop after the tick under way."""
+        self._ending.set()
+
+    def run(self) -> None:
+        """Tick until ended; hand any exception to ``failed``."""
+        try:
+            self._run()
+        except BaseException as error:
+            self._failed(error)
+
+    def _run(self) -> None:
+        raise NotImplementedError
+
+
+class Ticker(TickThread):
+    """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
+
+    The deadlines stay on their grid, so the rate has no drift. A tick that is late by less than
+    a period is made up for at once; after a stall the periods that have passed are left out,
+    ``resume`` gets its length in s, and the next tick is at the next deadline. The stamp is that
+    of the deadline. With simulated time the deadlines are instants of ``/clock``: the ticker
+    pauses with the clock, and a jump back calls ``restart``; but after ``stop_moving`` it
+    continues by the steady clock if ``/clock`` stands still for STOPPED s or jumps back.
+
+    Attributes:
+        late: ticks that began more than a period after their deadline.
+        dropped: periods left out in stalls.
+        jumps: of simulated time back.
+        stopping: whether the ticks do not wait for ``/clock``; set it False at rest.
+        paused: set by whoever ticks: the ticks go on, but nothing is done at them.
+
+    """
+
+    def __init__(self, node: Node, rate: float, tick: Callable[[float, int], None],
+                 restart: Callable[[], None], failed: Callable[[BaseException], None],
+                 resume: Callable[[float], None] | None = None,
+                 begin: Callable[[], None] = lambda: None) -> None:
+        """Prepare to tick.
+
+        Args:
+            node: whose clock says whether time is simulated.
+            rate: of the ticks, Hz.
+            tick: called with dt and stamp.
+            restart: called where simulated time jumps back.
+            failed: called with the exception that ended the thread.
+            resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
+            begin: called first thing in the thread.
+
+        """
+        super().__init__('ticker', rate, failed)
+        self.jumps = 0
+        self.stopping = self._resuming = self.paused = False
+        self._clock: Any = node.get_clock()
+        self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
+        self._moved = threading.Event()
+        threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
+                                  min_backward=Duration(nanoseconds=-1))
+        self._jumps = self._clock.create_jump_callback(
+            threshold, post_callback=lambda _: self._moved.set())
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it has not been started, or is paused."""
+        return self.paused or not self.is_alive()
+
+    def end(self) -> None:
+        """Stop after the tick under way."""
+        super().end()
+        self._moved.set()
+
+    def stop_moving(self) -> None:
+        """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
+        self.stopping = True
+        self._moved.set()
+
+    def _run(self) -> None:
+        self._begin()
+        if self._clock.ros_time_is_active:
+            self._run_simulated()
+        else:
+            self._run_steady(time.monotonic_ns(), lambda deadline: deadline + system_offset(),
+                             lambda: True)
+
+    def _period(self) -> int:
+        return round(1e9 / self.rate)
+
+    def _run_steady(self, deadline: int, stamp: Callable[[int], int],
+                    going: Callable[[], bool]) -> None:
+        """Tick by the steady clock while ``going``; the deadline, and its ``stamp``, in ns."""
+        ending = self._ending
+        while not ending.is_set() and going():
+            period = self._period()
+            deadline += period
+            behind = time.monotonic_ns() - deadline
+            if behind < 0:
+                time.sleep(-behind * 1e-9)
+                behind = time.monotonic_ns() - deadline
+            self._worst = max(self._worst, behind * 1e-9)
+            leap, skip = self._stalled(behind, period)
+            deadline += leap
+            if skip:
+                continue
+            self.ticks += 1
+            if behind > period:
+                self.late += 1
+            self._tick(period * 1e-9, stamp(deadline))
+
+    def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
+        """Return how far the deadline must leap, ns, and whether to leave out its tick, too.
+
+        Leaving it out keeps ticks apart after a stall; but where every sleep is longer than a
+        stall, some ticks must remain.
+        """
+        resume = self._resume
+        if resume is None:
+            missed, skip = behind // period if behind > MOST_BEHIND * 1e9 else 0, False
+        elif behind < STALL * period:
+            self._resuming = False
+            return 0, False
+        else:
+            missed, skip = behind // period, not self._resuming
+            self._resuming = skip
+            resume(behind * 1e-9)
+        self.dropped += missed + skip
+        return missed * period, skip
+
+    def _run_simulated(self) -> None:
+        # The last tick's stamp, the latest time, and its last step; 0 before the first.
+        deadline = last = step = 0
+        moved = time.monotonic()
+        while not self._ending.is_set():
+            left = moved + STOPPED - time.monotonic()
+            self._moved.wait(max(left, 0.0) if self.stopping and deadline else None)
+            self._moved.clear()
+            now = self._clock.now().nanoseconds
+            back = last - now
+            if now > last:
+                moved = time.monotonic()
+            elif self.stopping and deadline and (
+                    back > JITTER * 1e9 or time.monotonic() >= moved + STOPPED):
+                deadline = self._stop_by_steady_clock(deadline)
+                # The next time counts, whatever it is.
+                last, moved = 0, time.monotonic()
+                continue
+            if now == 0 or 0 <= back <= JITTER * 1e9:
+                continue
+            if last == 0 or back > 0:
+                if last:
+                    self.jumps += 1
+                    self._restart()
+                deadline = last = now
+            # A clock may be coarser than a period; a stall is a step unlike the one before.
+            usual, step = step, now - last
+            last = now
+            period = self._period()
+            behind = now - deadline - period
+            if behind >= STALL * period and step > max(2 * usual, round(COARSE * 1e9)):
+                leap, skip = self._stalled(behind, period)
+                deadline += leap + skip * period
+            while not self._ending.is_set() and deadline + self._period() <= now:
+                period = self._period()
+                deadline += period
+                self.ticks += 1
+                self._tick(period * 1e-9, deadline)
+
+    def _stop_by_steady_clock(self, stamp: int) -> int:
+        """Continue the ticks from a stamp, ns, until the robot is at rest; return the last one."""
+        now = time.monotonic_ns()
+        ahead = stamp - now
+
+        def next_stamp(deadline: int) -> int:
+            nonlocal stamp
+            stamp = deadline + ahead
+            return stamp
+
+        self._run_steady(now, next_stamp, lambda: self.stopping)
+        return stamp

@@ -1,0 +1,380 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One generator and its robot, as pages show them."""
+
+import asyncio
+from collections.abc import Callable
+import math
+import re
+import time
+from typing import Any
+
+from cpg_ros.ros.node.client import (
+    CallError,
+    Graph,
+    level,
+    namespace,
+    NodeClient,
+    RequestRefused,
+    ServiceClients,
+)
+from cpg_ros.ros.node.parameters import choices, presets_among
+from cpg_ros.ros.node.polled import best_effort, latched, PolledSubscription
+from cpg_ros.ros.panel import shape_source
+from cpg_ros.ros.panel.pages import RequestError
+from cpg_ros.ros.panel.teleop import Teleop
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Wrench
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterEvent, ParameterType
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import SetBool
+
+# The parameters of a node as controls of a page, made from its own descriptors.
+
+#: Types that a page has a control for.
+KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
+         ParameterType.PARAMETER_DOUBLE: 'double', ParameterType.PARAMETER_STRING: 'text'}
+#: How long a node may take to judge a value, s: it may have to solve for a gait.
+PATIENCE = 30.0
+#: Parameters that every node of ROS has.
+COMMON = ('qos_overrides.', 'start_type_description_service', 'use_sim_time')
+
+
+def unit(text: str) -> str:
+    """Return the unit in a description, as in ``rate [Hz]``; '' if it has none."""
+    found = re.search(r'\[([^\]]+)\]', text)
+    return found[1] if found else ''
+
+
+class Controls:
+    """One node's parameters.
+
+    Attributes:
+        known: name -> what a page needs to draw its control, with the value.
+
+    """
+
+    def __init__(self, node: NodeClient, report: Callable[[str], None]) -> None:
+        """Control a node; ``report`` takes a line for each value that the node rejects."""
+        self._node, self._report = node, report
+        self.known: dict[str, dict[str, Any]] = {}
+        self._waiting: dict[str, Any] = {}
+        self._work: asyncio.Task | None = None
+
+    async def read(self) -> None:
+        """Read descriptors and values from the node.
+
+        Raises:
+            CallError: it does not answer.
+
+        """
+        names = [name for name in await self._node.parameters() if not name.startswith(COMMON)]
+        described, values = await self._node.descriptors(names), await self._node.values(names)
+        known = {}
+        for name, about, value in zip(names, described, values, strict=True):
+            if about.type not in KINDS:
+                continue
+            (span,) = (*about.floating_point_range, *about.integer_range)[:1] or (None,)
+            known[name] = {
+                'name': name, 'kind': KINDS[about.type], 'text': about.description,
+                'unit': unit(about.description), 'fixed': about.read_only,
+                'choices': choices(about.additional_constraints),
+                'presets': presets_among(about.additional_constraints),
+                'value': value,
+                'low': span.from_value if span else None, 'high': span.to_value if span else None}
+        self.known = known
+
+    def hear(self, event: ParameterEvent) -> dict[str, Any]:
+        """Store the changes of an event; return name -> value if they are this node's."""
+        if event.node != self._node.name:
+            return {}
+        values = {one.name: parameter_value_to_python(one.value)
+                  for one in event.changed_parameters if one.name in self.known}
+        for name, value in values.items():
+            self.known[name]['value'] = value
+        return values
+
+    def value(self, name: str) -> Any:
+        """Return a parameter's value, None if there is none."""
+        return self.known.get(name, {}).get('value')
+
+    def set(self, name: str, value: Any) -> None:  # noqa: A003
+        """Set a parameter soon; of several waiting values only the last one is sent.
+
+        Raises:
+            RequestError: the node has no such parameter, or the value is invalid.
+
+        """
+        about = self.known.get(name)
+        if about is None:
+            raise RequestError(f"{self._node.name} has no parameter '{name}'")
+        if about['fixed']:
+            raise RequestError(f'{name} cannot be changed while the node runs')
+        self._waiting[name] = _fitting(about, value)
+        if self._work is None or self._work.done():
+            self._work = asyncio.get_running_loop().create_task(self._send())
+
+    async def _send(self) -> None:
+        while self._waiting:
+            name = next(iter(self._waiting))
+            value = self._waiting.pop(name)
+            try:
+                await self._node.set_parameters({name: value}, PATIENCE)
+            except RequestRefused as error:
+                self._report(f'{name} {value}: {error}')
+            except CallError as error:
+                self._report(str(error))
+
+
+def _fitting(about: dict[str, Any], value: Any) -> Any:
+    """Return a value converted to the kind of its parameter."""
+    kind, name = about['kind'], about['name']
+    right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
+    if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):
+        raise RequestError(f'{name} must be a {kind}, not {value!r}')
+    low, high = about['low'], about['high']
+    if low is not None and not low <= value <= high:
+        raise RequestError(f'{name} {value:g} is not from {low:g} to {high:g}')
+    return float(value) if kind == 'double' else value
+
+
+#: Decimal places of values: a tenth of a milliradian is less than a pixel.
+DIGITS = 4
+#: The folder of an absolute path.
+FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
+
+
+class RobotView:
+    """Topics, parameters and shape of one generator.
+
+    Attributes:
+        controls: its parameters.
+        teleop: its lease and its ``cmd_vel``.
+
+    """
+
+    def __init__(self, node: Node, watch: Node, services: ServiceClients, name: str,
+                 fastest: tuple[float, float], report: Callable[[str], None],
+                 send: Callable[[dict[str, Any]], None]) -> None:
+        """View a generator.
+
+        Args:
+            node: that publishes, and is spun.
+            watch: that subscribes, and is not spun.
+            services: clients of other nodes.
+            name: the generator's full name.
+            fastest: speed in m/s and turn in rad/s at full deflection.
+            report: shows a line on its pages.
+            send: sends its pages a message.
+
+        """
+        self.name, self._space = name, namespace(name)
+        self._node, self._watch, self._services = node, watch, services
+        self._report, self._send = report, send
+        self.controls = Controls(NodeClient(services, name), report)
+        # A client that the generator does not know yet would delay a stop.
+        services.client(SetBool, f'{name}/enable')
+        self._pushes: Any = None
+        self.teleop = Teleop(
+            node, f'{self._space}/cmd_vel', fastest,
+            lambda: self.controls.value('stamped_cmd_vel') is True)
+        self.graph = Graph()
+        self._topics: dict[str, PolledSubscription] = {}
+        self._kept: dict[str, dict[str, Any]] = {}
+        self._joints: dict[str, float] = {}
+        self._names: dict[str, list[str]] = {}
+        self._urdf = str(node.get_parameter('urdf').value)
+        self._readied: asyncio.Task | None = None
+        self._stale = True
+        self._sources: tuple[str, ...] = ()
+
+    # -- parameters and shape ---------------------------------------------------------------
+
+    def ready(self) -> None:
+        """Start reading parameters and shape, at first and when their sources have changed."""
+        sources = (self.graph.beside(self.name, self.graph.simulations),
+                   *sorted(name for name, _ in self.graph.topics
+                           if name in shape_source.descriptions(self._space)))
+        if self._stale or sources != self._sources:
+            self._stale, self._sources = False, sources
+            if self._readied is not None:
+                self._readied.cancel()
+            self._readied = asyncio.get_running_loop().create_task(self._ready())
+
+    async def _ready(self) -> None:
+        try:
+            await self.controls.read()
+            self._keep({'type': 'controls', 'node': self.name,
+                        'controls': list(self.controls.known.values())})
+            known = await shape_source.ask(
+                self._watch, self._services, self.graph, self.name,
+                str(self.controls.value('robot') or ''), self._urdf)
+            doubts: list[str] = []
+            shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
+            doubts = list(dict.fromkeys(doubts))[:5]
+            for doubt in doubts:
+                self._node.get_logger().warning(doubt)
+            # A page sees folders only of files that the graph names, not of the panel's own.
+            named = ' '.join((known.robot, known.model, known.description))
+            doubts = [FOLDER.sub(lambda found: found[0] * (found[0] in named), doubt)
+                      for doubt in doubts]
+            self._keep({**shape.message(), 'doubts': doubts})
+        except CallError as error:
+            self._report(str(error))
+            self._stale = True
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return the messages that a new page needs."""
+        return list(self._kept.values())
+
+    def _keep(self, message: dict[str, Any]) -> None:
+        self._kept[message['type']] = message
+        self._send(message)
+
+    # -- topics -----------------------------------------------------------------------------
+
+    def listen(self, graph: Graph, wanted: bool) -> None:
+        """Subscribe to the topics on the graph, or to none if no page shows the generator."""
+        self.graph = graph
+        space, floats = self._space, 'std_msgs/msg/Float64MultiArray'
+        joints = [topic for topic in (f'{space}/joint_states',)
+                  if self._watch.count_publishers(topic)]
+        # One topic with all joints costs their publisher less than one for each leg.
+        joints = joints or [name for name, kind in graph.topics if kind.endswith('/JointState')
+                            and name.startswith(f'{space}/') and name.endswith('/joint_states')
+                            and name.removeprefix(f'{space}/').count('/') == 1]
+        topics = {**{name: (JointState, best_effort()) for name in joints},
+                  f'{self.name}/gait': (String, latched()),
+                  '/diagnostics': (DiagnosticArray, best_effort(20)),
+                  '/parameter_events': (ParameterEvent, best_effort(100))}
+        optional = {f'{self.name}/phase': Float64MultiArray, f'{self.name}/cells':
+                    Float64MultiArray, f'{space}/foot_contacts': Float64MultiArray}
+        topics.update({name: (kind, best_effort()) for name, kind in optional.items()
+                       if (name, floats) in graph.topics})
+        if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
+            topics[f'{space}/odom'] = Odometry, best_effort()
+        topics = topics if wanted else {}
+        for name in set(self._topics) - set(topics):
+            self._topics.pop(name).close()
+        for name, (kind, quality) in topics.items():
+            if name not in self._topics:
+                self._topics[name] = PolledSubscription(self._watch, kind, name, quality,
+                                                        overridable=False)
+
+    def _newest(self, name: str) -> Any:
+        topic = self._topics.get(name)
+        return topic.newest() if topic else None
+
+    def frame(self) -> dict[str, Any]:
+        """Return what has changed since the last frame."""
+        found: dict[str, Any] = {}
+        fresh = False
+        for name in [name for name in self._topics if name.endswith('/joint_states')]:
+            if (joints := self._newest(name)) is not None:
+                self._joints.update(zip(joints.name, joints.position, strict=False))
+                found['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
+                fresh = True
+        if fresh:
+            self._names_message('joints', list(self._joints))
+            found['angles'] = _short(self._joints.values())
+        for key, name in (('phases', f'{self.name}/phase'), ('cells', f'{self.name}/cells'),
+                          ('forces', f'{self._space}/foot_contacts')):
+            if (message := self._newest(name)) is not None:
+                dimensions = message.layout.dim
+                if dimensions:
+                    self._names_message(key, dimensions[0].label.split(',')
+                                        if key != 'cells' else
+                                        [f'{dimension.label}:{dimension.size}'
+                                         for dimension in dimensions])
+                found[key] = _short(message.data)
+        if (moved := self._newest(f'{self._space}/odom')) is not None:
+            place, turn = moved.pose.pose.position, moved.pose.pose.orientation
+            speed = moved.twist.twist
+            found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
+            found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
+        if self.teleop.target != (0.0, 0.0):
+            found['steered'] = _short(self.teleop.target)
+        return found
+
+    def _names_message(self, key: str, names: list[str]) -> None:
+        """Send the pages the names of the numbers under a key, if they have changed."""
+        if self._names.get(key) != names:
+            self._names[key] = names
+            self._keep({'type': 'names', **self._names})
+
+    def news(self) -> None:
+        """Send the pages the gait, changed parameters and health."""
+        if (gait := self._newest(f'{self.name}/gait')) is not None:
+            self._keep({'type': 'gait', 'gait': gait.data})
+        if events := self._topics.get('/parameter_events'):
+            for event, _ in events.take():
+                # A node of the same name has started again.
+                self._stale |= event.node == self.name and bool(event.new_parameters)
+                if values := self.controls.hear(event):
+                    self._send({'type': 'values', 'values': values})
+        if health := self._topics.get('/diagnostics'):
+            beside = (self.graph.beside(self.name, kind)
+                      for kind in (self.graph.simulations, self.graph.bridges))
+            owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
+            for message, _ in health.take():
+                for status in message.status:
+                    if status.name.startswith(owners):
+                        self._keep_health(status)
+
+    def _keep_health(self, status: Any) -> None:
+        parts = {**self._kept.get('health', {}).get('parts', {}), status.name: {
+            'level': level(status), 'text': status.message,
+            'values': {value.key: value.value for value in status.values}}}
+        self._keep({'type': 'health', 'parts': parts})
+
+    # -- actions ----------------------------------------------------------------------------
+
+    def push(self, force: float, direction: float) -> None:
+        """Push the robot with a force, N, in a direction, degrees from ahead to the left.
+
+        Raises:
+            CallError: it is not simulated.
+
+        """
+        simulation = self.graph.beside(self.name, self.graph.simulations)
+        if not simulation:
+            raise CallError(f'there is no simulated robot for {self.name}')
+        if self._pushes is None:
+            self._pushes = self._node.create_publisher(Wrench, f'{simulation}/push', 10)
+        end = time.monotonic() + 1.0
+        while not self._pushes.get_subscription_count() and time.monotonic() < end:
+            time.sleep(0.01)
+        message, angle = Wrench(), math.radians(direction)
+        message.force.x, message.force.y = force * math.cos(angle), force * math.sin(angle)
+        self._pushes.publish(message)
+
+    def close(self) -> None:
+        """End subscriptions, publishers and clients."""
+        self.listen(self.graph, wanted=False)
+        self.teleop.close()
+        if self._pushes is not None:
+            self._node.destroy_publisher(self._pushes)
+        self._services.forget(self.name)
+        if self._readied is not None:
+            self._readied.cancel()
+
+
+def _short(values: Any) -> list[float | None]:
+    """Return rounded values, None for those that are not finite."""
+    return [round(value, DIGITS) if math.isfinite(value) else None for value in values]

@@ -1,0 +1,327 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a robot looks like: links that turn about joints, each with its own triangles."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+import math
+from typing import Any
+
+from cpg_ros.motion.meshes import merged, Mesh
+from cpg_ros.motion.robot import Robot
+from cpg_ros.simulation.robot_model import engine, legs, load
+import numpy as np
+
+#: Number of corners of a circle.
+ROUND = 16
+#: Colour of triangles without one.
+GREY = (0.62, 0.65, 0.70)
+#: Vertices closer than this are merged, m: a page draws a robot, not its screws.
+GRAIN = 0.008
+
+
+@dataclass
+class Link:
+    """A rigid part, and its joint to its parent.
+
+    Attributes:
+        name: of it.
+        parent: index of the parent, -1 for the base.
+        joint: name of the joint between them, '' for a fixed one.
+        slides: whether the joint is prismatic, m, not revolute, rad.
+        axis: of the joint, in the link's own frame.
+        place, pose: of the link in its parent at angle 0: m, and a rotation matrix.
+        zero: angle of the joint at which the link is where ``pose`` has it, rad.
+        vertices, colours: its triangles, shape (n, 3, 3), m, and their colours, (n, 3), 0 to 1.
+
+    """
+
+    name: str
+    parent: int
+    joint: str = ''
+    slides: bool = False
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
+    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    pose: np.ndarray = field(default_factory=lambda: np.eye(3))
+    zero: float = 0.0
+    vertices: list[np.ndarray] = field(default_factory=list)
+    colours: list[np.ndarray] = field(default_factory=list)
+
+    def add(self, triangles: np.ndarray, colour: tuple[float, ...] = GREY,
+            place: np.ndarray | None = None, pose: np.ndarray | None = None) -> None:
+        """Add triangles, shape (n, 3, 3), m, in a frame within the link, in a colour."""
+        turned = triangles if pose is None else triangles @ pose.T
+        self.vertices.append(turned if place is None else turned + place)
+        self.colours.append(np.broadcast_to(np.asarray(colour[:3]), (len(triangles), 3)))
+
+
+@dataclass
+class Shape:
+    """A robot.
+
+    Attributes:
+        source: of the shape, for people.
+        links: a parent before its children, the base first.
+        limits: joint -> lower and upper, rad, infinite where there is none.
+        feet: leg -> index of the link that stands on the floor, and where on it, m.
+
+    """
+
+    source: str
+    links: list[Link]
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    feet: dict[str, tuple[int, np.ndarray]] = field(default_factory=dict)
+
+    def message(self) -> dict[str, Any]:
+        """Return the message for a page: base64 of float32 triangles and uint8 colours."""
+        links = []
+        for link in self.links:
+            corners = (np.concatenate(link.vertices) if link.vertices else np.zeros((0, 3, 3)))
+            colours = (np.concatenate(link.colours) if link.colours else np.zeros((0, 3)))
+            links.append({
+                'name': link.name, 'parent': link.parent, 'joint': link.joint,
+                'slides': link.slides, 'zero': link.zero,
+                'axis': np.round(link.axis, 6).tolist(),
+                'place': np.round(link.place, 6).tolist(),
+                'pose': np.round(link.pose.ravel(), 6).tolist(),
+                'vertices': _base64(corners.reshape(-1, 3).astype('<f4')),
+                'colours': _base64((255 * np.clip(np.repeat(colours, 3, 0), 0, 1)).astype('u1'))})
+        limits = {joint: [value if math.isfinite(value) else None for value in span]
+                  for joint, span in self.limits.items()}
+        return {'type': 'shape', 'source': self.source, 'links': links, 'limits': limits,
+                'feet': {leg: [index, *np.round(place, 5).tolist()]
+                         for leg, (index, place) in self.feet.items()}}
+
+
+def _base64(values: np.ndarray) -> str:
+    return base64.b64encode(values.tobytes()).decode('ascii')
+
+
+def coarse(triangles: np.ndarray, grain: float = GRAIN) -> np.ndarray:
+    """Return the triangles that remain when vertices closer than ``grain``, m, are merged."""
+    left = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
+                  grain)
+    # Two that came to lie on one another are one, whichever way round.
+    _, kept = np.unique(np.sort(left.triangles, axis=1), axis=0, return_index=True)
+    return left.points[left.triangles[np.sort(kept)]]
+
+
+def box(half: np.ndarray) -> np.ndarray:
+    """Return the triangles of a box of three half lengths, shape (12, 3, 3)."""
+    faces = []
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            one, other = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+            middle = side * np.eye(3)[axis]
+            a, b, c, d = (middle + s * one + t * other
+                          for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+            faces += [(a, b, c), (a, c, d)]
+    return np.array(faces) * np.asarray(half)
+
+
+def turned(profile: np.ndarray) -> np.ndarray:
+    """Return the triangles of a profile of radius and height, (n, 2), turned about z."""
+    angles = np.linspace(0.0, 2.0 * math.pi, ROUND + 1)
+    ring = np.stack([profile[:, :1] * np.cos(angles), profile[:, :1] * np.sin(angles),
+                     np.broadcast_to(profile[:, 1:], (len(profile), ROUND + 1))], -1)
+    a, b, c, d = ring[:-1, :-1], ring[:-1, 1:], ring[1:, 1:], ring[1:, :-1]
+    found = np.concatenate([np.stack([a, b, c], -2).reshape(-1, 3, 3),
+                            np.stack([a, c, d], -2).reshape(-1, 3, 3)])
+    area = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1)
+    return found[area > 1e-12]
+
+
+def cylinder(radius: float, half: float) -> np.ndarray:
+    """Return the triangles of a cylinder along z of a radius and half a length, m."""
+    return turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
+
+
+def capsule(radius: float, half: float) -> np.ndarray:
+    """Return the triangles of a cylinder along z with a half sphere at each end, m."""
+    bend = np.linspace(0.0, 0.5 * math.pi, ROUND // 4 + 1)
+    low = np.stack([radius * np.sin(bend), -half - radius * np.cos(bend)], -1)
+    return turned(np.concatenate([low, low[::-1] * (1.0, -1.0)]))
+
+
+def sphere(radius: float) -> np.ndarray:
+    """Return the triangles of a sphere, m."""
+    return capsule(radius, 0.0)
+
+
+def along(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
+    """Return the triangles of a capsule between two points, m."""
+    way = np.asarray(end, float) - start
+    length = float(np.linalg.norm(way))
+    made = capsule(radius, 0.5 * length)
+    if length > 0.0:
+        z = way / length
+        x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
+        x /= np.linalg.norm(x)
+        made = made @ np.array([x, np.cross(z, x), z])
+    return made + 0.5 * (np.asarray(start) + end)
+
+
+# A stick figure for a robot of which only legs and joints are known.
+
+#: From hip to hip along and across, half of them, and the length of a leg, m.
+LONG, WIDE, LEG = 0.24, 0.11, 0.42
+BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
+
+
+def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tuple[float, float]],
+         limits: Mapping[str, tuple[float, float]] | None = None) -> Shape:
+    """Return the shape.
+
+    Args:
+        name: of the robot, for people.
+        legs: leg -> its joints, from the body down. Of three the first turns about the axis that
+            points ahead, all others turn about that to the left.
+        places: leg -> 1 or -1 for ahead or behind (0 in between), and for left or right.
+        limits: joint -> lower and upper, rad.
+
+    """
+    base = Link('base', -1)
+    ends = [np.array([LONG * ahead, WIDE * left, 0.0]) for ahead, left in places.values()]
+    long = max((abs(end[0]) for end in ends), default=0.0)
+    base.add(box(np.array([long + 0.06, 0.7 * WIDE, 0.05])), BODY)
+    base.add(box(np.array([0.02, 0.04, 0.02])), STICK, np.array([long + 0.08, 0.0, 0.02]))
+    shape = Shape(f"stick figure of '{name}'", [base], dict(limits or {}))
+    for (leg, joints), end in zip(legs.items(), ends, strict=True):
+        base.add(along(np.array([end[0], 0.0, 0.0]), end, 0.025), BODY)
+        parent, place = 0, end
+        down = [k for k in range(len(joints)) if not (len(joints) >= 3 and k == 0)]
+        length = LEG / max(len(down), 1)
+        for k, joint in enumerate(joints):
+            link = Link(joint, parent, joint, place=place,
+                        axis=np.eye(3)[1 if k in down else 0])
+            if k in down:
+                tip = np.array([0.0, 0.0, -length])
+                link.add(along(np.zeros(3), tip, 0.018), STICK)
+                link.add(sphere(0.028), BODY)
+            else:
+                tip = np.array([0.0, 0.3 * np.sign(end[1]) * WIDE, 0.0])
+                link.add(along(np.zeros(3), tip, 0.025), BODY)
+            shape.links.append(link)
+            parent, place = len(shape.links) - 1, tip
+        shape.links[parent].add(sphere(0.026), FOOT, place)
+        shape.feet[leg] = parent, place
+    return shape
+
+
+# The shape of a robot from its MuJoCo model, as robot_sim uses it.
+
+#: Geoms of these groups and above are for collisions, by the custom of the models.
+COLLISION_GROUP = 3
+
+
+def from_model(name: str, robot: Robot) -> Shape:
+    """Return the shape of a model.
+
+    Args:
+        name: as robot_sim's parameter ``model`` takes it.
+        robot: whose joints and legs.
+
+    Raises:
+        SimulationError: there is no such model or no MuJoCo, or model and robot do not match.
+
+    """
+    mujoco, model = engine(), load(name, robot, visual=True)
+    shape = Shape(f"model '{name}'", [])
+    free = next(k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE)
+    base = model.jnt_bodyid[free]
+    index: dict[int, int] = {}
+    for body in range(base, model.nbody):
+        parent = index.get(model.body_parentid[body], -1)
+        if parent < 0 and body != base:
+            continue
+        index[body] = _links(mujoco, model, body, parent, shape)
+        _draw(mujoco, model, body, shape.links[index[body]])
+    for leg in legs(robot):
+        end = max(model.joint(joint.name).bodyid[0] for joint in robot.legs[leg])
+        shape.feet[leg] = index[end], _lowest(shape.links[index[end]])
+    return shape
+
+
+def _links(mujoco: Any, model: Any, body: int, parent: int, shape: Shape) -> int:
+    """Add a body, as a link for each of its joints; return the index of the last one."""
+    frame = _matrix(mujoco, model.body_quat[body])
+    place, last, name = model.body_pos[body], parent, model.body(body).name
+    first = model.body_jntadr[body]
+    for k in range(first, first + model.body_jntnum[body]) if parent >= 0 else ():
+        joint, anchor = model.joint(k), model.jnt_pos[k]
+        # To the joint's point; the next link goes back from there to the body's own frame.
+        shape.links.append(Link(name, last, joint.name,
+                                model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE,
+                                model.jnt_axis[k].copy(), place + frame @ anchor, frame,
+                                float(model.qpos0[model.jnt_qposadr[k]])))
+        if model.jnt_limited[k]:
+            shape.limits[joint.name] = tuple(model.jnt_range[k])
+        last, frame, place = len(shape.links) - 1, np.eye(3), -anchor
+    if last == parent or np.any(place):
+        where = (np.zeros(3), np.eye(3)) if parent < 0 else (place.copy(), frame)
+        shape.links.append(Link(name, last, place=where[0], pose=where[1]))
+    return len(shape.links) - 1
+
+
+def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
+    first = model.body_geomadr[body]
+    geoms = range(first, first + model.body_geomnum[body])
+    seen = [k for k in geoms if model.geom_group[k] < COLLISION_GROUP
+            and not (model.geom_contype[k] and model.geom_type[k] != mujoco.mjtGeom.mjGEOM_MESH
+                     and any(model.geom_type[j] == mujoco.mjtGeom.mjGEOM_MESH for j in geoms))]
+    for k in seen or geoms:
+        triangles = _triangles(mujoco, model, k)
+        material = model.geom_matid[k]
+        colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
+        if triangles is not None and colour[3] > 0.05:
+            link.add(triangles, tuple(colour[:3]), model.geom_pos[k],
+                     _matrix(mujoco, model.geom_quat[k]))
+
+
+def _triangles(mujoco: Any, model: Any, k: int) -> np.ndarray | None:
+    kinds, size, kind = mujoco.mjtGeom, model.geom_size[k], model.geom_type[k]
+    if kind == kinds.mjGEOM_MESH:
+        mesh = model.geom_dataid[k]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+        vertices = model.mesh_vert[first:first + count].astype(float)
+        return coarse(vertices[model.mesh_face[start:start + faces]])
+    if kind == kinds.mjGEOM_BOX:
+        return box(size)
+    if kind == kinds.mjGEOM_SPHERE:
+        return sphere(size[0])
+    if kind == kinds.mjGEOM_CAPSULE:
+        return capsule(size[0], size[1])
+    if kind == kinds.mjGEOM_CYLINDER:
+        return cylinder(size[0], size[1])
+    if kind == kinds.mjGEOM_ELLIPSOID:
+        return sphere(1.0) * size
+    return None
+
+
+def _lowest(link: Link) -> np.ndarray:
+    """Return the point of a link's triangles that is farthest from its joint."""
+    if not link.vertices:
+        return np.zeros(3)
+    corners = np.concatenate(link.vertices).reshape(-1, 3)
+    away = np.linalg.norm(corners, axis=1)
+    return corners[away > 0.95 * away.max()].mean(axis=0)
+
+
+def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
+    made = np.zeros(9)
+    mujoco.mju_quat2Mat(made, quaternion)
+    return made.reshape(3, 3)

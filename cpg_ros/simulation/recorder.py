@@ -1,0 +1,383 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Pictures of a robot, drawn offscreen by OpenGL, and films of them."""
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+import importlib
+import math
+import os
+from pathlib import Path
+import shutil
+import subprocess
+from typing import Any, BinaryIO, Protocol
+
+from cpg_ros.common.command_line import progress_bar
+from cpg_ros.networks.leg_numbers import footfall_order
+from cpg_ros.simulation.body import Body, yaw
+from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
+from cpg_ros.simulation.terrain import add_ground, lay, Terrain
+import numpy as np
+from PIL import GifImagePlugin, Image
+
+# Recording of a run for its film, its footfall diagram and its summary.
+
+#: How much of the end of a run is kept, s: longer films and diagrams are of no use.
+KEPT = 60.0
+#: Pictures of a film and samples of the footfalls a second.
+FRAMES, SAMPLE_RATE = 12.5, 200.0
+
+
+class RunLog:
+    """Records a body after each of its periods."""
+
+    def __init__(self, body: Body, rate: float, film: Path | None = None,
+                 footfalls: Path | None = None, terrain: Terrain | None = None) -> None:
+        """Keep what the files need; one that is None is not made.
+
+        Args:
+            body: looked at.
+            rate: of the periods, Hz.
+            film: .gif or .mp4.
+            footfalls: .png, .svg or .pdf.
+            terrain: that the body is on; None for the flat floor.
+
+        Raises:
+            SimulationError: a file cannot be written there.
+
+        """
+        self._body, self._film, self._footfalls = body, film, footfalls
+        self._terrain = terrain
+        self._fps = min(FRAMES, rate)
+        self._frames = _Every(rate, FRAMES)
+        self._samples = _Every(rate, SAMPLE_RATE)
+        self._poses: deque[np.ndarray] = deque(maxlen=round(KEPT * FRAMES))
+        self._steps: deque[tuple] = deque(maxlen=round(KEPT * SAMPLE_RATE))
+        self._gaits: list[tuple[float, str]] = []
+        self._now = 0.0
+        if footfalls is not None:
+            from cpg_ros.analysis.gait_diagram import FORMATS
+            if footfalls.suffix not in FORMATS:
+                raise SimulationError(f'footfalls {footfalls}: must end in {", ".join(FORMATS)}')
+            if not footfalls.parent.is_dir():
+                raise SimulationError(f'footfalls {footfalls}: there is no folder '
+                                      f'{footfalls.parent}')
+        if film is not None:
+            check_film(film)
+
+    def gait(self, name: str) -> None:
+        """Note that a gait begins."""
+        if not self._gaits or self._gaits[-1][1] != name:
+            self._gaits.append((self._now, name))
+
+    def look(self, now: float) -> None:
+        """Record the body at a time, s, that grows from call to call."""
+        self._now, body = now, self._body
+        if self._film is not None and self._frames.due():
+            self._poses.append(body.data.qpos.copy())
+        if self._footfalls is not None and self._samples.due():
+            self._steps.append((now, body.feet.copy(), body.base[:2].copy()))
+
+    def write(self, name: str, enough: Callable[[], bool] = lambda: False) -> list[Path]:
+        """Make the files and return them; ``name`` is that of the model.
+
+        Raises:
+            SimulationError, OSError: one cannot be made.
+
+        """
+        written = []
+        if self._footfalls is not None and len(self._steps) > 2:
+            from cpg_ros.analysis.gait_diagram import plot_footfalls
+            times, forces, places = (np.array(each) for each in zip(*self._steps, strict=True))
+            begun = [gait for gait in self._gaits if gait[0] <= times[0]][-1:]
+            gaits = [(max(float(times[0]), when), gait) for when, gait in
+                     begun + [gait for gait in self._gaits if gait[0] > times[0]]]
+            robot = self._body.robot
+            measured, shown = legs(robot), footfall_order(robot.legs, robot.sides, robot.girdles)
+            plot_footfalls(self._footfalls, shown, times,
+                           forces[:, [measured.index(leg) for leg in shown]], places, gaits)
+            written.append(self._footfalls)
+        if self._film is not None and self._poses:
+            terrain = self._terrain
+            model = load(name, self._body.robot, visual=True, add=add_ground if terrain else None)
+            if terrain is not None:
+                lay(model, terrain)
+            shoot(self._film, model, self._poses, self._fps, enough=enough)
+            written.append(self._film)
+        return written
+
+
+class _Every:
+    """Selects from the periods of one rate those that are due at a lower one."""
+
+    def __init__(self, rate: float, wanted: float) -> None:
+        self._share, self._sum = min(1.0, wanted / rate), 1.0
+
+    def due(self) -> bool:
+        due = self._sum >= 1.0 - 1e-9
+        self._sum += self._share - (1.0 if due else 0.0)
+        return due
+
+
+def summary(body: Body, since: float) -> str:
+    """Summarise in one line where the body is after a time, s."""
+    x, y = body.base[:2]
+    way = math.hypot(x, y)
+    speed = way / since if since > 0.0 else 0.0
+    return (f'{way:.2f} m from the start (x {x:.2f}, y {y:.2f}) in {since:.1f} s, '
+            f'{speed:.2f} m/s, heading {math.degrees(body.yaw):.0f} degrees, '
+            f'{"fallen" if body.fallen else "upright"}')
+
+
+#: Colours of a GIF; few, and no dithering, make it small.
+COLOURS = 96
+#: Direction of view, degrees: from the robot's left, a little ahead of it and above.
+AZIMUTH, ELEVATION = -125.0, -14.0
+#: Distance of the camera in heights of the base when it stands.
+DISTANCE = 4.7
+#: Share of a turn of the robot by which the camera follows from one picture to the next.
+FOLLOW = 0.1
+NO_OPENGL = ('pictures need OpenGL without a screen; on Debian and Ubuntu: apt install libegl1 '
+             'libgl1-mesa-dri, or libosmesa6')
+#: Resolution of shadows, and samples a pixel (0: edges are not smoothed).
+SHADOW, SAMPLES = 1024, 0
+
+
+class Camera:
+    """Looks at the base of a robot from the front quarter, and goes and turns along with it.
+
+    To be used in the thread that made it, and closed by it.
+    """
+
+    def __init__(self, model: Any, width: int = 480, height: int = 320) -> None:
+        """Open an offscreen context for a ``mujoco.MjModel``.
+
+        Raises:
+            SimulationError: there is no OpenGL.
+
+        """
+        mujoco = engine()
+        self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
+        model.vis.global_.offwidth, model.vis.global_.offheight = width, height
+        model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = 0.4, 0.4
+        # Without a graphics card these two cost as much as all the rest.
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = SHADOW, SAMPLES
+        free = int(np.argmax(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)))
+        self._base = slice(model.jnt_qposadr[free], model.jnt_qposadr[free] + 7)
+        self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
+        shown = self._option.geomgroup[model.geom_group] > 0
+        if 2 * len(set(model.geom_bodyid[shown])) < len(set(model.geom_bodyid)):
+            # Hardly more than collision shapes, which are hidden by default.
+            self._option.geomgroup[:] = 1
+        self._view.azimuth, self._view.elevation = AZIMUTH, ELEVATION
+        self._view.distance = 0.0
+        self._rectangle = mujoco.MjrRect(0, 0, width, height)
+        self._picture = np.zeros((height, width, 3), np.uint8)
+        self._opengl = _opengl(width, height)
+        self._opengl.make_current()
+        self._scene = mujoco.MjvScene(model, maxgeom=2000)
+        try:
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            raise SimulationError(f'{NO_OPENGL} ({error})') from error
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
+
+    def picture(self, pose: np.ndarray) -> np.ndarray:
+        """Return the picture of one pose (all of ``qpos``), uint8, shape (height, width, 3).
+
+        The first pose sets how far away the camera stays.
+        """
+        mujoco, view = self._mujoco, self._view
+        self._data.qpos[:] = pose
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+        x, y, z, *turned = pose[self._base]
+        gap = AZIMUTH + math.degrees(yaw(np.array(turned))) - view.azimuth
+        gap -= 360.0 * round(gap / 360.0)
+        if not view.distance:
+            view.distance = DISTANCE * z
+            view.lookat[2] = 0.6 * z
+            view.azimuth += gap
+        view.azimuth += FOLLOW * gap
+        view.lookat[:2] = x, y
+        mujoco.mjv_updateScene(self._model, self._data, self._option, None, view,
+                               mujoco.mjtCatBit.mjCAT_ALL, self._scene)
+        mujoco.mjr_render(self._rectangle, self._scene, self._context)
+        mujoco.mjr_readPixels(self._picture, None, self._rectangle, self._context)
+        return self._picture[::-1]
+
+    def close(self) -> None:
+        """Give back the context; left to the end of the process, drivers complain."""
+        self._context.free()
+        self._opengl.free()
+
+    def __enter__(self) -> 'Camera':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def without_opengl() -> str:
+    """Say why no picture can be drawn, or ''."""
+    anything = engine().MjModel.from_xml_string(
+        '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>')
+    try:
+        Camera(anything, 16, 16).close()
+    except SimulationError as error:
+        return str(error)
+    return ''
+
+
+def _opengl(width: int, height: int) -> Any:
+    """Return a context of MUJOCO_GL's kind, or of the first that works without a screen."""
+    given = os.environ.get('MUJOCO_GL', '').strip().lower()
+    kinds = (given,) if given in ('egl', 'osmesa', 'glfw') else ('egl', 'osmesa')
+    reasons = []
+    for kind in kinds:
+        # What is missing shows as almost any error, down to attributes of None. A failed
+        # attempt leaves its choice of a platform behind, and that may not be changed once
+        # PyOpenGL is loaded.
+        platform = os.environ.get('PYOPENGL_PLATFORM')
+        try:
+            return importlib.import_module(f'mujoco.{kind}').GLContext(width, height)
+        except Exception as error:
+            reasons.append(f'{kind}: {" ".join(str(error).split())[:120]}')
+            if platform is None:
+                os.environ.pop('PYOPENGL_PLATFORM', None)
+    raise SimulationError(f'{NO_OPENGL} ({"; ".join(reasons)})')
+
+
+class Film(Protocol):
+    """Takes pictures of one size, uint8, shape (height, width, 3), one after the other."""
+
+    def add(self, picture: np.ndarray) -> None:
+        """Put one picture at the end."""
+
+    def close(self) -> None:
+        """End the film."""
+
+
+class _Gif:
+    """A GIF with the colours of its first picture, written as the pictures come."""
+
+    def __init__(self, file: BinaryIO, fps: float) -> None:
+        self._file, self._shown, self._taken, self._fps = file, 0, 0, fps
+        self._palette: Image.Image | None = None
+
+    def add(self, picture: np.ndarray) -> None:
+        image = Image.fromarray(np.ascontiguousarray(picture))
+        if self._palette is None:
+            self._palette = image.quantize(COLOURS, dither=Image.Dither.NONE)
+            self._palette.info.update(loop=0)
+            header, _ = GifImagePlugin.getheader(self._palette)
+            self._file.write(b''.join(header))
+        # A GIF counts in hundredths of a second: what rounding leaves over is made up for.
+        self._taken += 1
+        end = round(100 * self._taken / self._fps)
+        frame = image.quantize(palette=self._palette, dither=Image.Dither.NONE)
+        for part in GifImagePlugin.getdata(frame, duration=10 * (end - self._shown)):
+            self._file.write(part)
+        self._shown = end
+
+    def close(self) -> None:
+        self._file.write(b';')
+
+
+class _Mp4:
+    """An MP4 by ffmpeg."""
+
+    def __init__(self, path: Path, fps: float) -> None:
+        self._path, self._fps = path, fps
+        self._ffmpeg: subprocess.Popen | None = None
+
+    def add(self, picture: np.ndarray) -> None:
+        if self._ffmpeg is None:
+            height, width, _ = picture.shape
+            self._ffmpeg = subprocess.Popen(
+                ['ffmpeg', '-y', '-loglevel', 'error', '-f', 'rawvideo', '-pix_fmt', 'rgb24',
+                 '-s', f'{width}x{height}', '-r', str(self._fps), '-i', '-', '-an', '-pix_fmt',
+                 'yuv420p', '-movflags', '+faststart', '-f', 'mp4', str(self._path)],
+                stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+        assert self._ffmpeg.stdin is not None
+        try:
+            self._ffmpeg.stdin.write(picture.tobytes())
+        except BrokenPipeError:
+            self.close()
+
+    def close(self) -> None:
+        if self._ffmpeg is not None:
+            _, complaint = self._ffmpeg.communicate()
+            if self._ffmpeg.returncode:
+                words = ' '.join(complaint.decode(errors='replace').split())
+                raise SimulationError(f'ffmpeg: {words or self._ffmpeg.returncode}')
+
+
+def check_film(path: Path) -> None:
+    """Say now what would stop a film from being written later.
+
+    Raises:
+        SimulationError: an unknown ending, no such folder, or no ffmpeg.
+
+    """
+    if path.suffix not in ('.gif', '.mp4'):
+        raise SimulationError(f'film {path}: must end in .gif or .mp4')
+    if not path.parent.is_dir():
+        raise SimulationError(f'film {path}: there is no folder {path.parent}')
+    if path.suffix == '.mp4' and shutil.which('ffmpeg') is None:
+        raise SimulationError(f'film {path}: .mp4 needs ffmpeg (apt install ffmpeg); .gif needs '
+                              'nothing more')
+
+
+@contextmanager
+def film(path: Path, fps: float) -> Iterator[Film]:
+    """Open a film, GIF or MP4, that is at ``path`` when it is whole, and not before.
+
+    Raises:
+        SimulationError: as ``check_film``, or ffmpeg failed.
+        OSError: it cannot be written.
+
+    """
+    check_film(path)
+    beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
+    try:
+        with beside.open('wb') as file:
+            roll: Film = _Gif(file, fps) if path.suffix == '.gif' else _Mp4(beside, fps)
+            yield roll
+            roll.close()
+        beside.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def shoot(path: Path, model: Any, poses: Sequence[np.ndarray], fps: float = 20.0,
+          width: int = 480, height: int = 320, enough: Callable[[], bool] = lambda: False
+          ) -> None:
+    """Make a film of poses (all of ``qpos``) that are 1/fps s apart, with a progress bar.
+
+    It is as short as one picture where ``enough`` says so. Without a graphics card a picture
+    takes 0.1 to 0.2 s, so films are made after a run and not while it has to be in time.
+    """
+    with (Camera(model, width, height) as camera, film(path, fps) as roll,
+          progress_bar(f'drawing {path.name}', len(poses)) as bar):
+        for k, pose in enumerate(poses):
+            roll.add(camera.picture(pose))
+            bar(k + 1)
+            if enough():
+                return

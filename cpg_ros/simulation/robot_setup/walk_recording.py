@@ -1,0 +1,231 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Recording of a walking robot in a bag: joints, IMU and foot forces on one clock."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.common.errors import ShortRepr
+from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
+from cpg_ros.feedback.estimate import rpy_of, SensorData
+from cpg_ros.fitting.recordings.bag_storage import opened
+from cpg_ros.fitting.recordings.cdr import JOINT_STATE
+from cpg_ros.fitting.recordings.recording import RecordingError
+from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
+from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.scenario import Scenario
+from cpg_ros.simulation.tuning.foot_path import read_geometry
+import numpy as np
+
+# Measurement of a gait's efference copy: the body's motion on flat ground without feedback.
+
+#: Length of a run, and of its beginning, which is left out, s.
+DURATION, BEGINNING = 10.0, 3.0
+
+
+def measure_efference(loop: ClosedLoopBatch,
+                      speeds: Sequence[float] | None = None) -> EfferenceCopy:
+    """Measure the motion of the body in a gait at several commanded speeds.
+
+    Args:
+        loop: bodies, whose first gait it is.
+        speeds: commanded, m/s; by default as many as a table takes, from the slowest, which may
+            be backward, to the fastest. A gait that cannot be steered has only its own.
+
+    """
+    commanded: Sequence[float] | np.ndarray = [0.0]
+    if loop.plan.motion.steering is not None:
+        commanded = np.linspace(*loop.plan.speeds, SPEEDS) if speeds is None else speeds
+    ran = loop.run([Scenario(speed=speed) for speed in commanded], DURATION)
+    first = round(BEGINNING / loop.timestep)
+    # The velocity is the robot's own estimate: an error that it makes at every stride is no
+    # disturbance.
+    signals = np.concatenate([ran.estimated[:, :, :2], ran.angular_velocity[:, :, :2],
+                              ran.rpy[:, :, :2]], axis=2)
+    tables = [fold(phase[first:], one[first:])
+              for phase, one in zip(ran.phase, signals, strict=True)]
+    found = ran.velocity[:, first:, 0].mean(axis=1)
+    rising = np.argsort(found)
+    return EfferenceCopy(found[rising], np.array(tables)[rising])
+
+
+def calibrated(robot: Robot, model: str, gaits: Sequence[str],
+               update: Callable[[str], None] = lambda gait: None, *, kp: float | None = None,
+               kd: float | None = None) -> Robot:
+    """Return a robot with the geometry of a model, and with efference copies measured on it.
+
+    A robot of whose legs feedback can displace none stays as it is.
+
+    Args:
+        robot: whose first network is used.
+        model: as of ``robot_model.load``.
+        gaits: that are measured; others keep theirs.
+        update: called with each gait when it has been measured.
+        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        kd: damping gain of the joints, N m s / rad; the same.
+
+    Raises:
+        SimulationError: the model cannot be used.
+        Refused: a gait cannot be run.
+        InputError: a robot did not go through all phases of a stride.
+
+    """
+    presets, motions = NETWORKS[robot.networks[0]].presets(), dict(robot.motions)
+    for gait in gaits:
+        preset, motion = presets[gait], robot.motion(gait, gait)
+        gait_plan = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        loop = ClosedLoopBatch(model, gait_plan, kp=kp, kd=kd)
+        geometry = read_geometry(loop.body, loop.parts)
+        if not geometry.legs:
+            return robot
+        motions[gait] = replace(motion, efference=measure_efference(loop).as_table())
+        robot = replace(robot, geometry=geometry)
+        update(gait)
+    return replace(robot, motions=motions)
+
+
+#: What is read: key -> type of its topic.
+TYPES = {'joint_states': JOINT_STATE, 'imu': 'sensor_msgs/msg/Imu',
+         'foot_contacts': 'std_msgs/msg/Float64MultiArray',
+         'phase': 'std_msgs/msg/Float64MultiArray'}
+#: What a bag may be without.
+OPTIONAL = ('phase',)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class WalkRecording(ShortRepr):
+    """Sensor data of a walking robot.
+
+    Attributes:
+        source: the bag.
+        joints: names, leg by leg.
+        times: of the IMU's stamps, rising, s, shape (n,).
+        senses: at these, n runs' worth.
+        phase: of the first leg's cell, as the generator told it, cycles, shape (n,), or None.
+
+    """
+
+    source: str
+    joints: tuple[str, ...]
+    times: np.ndarray
+    senses: SensorData
+    phase: np.ndarray | None = None
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Angles in rad, shape (n, joints)."""
+        return self.senses.joint_positions
+
+
+def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> WalkRecording:
+    """Read the sensor data that feedback takes from a bag.
+
+    Args:
+        path: the bag.
+        robot: whose joints and legs are read.
+        topics: their names, by the keys of TYPES.
+
+    Raises:
+        RecordingError: the bag or a message cannot be read, a topic is missing or of another
+            type, or a joint or a leg is not in it.
+
+    """
+    path = Path(path)
+    names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
+    with opened(path) as bag:
+        kinds = {one.topic: one.msgtype for one in bag.connections}
+        for key, topic in list(names.items()):
+            if key in OPTIONAL and topic not in kinds:
+                del names[key]
+            elif kinds.get(topic) != TYPES[key]:
+                there = ', '.join(f'{name} ({kind})' for name, kind in list(kinds.items())[:8])
+                raise RecordingError(f'{path}: no topic {topic} of type {TYPES[key]} (--'
+                                     f'{key.replace("_", "-")}); it has {there or "none"}')
+        key_of = {topic: key for key, topic in names.items()}
+        found: dict[str, list[tuple[int, Any]]] = {key: [] for key in names}
+        for topic, received, data in bag.messages(list(names.values())):
+            key = key_of[topic]
+            try:
+                found[key].append((received, STORE.deserialize_cdr(data, TYPES[key])))
+            except SerdeError as error:
+                raise RecordingError(f'{path}, {topic}: a message cannot be read: {error}'
+                                     ) from error
+    for key, messages in found.items():
+        if len(messages) < 2:
+            raise RecordingError(f'{path}: {len(messages)} messages of {names[key]}')
+    return _joined(path, robot, found)
+
+
+def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -> WalkRecording:
+    received = np.array([at for at, _ in found['imu']], dtype=float)
+    stamps = np.array([_stamp(message) for _, message in found['imu']])
+    # Whoever played a bag faster or slower has stamps that tell the true time.
+    first = stamps[0]
+    times, keep = np.unique(1e-9 * (stamps - first), return_index=True)
+    messages = [found['imu'][k][1] for k in keep]
+
+    def to_imu(key: str, rows: np.ndarray, own: np.ndarray) -> np.ndarray:
+        if rows.ndim != 2 or not np.isfinite(rows).all():
+            raise RecordingError(f'{path}: {key} has messages without numbers')
+        return np.stack([np.interp(times, 1e-9 * (own - first), row) for row in rows.T], axis=1)
+
+    joints = tuple(joint.name for joint in robot.joints)
+    states = [message for _, message in found['joint_states']]
+    places = []
+    for name in joints:
+        if name not in states[0].name:
+            raise RecordingError(f"{path}: joint_states has no joint '{name}'")
+        places.append(list(states[0].name).index(name))
+    own = np.array([_stamp(message) for message in states])
+    angles, rates = (np.array([getattr(one, part)[places] if len(getattr(one, part)) else
+                               np.full(len(places), np.nan) for one in states])
+                     for part in ('position', 'velocity'))
+    # Without stamps: by when they were received, beside the IMU's.
+    by_leg = {}
+    for key in ('foot_contacts', 'phase'):
+        rows = [message.data for _, message in found.get(key, [])]
+        if {len(row) for row in rows} - {len(robot.legs)}:
+            raise RecordingError(f'{path}: {key} does not have {len(robot.legs)} numbers, one a '
+                                 'leg')
+        at = np.interp([when for when, _ in found.get(key, [])], received, stamps)
+        by_leg[key] = np.array(rows), at
+    loads, at = by_leg['foot_contacts']
+    phase = None
+    if len(by_leg['phase'][0]):
+        first_leg = 2.0 * np.pi * by_leg['phase'][0][:, :1]
+        phase = to_imu('phase', np.unwrap(first_leg, axis=0), by_leg['phase'][1])[:, 0] / (
+            2.0 * np.pi)
+
+    def vectors(part: str) -> np.ndarray:
+        return np.array([[getattr(one, part).x, getattr(one, part).y, getattr(one, part).z]
+                         for one in messages])
+
+    turned = np.array([[one.orientation.w, one.orientation.x, one.orientation.y,
+                        one.orientation.z] for one in messages])
+    senses = SensorData(to_imu('joint_states.position', angles, own),
+                    to_imu('joint_states.velocity', rates, own),
+                    to_imu('foot_contacts', loads, at), rpy_of(turned),
+                    vectors('angular_velocity'), vectors('linear_acceleration'))
+    return WalkRecording(str(path), joints, times, senses, phase)
+
+
+def _stamp(message: Any) -> float:
+    """Time of a message's header, ns."""
+    return 1e9 * message.header.stamp.sec + message.header.stamp.nanosec

@@ -1,0 +1,137 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Sensor data of simulated bodies, from the true state of the physics and with sensor noise."""
+
+from collections import deque
+import math
+
+from cpg_ros.dynamics.integration.compilation import jit_entry
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.scenario import SensorNoise
+import numpy as np
+
+# What an inertial measurement unit on a simulated base shows, with the noise of a real one.
+
+class InertialUnit:
+    """Measures a body period by period.
+
+    Attributes:
+        seed: of its noise.
+
+    """
+
+    def __init__(self, body: Body, period: float, noise: SensorNoise) -> None:
+        """Be ready to measure a body at a period in s."""
+        self._body, self._period, self._noise = body, period, noise
+        self.seed = noise.seed
+        self._rng = np.random.default_rng(noise.seed)
+        half = 0.5 * noise.orientation_bias
+        turned = np.array([1.0, half, half, 0.0])
+        self._turned = turned / np.linalg.norm(turned)
+        self._before = body.rates[:3].copy()
+        self._orientation = np.empty(4)
+        self._late: deque[tuple[int, np.ndarray]] = deque()
+
+    def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
+        """Measure at a stamp in ns.
+
+        Returns:
+            What arrives now, None if nothing does: its stamp, and orientation (x y z w), angular
+            velocity in rad/s and acceleration in m/s^2, shape (10,).
+
+        """
+        noise, body, found = self._noise, self._body, np.empty(10)
+        engine().mju_mulQuat(self._orientation, body.quaternion, self._turned)
+        found[:4] = np.roll(self._orientation, -1)
+        rates = body.rates
+        faster = (rates[:3] - self._before) / self._period
+        faster[2] += GRAVITY
+        self._before[:] = rates[:3]
+        found[4:7] = rates[3:] + noise.gyroscope_bias
+        found[7:] = faster @ body.axes + noise.accelerometer_bias
+        if noise.gyroscope_noise or noise.accelerometer_noise:
+            drawn = self._rng.standard_normal(6)
+            found[4:7] += noise.gyroscope_noise * drawn[:3]
+            found[7:] += noise.accelerometer_noise * drawn[3:]
+        if not noise.delay:
+            return stamp, found
+        self._late.append((stamp, found))
+        arrived = None
+        while self._late and self._late[0][0] <= stamp - 1e9 * noise.delay:
+            arrived = self._late.popleft()
+        return arrived
+
+
+@jit_entry
+def fill_sensor_data(senses, quaternions, moving, before, dt, velocity):
+    """Fill what the base measures, and its true velocity in its own frame, m/s, (runs, 3).
+
+    Args:
+        senses: SensorData, whose rpy, angular_velocity and acceleration are filled.
+        quaternions: of the bases, w x y z, shape (runs, 4).
+        moving: velocity in the world's frame, m/s, then angular velocity in the base's, rad/s,
+            shape (runs, 6).
+        before: the same dt before.
+        dt: s.
+        velocity: filled.
+
+    """
+    rpy, acceleration = senses.rpy, senses.acceleration
+    for k in range(len(quaternions)):
+        w, x, y, z = quaternions[k]
+        rpy[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        rpy[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        rpy[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+                (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+                (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
+        faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
+                  (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
+        for axis in range(3):
+            senses.angular_velocity[k, axis] = moving[k, 3 + axis]
+            acceleration[k, axis] = velocity[k, axis] = 0.0
+            for world in range(3):
+                acceleration[k, axis] += axes[axis][world] * faster[world]
+                velocity[k, axis] += axes[axis][world] * moving[k, world]
+
+
+class NoisySenses:
+    """Sensor data of many bodies with the noise and the delay of sensors."""
+
+    def __init__(self, noise: SensorNoise, runs: int, legs: int, dt: float) -> None:
+        self._noise, self._rng = noise, np.random.default_rng(noise.seed)
+        self._later = round(noise.delay / dt)
+        self._waiting: list[SensorData] = []
+        self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
+        self._tilt = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
+
+    def __call__(self, true: SensorData) -> SensorData:
+        """Return the data that arrives now."""
+        rng, noise = self._rng, self._noise
+        loads = true.foot_forces * (self._factor + noise.force_noise * rng.normal(
+            size=true.foot_forces.shape))
+        rpy = true.rpy.copy()
+        rpy[:, :2] += self._tilt
+        angular_velocity = (true.angular_velocity + noise.gyroscope_bias
+                            + noise.gyroscope_noise * rng.normal(size=rpy.shape))
+        acceleration = true.acceleration + noise.accelerometer_bias
+        if noise.accelerometer_noise:
+            acceleration += noise.accelerometer_noise * rng.normal(size=rpy.shape)
+        self._waiting.append(SensorData(true.joint_positions.copy(), true.joint_velocities.copy(),
+                                        loads, rpy, angular_velocity, acceleration))
+        return self._waiting[0] if len(self._waiting) <= self._later else self._waiting.pop(0)

@@ -1,0 +1,253 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A biped's own gains of the feedback in its walk, found by CMA-ES (Hansen) in simulation.
+
+Sensors are noisy and late, the velocity is estimated, and links collide with one another. Every
+generation meets other pushes, noise and tiles; what was found is judged on seeds that no
+generation has seen.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+import math
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.gains import BipedGains, GAINS
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.body_file import BipedBody
+from cpg_ros.motion.robot import Robot
+from cpg_ros.simulation.biped_run import BipedOutcome, BipedRun
+from cpg_ros.simulation.scenario import impulse, SensorNoise
+from cpg_ros.simulation.terrain import Terrain
+from cpg_ros.simulation.tuning.feedback import more_than_chance
+from cpg_ros.simulation.tuning.gaits import cma_es
+import numpy as np
+
+#: What is searched for.
+SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
+            'speed_up_from', 'pressure_x', 'pressure_y', 'height_kp', 'height_kd', 'roll_kp',
+            'roll_kd', 'pitch_kp', 'pitch_kd', 'yaw_kp', 'yaw_kd', 'stance_damping', 'lean',
+            'lift', 'swing_kp', 'swing_kd', 'sole_kp', 'sole_kd', 'reaction_yaw')
+#: A gain changes by this factor at most, either way; the search begins with this spread of logs,
+#: and gains in a file have so many digits.
+FACTOR, SPREAD, DIGITS = 3.0, 0.15, 4
+#: Designs of a generation, and of a job; walks of a job that judges.
+GENERATION, TOGETHER, BATCH = 12, 3, 8
+#: Pushes of each impulse, as shares of m sqrt(g h); speeds, m/s, and height of tiles, m, for a
+#: robot of the G1's size.
+PUSHES, IMPULSES, SPEEDS, TILES = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
+#: Sensors as those of a real robot: late, in s, and noisy.
+NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
+#: When it walks off, is pushed (within a stride from then on), and a run ends, s.
+WALKS_OFF, PUSHED, STRIDE, END = 1.0, 5.0, 0.6, 9.0
+#: What an error of speed and a tilt in rad cost, beside a fall.
+SPEED, TILT = 0.5, 0.5
+#: Pushes of each impulse and walks of each speed that judge what was found; their seed.
+JUDGED, WALKED, FRESH = 24, 5, 10_000_019
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A run of a biped.
+
+    Attributes:
+        speed: forward, m/s.
+        seed: of the noise, and of the tiles.
+        push: as ``impulse`` makes it, or None.
+        tiles: their height, m; 0 for flat ground.
+
+    """
+
+    speed: float
+    seed: int
+    push: tuple[float, float, float] | None = None
+    tiles: float = 0.0
+
+    @property
+    def ground(self) -> Terrain | None:
+        """Return tiles of its own, None if it is flat."""
+        return Terrain('boxes', self.tiles, self.seed) if self.tiles else None
+
+
+@dataclass(frozen=True)
+class WalkJob:
+    """Walks of a robot with some sets of gains, in a process of its own."""
+
+    robot: Robot
+    model: str
+    candidates: Sequence[Mapping[str, float]]
+    walks: Sequence[Walk]
+
+
+@dataclass(frozen=True)
+class TunedBiped:
+    """What fresh runs make of gains before and after a search.
+
+    Attributes:
+        pushes: how many were met.
+        before: how many of them were survived with the gains that the search began with.
+        after: with those that it found.
+        walks: how many were without a push.
+        fell_before: how many of these ended in a fall before.
+        fell_after: and after.
+        won: runs that only the gains after survive.
+        lost: runs that only those before survive.
+
+    """
+
+    pushes: int
+    before: int
+    after: int
+    walks: int
+    fell_before: int
+    fell_after: int
+    won: int
+    lost: int
+
+    @property
+    def better(self) -> bool:
+        """Whether more runs are survived than chance would have it (p < 0.05, sign test)."""
+        return more_than_chance(self.won, self.lost)
+
+    def __str__(self) -> str:
+        return (f'fresh pushes survived: {self.before} of {self.pushes} before, {self.after} '
+                f'after; of {self.walks} walks without a push, {self.fell_before} ended in a fall '
+                f'before, {self.fell_after} after')
+
+
+def walked(job: WalkJob) -> list[list[BipedOutcome]]:
+    """Return the outcomes of each candidate's walks."""
+    runs = {ground: BipedRun(job.model, job.robot, NOISE, terrain=ground)
+            for ground in {walk.ground for walk in job.walks}}
+    found = []
+    for gains in job.candidates:
+        robot = with_gains(job.robot, gains)
+        found.append([runs[walk.ground].run(
+            END, ((WALKS_OFF, walk.speed, 0.0, 0.0),), (walk.push,) if walk.push else (),
+            BipedFeedback(robot), walk.seed) for walk in job.walks])
+    return found
+
+
+def with_gains(robot: Robot, gains: Mapping[str, float]) -> Robot:
+    """Return a biped with some gains of its own changed."""
+    body = _body(robot)
+    return replace(robot, biped=replace(body, gains={**body.gains, **gains}))
+
+
+def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
+               executor: Executor | None = None,
+               update: Callable[[int], None] = lambda done: None) -> tuple[Robot, TunedBiped]:
+    """Look for gains that suit a biped in its walk.
+
+    Args:
+        robot: whose file has the part ``biped``.
+        model: as of ``robot_model.load``.
+        evaluations: how many sets of gains to try, about.
+        seed: the same one finds the same, on whatever workers.
+        executor: that walks are computed by; None for this process.
+        update: called with the number tried so far.
+
+    Returns:
+        The robot whose file has the gains, and what fresh runs make of them; where they are no
+        better than those before, it keeps these.
+
+    Raises:
+        InputError: the robot is no biped with soles.
+        SimulationError: CMA-ES is missing, or the model cannot be used.
+
+    """
+    usual = BipedGains.of_body(_body(robot))
+    compute = map if executor is None else executor.map
+
+    def changed(logs: Sequence[float]) -> dict[str, float]:
+        found = {}
+        for name, log in zip(SEARCHED, logs, strict=True):
+            value = float(f'{getattr(usual, name) * math.exp(log):.{DIGITS}g}')
+            found[name] = min(max(value, GAINS[name].low), GAINS[name].high)
+        return found
+
+    most, tried = math.log(FACTOR), 0
+    search = cma_es().CMAEvolutionStrategy(np.zeros(len(SEARCHED)), SPREAD, {
+        'bounds': [-most, most], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
+    draws = np.random.default_rng([seed, 1])
+    while tried < evaluations:
+        logs = search.ask()
+        walks = _walks(robot, int(draws.integers(2**31)), PUSHES, 1)
+        jobs = [WalkJob(robot, model, [*map(changed, logs[k:k + TOGETHER])], walks)
+                for k in range(0, len(logs), TOGETHER)]
+        search.tell(logs, [_price(walks, one) for some in compute(walked, jobs) for one in some])
+        tried += len(logs)
+        update(min(tried, evaluations))
+    # The middle of the last generation: its best one was lucky, too.
+    gains = changed(search.result.xfavorite)
+    fresh = _walks(robot, FRESH + seed, JUDGED, WALKED)
+    jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + BATCH])
+            for k in range(0, len(fresh), BATCH)]
+    parts = [*compute(walked, jobs)]
+    found = _compared(fresh, [[one for part in parts for one in part[k]] for k in range(2)])
+    return with_gains(robot, gains) if found.better else robot, found
+
+
+def _body(robot: Robot) -> BipedBody:
+    if robot.biped is None:
+        raise InputError(f"robot file '{robot.name}' has no part biped: check_robot --make writes "
+                         'it for two legs with soles')
+    return robot.biped
+
+
+def _walks(robot: Robot, seed: int, pushes: int, walks: int) -> list[Walk]:
+    """Draw pushes in a walk, walks at all speeds, and one over tiles for each of these."""
+    rng = np.random.default_rng(seed)
+    length, mass = _body(robot).scale[0], _body(robot).total
+    pace = math.sqrt(length)
+    height = BipedGains.of_body(_body(robot)).height
+    found = []
+    for fraction in IMPULSES:
+        for _ in range(pushes):
+            angle, size = rng.uniform(0.0, 2.0 * math.pi), fraction * mass * math.sqrt(
+                GRAVITY * height)
+            push = impulse(PUSHED + pace * rng.uniform(0.0, STRIDE), size * math.cos(angle),
+                           size * math.sin(angle))
+            found.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), push))
+    for _ in range(walks):
+        found += [Walk(pace * speed, int(rng.integers(2**31))) for speed in SPEEDS]
+        found.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), None, length * TILES))
+    return found
+
+
+def _price(walks: Sequence[Walk], found: Sequence[BipedOutcome]) -> float:
+    """Return the mean price of runs: falls, the sooner the dearer, errors of speed, and tilt."""
+    price = 0.0
+    for walk, one in zip(walks, found, strict=True):
+        if math.isfinite(one.fell):
+            price += 2.0 - one.fell / END + SPEED
+            continue
+        price += TILT * one.tilt
+        if walk.push is None:
+            scale = max(abs(walk.speed), SPEEDS[1])
+            price += SPEED * min(math.hypot(one.speed[0] - walk.speed, one.speed[1]) / scale, 1.0)
+    return price / len(walks)
+
+
+def _compared(walks: Sequence[Walk], found: Sequence[Sequence[BipedOutcome]]) -> TunedBiped:
+    """Compare the outcomes of walks with the gains before and after, in this order."""
+    before, after = (np.array([math.isinf(one.fell) for one in some]) for some in found)
+    pushed = np.array([walk.push is not None for walk in walks])
+    return TunedBiped(int(pushed.sum()), int(before[pushed].sum()), int(after[pushed].sum()),
+                      int((~pushed).sum()), int((~before[~pushed]).sum()),
+                      int((~after[~pushed]).sum()), int((after & ~before).sum()),
+                      int((before & ~after).sum()))

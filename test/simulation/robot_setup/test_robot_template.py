@@ -1,0 +1,159 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""check_robot --make: robot files made of URDFs stand, step and fit."""
+
+import json
+import math
+
+from cpg_ros.motion.robot_file import read_robot
+from cpg_ros.simulation.robot_setup.check_robot import main
+from depth import examples
+from hypothesis import given, Phase
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from urdf_texts import biped_of, joint_of, LEGS, quadruped_urdf, robot_of
+
+
+def made(tmp_path, urdf, code=0):
+    tmp_path.mkdir(exist_ok=True)
+    path, out = tmp_path / 'my.urdf', tmp_path / 'my_robot.yaml'
+    path.write_text(urdf)
+    out.unlink(missing_ok=True)
+    assert main(['--urdf', str(path), '--make', str(out)]) == code
+    assert main([str(out), '--urdf', str(path)]) == code
+    return read_robot(out)
+
+
+def feet(robot, thigh, calf, axis=1.0):
+    """Where a leg of two links of length 1 ends, forward and up from its hip."""
+    first, both = axis * thigh, axis * (thigh + calf)
+    return -math.sin(first) - math.sin(both), -math.cos(first) - math.cos(both)
+
+
+@pytest.mark.parametrize('axis', [1, -1])
+def test_a_quadruped_is_made_that_stands_and_steps(tmp_path, axis, capsys):
+    calf = 'lower="-2.7" upper="-0.8" velocity="20"' if axis > 0 else \
+        'lower="0.8" upper="2.7" velocity="20"'
+    thigh = 'lower="-1" upper="3"' if axis > 0 else 'lower="-3" upper="1"'
+    robot = made(tmp_path, quadruped_urdf(calf, f'0 {axis} 0', thigh=thigh))
+    assert 'FL_calf_joint bends in swing' in capsys.readouterr().err
+    assert robot.networks == ('delayed', 'quadruped') and list(robot.legs) == list(LEGS)
+    assert robot.order[:3] == ('FL_calf_joint', 'FL_thigh_joint', 'FL_hip_joint')
+    assert [joint.name[:2] for joint in robot.joints[::3]] == ['RL', 'RR', 'FL', 'FR']
+    for leg, cell in zip(LEGS, (1, 2, 3, 4), strict=True):
+        joints = {joint.name[3:-6]: joint for joint in robot.legs[leg]}
+        assert {joint.cell for joint in joints.values()} == {cell}
+        hip, thigh, calf = joints['hip'], joints['thigh'], joints['calf']
+        assert (hip.offset, hip.weights) == (0.0, (0.0,))
+        assert (hip.lower, hip.upper, hip.velocity) == (-0.8, 0.8, 20.0)
+        # The URDF has a velocity of thigh and calf only where it says so, and none of the hip.
+        assert hip.invented == ('velocity',) and calf.invented == ()
+        standing = feet(robot, thigh.offset, calf.offset, axis)
+        assert standing[0] == pytest.approx(0.0, abs=1e-9) and standing[1] < -1.2
+        # Furthest forward at x = 1, further up while y > 0.
+        forward = feet(robot, thigh.offset + thigh.weights[0], calf.offset, axis)
+        lifted = feet(robot, thigh.offset, calf.offset + calf.weights[1], axis)
+        assert forward[0] > standing[0] + 0.05 and lifted[1] > standing[1] + 0.02
+        assert calf.weights[0] == 0.0
+
+
+def test_a_frame_that_is_turned_turns_the_axes_with_it(tmp_path):
+    # A quarter turn about z at the hip: axes along -x point along -y of the root, -y along x.
+    robot = made(tmp_path, quadruped_urdf(axis='-1 0 0', rpy='0 0 1.5707963', roll='0 -1 0'))
+    swinging = {joint.name[3:-6]: joint.weights for joint in robot.legs['lf']}
+    assert swinging['thigh'][0] > 0.0 and swinging['hip'] == (0.0,)
+
+
+def test_a_hip_that_yaws_before_pitching_joints_holds_still(tmp_path):
+    """Upright, then two level axes across the body: no leg that reaches to the side."""
+    robot = made(tmp_path, quadruped_urdf(roll='0 0 1'))
+    swinging = {joint.name[3:-6]: joint.weights for joint in robot.legs['lf']}
+    assert swinging['thigh'][0] != 0.0 and swinging['hip'] == (0.0,)
+
+
+def test_a_biped_is_made(tmp_path):
+    joints = []
+    for side in ('left', 'right'):
+        above = 'base'
+        for name, axis, low, high in (('hip_yaw', '0 0 1', -1, 1), ('hip_pitch', '0 1 0', -2, 1),
+                                      ('knee', '0 1 0', 0, 2), ('ankle', '0 1 0', -1, 1)):
+            joints.append(joint_of(f'{side}_{name}', limit=f'lower="{low}" upper="{high}" '
+                                   'velocity="9"', axis=axis, parent=above))
+            above = f'{side}_{name}_l'
+    robot = made(tmp_path, robot_of(*joints))
+    assert robot.networks == ('biped',) and list(robot.legs) == ['left', 'right']
+    yaw, pitch, knee, ankle = robot.legs['right']
+    assert {joint.cell for joint in robot.legs['right']} == {2}
+    assert knee.offset > 0.2 and pitch.offset == pytest.approx(-knee.offset / 2)
+    assert pitch.offset + knee.offset + ankle.offset == pytest.approx(0.0, abs=2e-3)
+    assert yaw.weights == (0.0,) and pitch.weights[0] < 0.0 < knee.weights[1]
+
+
+limits = st.tuples(st.floats(-3.0, 3.0), st.floats(0.02, 6.0), st.floats(0.3, 40.0))
+
+
+# Each example takes its time: a failing one is not made smaller.
+@examples(15, phases=(Phase.generate,))
+@given(hip=limits, thigh=limits, calf=limits)
+def test_whatever_the_limits_what_is_made_fits(tmp_path_factory, hip, thigh, calf):
+    texts = [f'lower="{low:.5f}" upper="{low + width:.5f}" velocity="{speed:.4f}"'
+             for low, width, speed in (hip, thigh, calf)]
+    robot = made(tmp_path_factory.mktemp('made'),
+                 quadruped_urdf(hip=texts[0], thigh=texts[1], calf=texts[2]))
+    assert np.abs(robot.weights()).max() <= 0.15
+
+
+@pytest.mark.parametrize(('left', 'right', 'more'), [
+    ('LLEG', 'RLEG', ('LLEG_HIP_R', 'RLEG_HIP_R')), ('FL', 'FR', ())])
+def test_bipeds_with_unusual_names_are_made(tmp_path, capsys, left, right, more):
+    path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
+    path.write_text(biped_of(left, right, *more))
+    assert main(['--urdf', str(path), '--make', str(out)]) == 0
+    robot = read_robot(out)
+    assert {leg: {joint.name for joint in joints} for leg, joints in robot.legs.items()} == {
+        leg: {f'{side}_{name}' for name in ('HIP_P', 'KNEE', 'ANKLE_P', *(['HIP_R'] if more
+                                                                          else []))}
+        for leg, side in (('left', left), ('right', right))}
+    assert robot.networks == ('biped',)
+
+
+def test_slow_joints_are_told_at_once_and_can_be_corrected(tmp_path, capsys):
+    urdf, out = tmp_path / 'my.urdf', tmp_path / 'robot.yaml'
+    urdf.write_text(quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="0.7"',
+                                   thigh='lower="-1" upper="3" velocity="1.5"'))
+    assert main(['--urdf', str(urdf), '--make', str(out)]) == 0
+    assert ('note: velocity limits of 0.7 and 1.5 rad/s are slow for a walking robot (hobby '
+            'servos reach about 5 to 10 rad/s), and gaits keep to them: if your motors are '
+            'faster, correct the URDF, or make the file with --velocity'
+            ) in capsys.readouterr().out
+    out.unlink()
+    assert main(['--urdf', str(urdf), '--make', str(out), '--velocity', '8']) == 0
+    said = capsys.readouterr()
+    assert 'are slow' not in said.out and '8 rad/s, as given with --velocity' in said.err
+    robot = read_robot(out)
+    assert {joint.velocity for joint in robot.joints} == {8.0}
+    assert not any('velocity' in joint.invented for joint in robot.joints)
+
+
+def test_lopsided_legs_are_a_finding(tmp_path, capsys):
+    path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
+    path.write_text(biped_of('L', 'R', 'L_TOE_X'))
+    assert main(['--urdf', str(path), '--make', str(out), '--json']) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert not said['matches']
+    assert said['lopsided'] == ['right: has 3 joints and left 4, none there like L_TOE_X']
+    assert main([str(out), '--urdf', str(path)]) == 1
+    assert '- right: has 3 joints and left 4' in capsys.readouterr().out
