@@ -27,6 +27,7 @@ import sys
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from cpg_ros.common.errors import CpgError
 import numpy as np
 
 #: What the process may take: address space, bytes, and time of the processor, s; besides, for
@@ -37,7 +38,7 @@ TIME, TIME_PER_BYTE = 5.0, 1e-6
 REFUSED = 3
 
 
-class UnreadableC3D(Exception):
+class UnreadableC3D(CpgError):
     """The library cannot read the file; the message gives the reason."""
 
 

@@ -17,5 +17,10 @@
 Its server uses topics, services and parameters only.
 """
 
+from cpg_ros.common.errors import needed
+
+# One line where the extra is missing, before a module imports it.
+needed('websockets', part='websockets.asyncio')
+
 __all__ = ['bridge_views', 'pages', 'panel_node', 'robot_view', 'shape', 'shape_source', 'teleop',
            'web_server']
