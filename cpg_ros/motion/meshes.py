@@ -274,17 +274,17 @@ def _installed(reference: str, package: str, rest: str) -> Path:
     """Return a file of an installed package, or of its sources where these are linked to."""
     try:
         for prefix in _folders('AMENT_PREFIX_PATH'):
-            fraction = Path(os.path.normpath(prefix / 'share'))
-            path = Path(os.path.normpath(fraction / package / rest if package else Path('/',
+            shared = Path(os.path.normpath(prefix / 'share'))
+            path = Path(os.path.normpath(shared / package / rest if package else Path('/',
                                                                                         rest)))
-            if not path.is_relative_to(fraction):
+            if not path.is_relative_to(shared):
                 continue
-            name = package or path.relative_to(fraction).parts[:1][0]
-            index = fraction / 'ament_index' / 'resource_index' / 'packages' / name
+            name = package or path.relative_to(shared).parts[:1][0]
+            index = shared / 'ament_index' / 'resource_index' / 'packages' / name
             if not re.fullmatch(r'\w[\w-]*', name, re.ASCII) or not index.is_file():
                 continue
             real = Path(os.path.realpath(path))
-            if real.is_relative_to(os.path.realpath(fraction / name)) or _is_source(real, name):
+            if real.is_relative_to(os.path.realpath(shared / name)) or _is_source(real, name):
                 return real
     except (ValueError, LookupError) as error:  # a byte 0, or the folder of all packages
         raise MeshError(one_line(f'{reference[:80]!r}: {error}')) from error

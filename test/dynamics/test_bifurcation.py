@@ -21,7 +21,7 @@ from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
@@ -64,7 +64,7 @@ def test_the_hop_doubles_its_period_where_the_walk_ends():
     walk = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
     assert walk.ends[0].why == 'symmetry'
     last = walk.points[0].orbit
-    hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
+    hop = from_path(last.network, last.network.symmetry('two_legged_hop'),
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     value = walk.ends[0].value
     branch = continue_orbit(hop, line, value - 0.05, value + 0.05)

@@ -86,7 +86,7 @@ def leading_modes(series, count):
 
 
 @EVERY
-@pytest.mark.parametrize('share', [0.0, 0.3])
+@pytest.mark.parametrize('fraction', [0.0, 0.3])
 def test_transverse_disturbances_grow_in_simulation_as_the_multipliers_say(name, fraction):
     orbit = solved(name)
     gain = fraction * smallest_gain(orbit)

@@ -28,7 +28,7 @@ from cpg_ros.dynamics.stability import stability
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot
-from cpg_ros.networks import shipped
+from cpg_ros.networks.library import shipped
 from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.networks.stated_gait import stated_gait
@@ -286,7 +286,7 @@ def test_a_simulation_over_kinks_is_of_second_order():
 
 
 @pytest.mark.deep  # the papers' reproduction has the same
-@pytest.mark.parametrize('share', [0.5, 1.0, 2.0])
+@pytest.mark.parametrize('fraction', [0.5, 1.0, 2.0])
 def test_two_neurons_obey_matsuokas_laws(fraction):
     """Scale with c, speed with the time constants, oscillate for 1 + tau/tau_v < a < 1 + beta."""
     network = alone('matsuoka', 'trot')

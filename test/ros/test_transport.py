@@ -37,11 +37,11 @@ print(found and len(message.name))
 """
 
 
-def started(monkeypatch, args):
+def started(monkeypatch, environment):
     """Start a generator by what a user has chosen, and nothing else."""
     for name in NAMES:
         monkeypatch.delenv(name, raising=False)
-    return Process(environment=args).wait_for('publishing')
+    return Process(environment=environment).wait_for('publishing')
 
 
 def addresses(pid):
@@ -53,21 +53,22 @@ def addresses(pid):
             for row in rows if row[9] in sockets}
 
 
-@pytest.mark.parametrize(('chosen', 'shared'), [
+@pytest.mark.parametrize(('environment', 'shared'), [
     ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}, False),
     ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'FASTDDS_BUILTIN_TRANSPORTS': 'DEFAULT'}, True),
     ({'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}, False),
     ({'ROS_LOCALHOST_ONLY': '1'}, False)], ids=('subnet', 'chosen', 'localhost', 'local_only'))
-def test_nobody_who_joins_can_make_it_wait_for_shared_memory(monkeypatch, args, shared):
+def test_nobody_who_joins_can_make_it_wait_for_shared_memory(monkeypatch, environment, shared):
     # A participant that joins while its listener is busy holds up all that send to it by shared
     # memory for 333 ms; the user's own choice goes first.
-    process = started(monkeypatch, args)
+    process = started(monkeypatch, environment)
     try:
         heard = subprocess.run([sys.executable, '-c', LISTENER], capture_output=True, text=True,
-                               env={**os.environ, 'ROS_DOMAIN_ID': str(process.domain), **args})
+                               env={**os.environ, 'ROS_DOMAIN_ID': str(process.domain),
+                                    **environment})
         assert heard.stdout == '12\n', heard.stderr
         assert ('/fastrtps_' in Path(f'/proc/{process.pid}/maps').read_text()) == shared
-        assert (addresses(process.pid) == {LOOPBACK}) == ('SUBNET' not in args.values())
+        assert (addresses(process.pid) == {LOOPBACK}) == ('SUBNET' not in environment.values())
     finally:
         process.end()
 

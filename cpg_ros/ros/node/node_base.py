@@ -97,11 +97,11 @@ def leave_shared_memory() -> None:
     """
     environment = os.environ
     name, udp = TRANSPORT
-    args = (environment.setdefault(name, udp) != udp
-              or any(environment.get(one) for one in ('ROS_STATIC_PEERS', *PROFILES)))
+    configured = (environment.setdefault(name, udp) != udp
+                  or any(environment.get(one) for one in ('ROS_STATIC_PEERS', *PROFILES)))
     local = (environment.get(LOCAL_ONLY) == '1' or (
         LOCAL_ONLY not in environment and environment.get(RANGE) == 'LOCALHOST'))
-    if local and not args and 'fastrtps' in get_rmw_implementation_identifier():
+    if local and not configured and 'fastrtps' in get_rmw_implementation_identifier():
         environment.pop(LOCAL_ONLY, None)
         environment.update({RANGE: 'SYSTEM_DEFAULT', PROFILES[1]: str(LOCALHOST)})
 

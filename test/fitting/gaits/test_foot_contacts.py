@@ -79,7 +79,7 @@ def test_legs_that_are_built_unlike_are_in_step_by_their_feet():
     assert any('those of touchdown' in note for note in found.notes)
 
 
-@pytest.mark.parametrize(('share', 'by_feet'), [(0.1, True), (0.5, False)])
+@pytest.mark.parametrize(('fraction', 'by_feet'), [(0.1, True), (0.5, False)])
 def test_stumbles_do_not_move_touchdowns(fraction, by_feet):
     recording, loads = recorded(0.62)
     rng, stride = np.random.default_rng(8), loads.times // PERIOD
