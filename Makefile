@@ -82,7 +82,7 @@ coverage: install/.built
 # What is run before every commit; with COVERAGE=yes it measures that, too, and takes three
 # minutes longer. The kernels of all networks are compiled while linters run.
 test: install/.built messages
-	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.executables $(KERNELS) & \
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.precompile $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
 	@$(ENTER); for part in '$(OFFLINE) -m "not (live or $(LEFT_OUT))" $(if $(COVERAGE),$(COVER))' \
 		'$(ONLINE) $(AGAIN) -m "live and not ($(LEFT_OUT))"'; do \
@@ -152,7 +152,7 @@ install/.built: $(INSTALLED) $(SOURCES)
 # Once for each installation, at most 90 s: later changes are compiled where they are first used.
 # -P: of the installed copy, which is what nodes run.
 install/.compiled: | install/.built
-	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.executables || \
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.precompile || \
 		echo 'the kernels were not compiled: that is done at the first start'
 	@touch $@
 

@@ -149,7 +149,7 @@ def compile_apart(node: Any, part: str, seconds: float) -> None:
     progress = StartProgress(node, f'compiling the {part}', seconds)
     # Ctrl-C in the terminal is for the node.
     child = subprocess.Popen(
-        ['nice', sys.executable, '-P', '-m', 'cpg_ros.ros.cli.executables', part],
+        ['nice', sys.executable, '-P', '-m', 'cpg_ros.ros.cli.precompile', part],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
         start_new_session=True)
     try:

@@ -14,4 +14,4 @@
 
 """The executables, the command ``cpg`` and the demonstration."""
 
-__all__ = ['cpg', 'demo', 'demo_parts', 'executables', 'graph', 'inversion']
+__all__ = ['cpg', 'demo', 'demo_parts', 'executables', 'graph', 'inversion', 'precompile']

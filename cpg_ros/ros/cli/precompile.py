@@ -1,0 +1,94 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Compile what the first start of a generator would otherwise wait for.
+
+``make build`` runs it once for each installation: the networks of the shipped robots with two and
+four legs, and the feedback of either. Whatever is not done in time is compiled when it is first
+used.
+"""
+
+from collections.abc import Sequence
+import os
+import subprocess
+import sys
+import time
+
+from cpg_ros.common.command_line import say
+from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.dynamics.integration.compilation import COMPILED
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.feedback import warm_up, warm_up_judges
+from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.motion.pattern import precompile
+from cpg_ros.motion.robot_file import load_robot
+
+#: What is compiled, those that the demonstration needs first, and the longest it may take, s.
+PARTS, LIMIT = (('delayed', 'feedback', 'quadruped', 'biped', 'balance') if COMPILED else
+                ('delayed', 'quadruped', 'biped')), 85.0
+#: Of the feedback and of a biped's: their kernels are the same for every robot with such legs.
+ROBOT, BIPED = 'unitree_go2', 'humanoid'
+
+
+def compile_part(part: str) -> None:
+    """Compile or load the kernels of a network, of the feedback, or those that balance a biped."""
+    choose()
+    if part == 'feedback':
+        robot = load_robot(ROBOT)
+        warm_up(geometry_of(robot), len(robot.joints))
+    elif part == 'balance':
+        biped = BipedFeedback(load_robot(BIPED))
+        warm_up_judges(len(biped.robot.legs), len(biped.order))
+        # The first tick compiles.
+        biped.advance(SensorData.zeros(1, len(biped.robot.legs), len(biped.order)), 1e-3)
+    else:
+        precompile(part)
+
+
+def compile_parts(parts: Sequence[str]) -> None:
+    """Compile parts in a process each, as many at once as there are cores."""
+    began, waiting = time.monotonic(), list(parts)
+    running: dict[str, subprocess.Popen] = {}
+    say(f'compiling the numerical kernels, so that no start waits for it: {", ".join(parts)} '
+        f'(at most {LIMIT:g} s)')
+    while (waiting or running) and time.monotonic() < began + LIMIT:
+        while waiting and len(running) < (os.cpu_count() or 1):
+            part = waiting.pop(0)
+            running[part] = subprocess.Popen([sys.executable, '-P', '-m', __spec__.name, part])
+        for part in [part for part, process in running.items() if process.poll() is not None]:
+            code = running.pop(part).returncode
+            say(f'  {time.monotonic() - began:3.0f} s  {part}'
+                + (f' failed with exit code {code}' if code else ''))
+        time.sleep(0.1)
+    for process in running.values():
+        process.terminate()
+        process.wait()
+    if left := [*running, *waiting]:
+        say(f'  {time.monotonic() - began:3.0f} s  out of time: {", ".join(left)} will be '
+            'compiled at the first start')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compile the parts that are named, or all; return the exit code."""
+    parts = (sys.argv[1:] if arguments is None else arguments) or PARTS
+    if len(parts) == 1:
+        compile_part(parts[0])
+    else:
+        compile_parts(parts)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
