@@ -23,7 +23,7 @@ from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import ParameterLine
@@ -54,7 +54,7 @@ def spectrum(point, value):
 def exact(point, mu):
     """Return the orbit at a distance mu of the parameter, on the side where the orbits lie."""
     value = point.value + point.normal_form.side * mu
-    return value, collocate(point.line.at(point.network, value), point.block.symmetry,
+    return value, from_path(point.line.at(point.network, value), point.block.symmetry,
                             lambda theta: point.path(value, theta), point.period(value))
 
 

@@ -23,7 +23,7 @@ from cpg_ros.dynamics.continuation import continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.fourier import solve
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
@@ -286,7 +286,7 @@ def test_a_branch_ends_at_an_orbit_of_more_symmetry():
                             ParameterLine.parse('w_a', Biped), -1.0, 0.4)
     assert [end.why for end in branch.ends] == ['symmetry', 'bound']
     last = branch.points[0].orbit
-    hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
+    hop = from_path(last.network, last.network.symmetry('two_legged_hop'),
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     assert 2.0 * hop.period == pytest.approx(branch.ends[0].period, rel=1e-6)
     found = np.concatenate([multipliers(hop).within, multipliers(hop).transverse])
@@ -302,7 +302,7 @@ def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
     (two_peaks,) = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -0.3, 0.4).at(-0.2)
     theta = np.linspace(0.4, 0.6, 2001)
     late = theta[two_peaks.waveform(theta).argmax()]
-    lower = collocate(two_peaks.network, two_peaks.symmetry, lambda theta: two_peaks(
+    lower = from_path(two_peaks.network, two_peaks.symmetry, lambda theta: two_peaks(
         (theta + late) * two_peaks.period), two_peaks.period)
     assert lower.waveform(np.array(0.0)) < two_peaks.peak - 1e-3
     peak = continue_orbit(lower, line, -0.21, -0.19)

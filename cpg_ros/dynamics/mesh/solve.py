@@ -65,7 +65,7 @@ SMALLEST = 1e-5
 BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
-def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
+def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
               period: float, known: Sequence[float] = ()) -> MeshOrbit | None:
     """Solve for an orbit from a guess; None where Newton's method leads to none.
 
@@ -91,7 +91,7 @@ def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
 
 
 def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
-    """Solve for an orbit from what the derivatives of a known one predict; None as in collocate.
+    """Solve for an orbit from what the derivatives of a known one predict; None as in from_path.
 
     The mesh of the known one is taken over, so that little is left to do.
 
@@ -115,7 +115,7 @@ def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
 
 def _refined(reduced: Reduced, now: Solution, known: Sequence[float] = ()
              ) -> MeshOrbit | None:
-    """Solve, remesh and solve again until the mesh is fine enough; None as in collocate."""
+    """Solve, remesh and solve again until the mesh is fine enough; None as in from_path."""
     fewest = FEWEST
     while True:
         with np.errstate(all='ignore'):
@@ -375,7 +375,7 @@ def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period:
                 ) -> MeshOrbit | None:
     """Collocate from what a simulation does in a period from a state near the orbit."""
     run = simulate(network, start, 1.05 * period, network.step, progress=False)
-    return _accepted(collocate(network, symmetry, lambda theta: run(theta * period), period))
+    return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
 
 
 def _stated(network: Network, gait: str) -> MeshOrbit | None:
@@ -404,7 +404,7 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
     """Return what the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
-        found = (_accepted(collocate(network, symmetry, *one)) for one in find_orbit(network,
+        found = (_accepted(from_path(network, symmetry, *one)) for one in find_orbit(network,
                                                                                      gait))
         return next((orbit for orbit in found if orbit is not None), None)
     except NoEquilibrium:
@@ -414,7 +414,7 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                ) -> MeshOrbit | None:
     found = settle(network, symmetry, start, period)
-    return None if found is None else _accepted(collocate(network, symmetry, *found))
+    return None if found is None else _accepted(from_path(network, symmetry, *found))
 
 
 def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:
@@ -430,7 +430,7 @@ def _continue_orbit(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | Non
         fraction = min(1.0, reached + step)
         here = replace(network, **{key: start[key] + fraction * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
-        found = _accepted(collocate(here, known.symmetry, _on_cycles(orbit), orbit.period))
+        found = _accepted(from_path(here, known.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
         if found is None or not 0.5 < found.period / orbit.period < 2.0:
             step *= 0.25
@@ -448,7 +448,7 @@ def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
     """
     found = _accepted(predicted(network, near))
     if found is None:
-        found = _accepted(collocate(network, near.symmetry, _on_cycles(near), near.period))
+        found = _accepted(from_path(network, near.symmetry, _on_cycles(near), near.period))
     if found is None or not 0.5 < found.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
     return found
