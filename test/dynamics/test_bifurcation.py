@@ -16,12 +16,12 @@
 
 from functools import cache
 
-from cpg_ros.common.errors import InputError
-from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
+from branch_switching import switch_branch
+from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
@@ -64,7 +64,7 @@ def test_the_hop_doubles_its_period_where_the_walk_ends():
     walk = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
     assert walk.ends[0].why == 'symmetry'
     last = walk.points[0].orbit
-    hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
+    hop = from_path(last.network, last.network.symmetry('two_legged_hop'),
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     value = walk.ends[0].value
     branch = continue_orbit(hop, line, value - 0.05, value + 0.05)
@@ -122,10 +122,3 @@ def test_a_simulation_keeps_to_the_branch_that_leaves():
     run = simulate(orbit.network, orbit, orbit.period, orbit.network.delay / 400, progress=False)
     # Disturbances grow three times in a period: errors of the method stay small.
     assert run.x == pytest.approx(orbit(run.t), abs=1e-7)
-
-
-def test_no_branch_of_orbits_leaves_at_a_torus_point():
-    branch, found = pace()
-    torus = next(one for one in found if one.kind == 'torus')
-    with pytest.raises(InputError, match='torus point at alpha=beta'):
-        switch_branch(torus, branch.along, 0.05, 0.52)

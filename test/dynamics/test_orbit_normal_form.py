@@ -16,11 +16,12 @@
 
 from dataclasses import replace
 
-from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
+from branch_switching import switch_branch
+from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.mesh.solve import collocate
+from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.orbit_normal_form import orbit_normal_form
 from cpg_ros.dynamics.solve_orbit import solve_from_path, solve_preset
@@ -128,7 +129,7 @@ def test_the_walk_leaves_the_hop_as_the_normal_form_has_it():
     line = ParameterLine.parse('w_a', Biped)
     walk = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
     last, value = walk.points[0].orbit, walk.ends[0].value
-    hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
+    hop = from_path(last.network, last.network.symmetry('two_legged_hop'),
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     branch = continue_orbit(hop, line, value - 0.05, value + 0.05)
     (point,) = (one for one in bifurcations(branch) if one.kind == 'period doubling')
