@@ -28,8 +28,9 @@ from itertools import pairwise
 import math
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition, slopes
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition
 from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.arclength import newton
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
 from cpg_ros.dynamics.hopf import HopfPoint, ON_AXIS, SPARE
@@ -93,19 +94,13 @@ def _determinant(block: Block, root: complex) -> complex:
 
 def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Apply Newton's method; return the solution and its largest residual, or None."""
-    unknowns = start
     try:
-        for _ in range(NEWTON):
-            move = np.linalg.solve(slopes(equations, unknowns, DIFFERENCE), equations(unknowns))
-            unknowns = unknowns - move
-            if not np.abs(move).max() < 1.0:
-                return None
-            if np.abs(move).max() < EXACT:
-                left = float(np.abs(equations(unknowns)).max())
-                return (unknowns, left) if left < LEFT else None
+        found = newton(equations, start, steps=NEWTON, tolerance=EXACT, difference=DIFFERENCE,
+                       longest=1.0)
+        left = math.inf if found is None else float(np.abs(equations(found)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
         return None
-    return None
+    return None if found is None or not left < LEFT else (found, left)
 
 
 def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
@@ -192,7 +187,7 @@ class _Curve:
         found = self.condition.corrected(one + way * (other - one), tangent)
         if found is None:
             raise ArithmeticError('the curve is lost')
-        return found[0]
+        return found
 
     def zeros(self, test: Test, small: float) -> Iterator[np.ndarray]:
         """Yield the places at which a test function changes its sign through 0.
@@ -237,8 +232,7 @@ def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[Codimensi
         curve: of Hopf points, as ``hopf_curves`` returns it.
 
     """
-    fractions = np.column_stack([(curve.points[:, :2] - chart.low) / chart.size,
-                                 curve.points[:, 2]])
+    fractions = np.column_stack([curve.fractions(chart), curve.points[:, 2]])
     found: list[CodimensionTwo] = []
     for k, gait in enumerate(curve.gaits):
         condition = condition_of(chart, gait, fractions[len(fractions) // 2])

@@ -25,11 +25,11 @@ from itertools import chain, pairwise
 
 from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, slopes
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, on_curve
 from cpg_ros.analysis.atlas.orbit_plane import OrbitPlane, spectrum, stability_losses
 from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.arclength import continue_along_tangents, derivatives, newton, NoOrbit
 from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.floquet import ATTRACTS
 import numpy as np
@@ -107,7 +107,8 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
     target = np.exp(2j * np.pi / n)
 
     def gaps(fraction: np.ndarray) -> np.ndarray:
-        some = spectrum(plane.orbit(fraction))[part]
+        plane.last = plane.orbit(fraction)
+        some = spectrum(plane.last)[part]
         one = complex(some[np.abs(some - target).argmin()])
         if abs(one.imag) > REAL * REAL:
             product, total = abs(one)**2, 2.0 * one.real
@@ -118,18 +119,12 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
         return np.array([product - 1.0, total - SUMS[n]])
 
     try:
-        for _ in range(RESONANCE_STEPS):
-            plane.last = plane.orbit(fraction)
-            move = np.linalg.solve(slopes(gaps, fraction, RESONANCE_DIFFERENCE), gaps(fraction))
-            fraction = fraction - move
-            if not np.abs(move).max() < REACH:
-                return None
-            if np.abs(move).max() < RESONANCE_TOLERANCE:
-                left = float(np.abs(gaps(fraction)).max())
-                return (fraction, left) if left < LEFT else None
+        found = newton(gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
+                       difference=RESONANCE_DIFFERENCE, longest=REACH)
+        left = np.inf if found is None else float(np.abs(gaps(found)).max())
     except (CpgError, np.linalg.LinAlgError, IndexError):
         return None
-    return None
+    return None if found is None or not left < LEFT else (found, left)
 
 
 #: Curves of a gait at most, points of each, steps in shares of the ranges.
@@ -174,8 +169,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
     for edge in crossed:
         middle = 0.5 * (edge.here + edge.there)
         reach = np.abs(edge.here - edge.there).max()
-        known = [(one.points[:, :2] - chart.low) / chart.size for one in found]
-        if any(np.abs(points - middle).max(axis=1).min() < 1.5 * reach for points in known):
+        if any(on_curve(curve, chart, middle, 1.5 * reach) for curve in found):
             continue
         try:
             found += _through(chart, gait, edge)
@@ -227,36 +221,29 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
 
 def _continue_edge(g: Distance, start: np.ndarray, way: float) -> Iterator[np.ndarray]:
     """Yield points of g = 0 from one on, until the plane ends or the orbit is lost."""
-    here, step, count = start, STEP, 0
-    normal = slopes(g, here, DIFFERENCE)
-    tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
-    while count < MOST and step > SHORTEST:
+    def correct(guess: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         try:
-            new, across = _onto(g, here + step * tangent, normal)
+            point, slope = _onto(g, guess, _normal(tangent))
         except (NoOrbit, np.linalg.LinAlgError):
-            step *= 0.5
-            continue
-        ahead = np.array([-across[1], across[0]]) / np.linalg.norm(across)
-        ahead *= np.sign(ahead @ tangent) or 1.0
-        if (ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step
-                or (new < 0.0).any() or (new > 1.0).any()):
-            # Beyond the edge, too: up to it by shorter steps.
-            step *= 0.5
-            continue
-        here, tangent, normal = new, ahead, across
-        yield here
-        count, step = count + 1, min(1.5 * step, STEP)
-        if count > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
-            break
+            return None
+        return None if (point < 0.0).any() or (point > 1.0).any() else (point, _normal(slope))
+
+    return continue_along_tangents(
+        correct, start, way * _normal(derivatives(g, start, DIFFERENCE)), (STEP, SHORTEST, STEP),
+        aligned=0.8, most=MOST)
+
+
+def _normal(vector: np.ndarray) -> np.ndarray:
+    """Return the unit vector a quarter turn ahead of one in the plane."""
+    return np.array([-vector[1], vector[0]]) / np.linalg.norm(vector)
 
 
 def _onto(g: Distance, fraction: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Apply Newton's method normal to the curve; return the point on it and the slope of g."""
+    """Apply Newton's method along a unit vector; return the point on it and the slope of g."""
     for _ in range(NEWTON):
         value = g(fraction)
         if abs(value) < EXACT:
-            return fraction, slopes(g, fraction, DIFFERENCE)
-        unit = normal / np.linalg.norm(normal)
-        along = (g(fraction + DIFFERENCE * unit) - value) / DIFFERENCE
-        fraction = fraction - value / along * unit
+            return fraction, derivatives(g, fraction, DIFFERENCE)
+        along = (g(fraction + DIFFERENCE * normal) - value) / DIFFERENCE
+        fraction = fraction - value / along * normal
     raise NoOrbit('the curve is lost')
