@@ -143,8 +143,9 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
         preset, orbit = exact_preset(Preset(gait, score.network, score.state, score.period))
     except NoOrbit as error:
         raise NotVerified(str(error)) from error
-    leading = multipliers(orbit).leading
-    if leading >= 1.0:
+    spectrum = multipliers(orbit)
+    leading = spectrum.leading
+    if not spectrum.attracts:
         raise NotVerified(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
     signals = orbit_signals(orbit)
     if waveform_shortfall(signals, orbit.symmetry) > 0.0:

@@ -75,8 +75,8 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
         exact: share of the way between two points to which a crossing is located.
 
     """
-    spectra = [_parts(one) for one in judged or (multipliers(point.orbit)
-                                                 for point in branch.points)]
+    spectra = [spectrum.subspaces for spectrum in judged or map(
+        multipliers, (point.orbit for point in branch.points))]
     found: list[Bifurcation] = []
     gaps: dict[int, _Gap] = {}
     for k, part, rank in _crossings(branch, spectra):
@@ -95,12 +95,6 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
                 for other in found):
             found.append(one)
     return tuple(found)
-
-
-def _parts(judged: Multipliers) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first, that of the gait's class without 1 first."""
-    return [part[np.argsort(-np.abs(part), kind='stable')] for part in
-            (judged.within, *judged.parts)]
 
 
 def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
@@ -157,7 +151,7 @@ class _Gap:
             if place is None:
                 raise NoOrbit('no orbit between two points of a branch')
             point = BranchPoint(place.value, place.curve.orbit(place.z), place)
-            self._known[fraction] = point, _parts(multipliers(point.orbit))
+            self._known[fraction] = point, multipliers(point.orbit).subspaces
         return self._known[fraction]
 
 

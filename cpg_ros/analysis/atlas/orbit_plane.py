@@ -34,8 +34,7 @@ ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
     """Multipliers of each subspace, largest first; that of the class first, without 1."""
-    return [part[np.argsort(-np.abs(part), kind='stable')]
-            for part in subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)]
+    return subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)
 
 
 class OrbitPlane:
