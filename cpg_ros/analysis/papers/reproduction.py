@@ -24,7 +24,6 @@ from cpg_ros.analysis.papers import (
     buono_gaits,
     buono_hopf,
     buono_linear,
-    buono_symmetry,
     liu_zhang,
     oscillators,
     rashidi,
@@ -40,14 +39,14 @@ PAPER = Paper('buono_golubitsky', buono_gaits.AUTHORS,
               'P.-L. Buono, M. Golubitsky: Models of central pattern generators for quadruped '
               'locomotion. I. Primary gaits (2001)',
               (buono_gaits.constants, buono_gaits.fast_gaits, buono_gaits.slow_gaits,
-               buono_symmetry.dihedral, buono_symmetry.lattice, buono_symmetry.four_cells,
-               buono_symmetry.legs,
+               buono_gaits.dihedral, buono_gaits.lattice, buono_gaits.four_cells,
+               buono_gaits.legs,
                buono_linear.phases, buono_linear.tables, buono_linear.coupled_variable,
                buono_linear.equal_couplings, buono_hopf.the_stand, buono_hopf.existence,
                buono_hopf.table_12, buono_hopf.theorem_4_2, buono_hopf.genericity,
                buono_hopf.jump, buono_hopf.stable_points, buono_hopf.near_equal,
-               buono_hopf.necessary_and_sufficient, buono_symmetry.conditions,
-               buono_symmetry.one_variable))
+               buono_hopf.necessary_and_sufficient, buono_gaits.conditions,
+               buono_gaits.one_variable))
 
 
 # The papers by name.
