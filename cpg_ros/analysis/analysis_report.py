@@ -268,7 +268,7 @@ class Analysis(ShortRepr):
         """Return lines on the equilibrium and its Hopf points."""
         _, parts, rest, why = self._found
         if why:
-            return [f'Stand: {why}.']
+            return [f'Equilibrium: {why}.']
         lines = [*(self._roots(parts, rest) if self.delay else self._eigenvalues(parts, rest)), '']
         where = (f'up to a delay of {self.longest:g}' if self.delay else
                  f'with {self.along} from {self.span[0]:g} to {self.span[1]:g}')
@@ -280,15 +280,15 @@ class Analysis(ShortRepr):
         block = max(parts, key=lambda one: one.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
         place = '' if odd(self.network) else f' at {_state(self.network, rest)}'
-        return [f'Rest{place}: {count} with positive real part; the rightmost is '
+        return [f'Equilibrium{place}: {count} with positive real part; the rightmost is '
                 f'{_root(block.leading)} per model time, of mode '
                 f'({", ".join(map(str, block.mode))}).']
 
     def _eigenvalues(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
         rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
         rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
-        return [f'Stand: {_state(self.network, rest)}; eigenvalues per model time by symmetry '
-                'class:', *(f'  {line}' for line in table(rows))]
+        return [f'Equilibrium: {_state(self.network, rest)}; eigenvalues per model time by '
+                'symmetry class:', *(f'  {line}' for line in table(rows))]
 
     def _points(self, where: str) -> list[str]:
         """Return a table of the Hopf points."""

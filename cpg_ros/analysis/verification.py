@@ -32,8 +32,7 @@ import numpy as np
 #: Noise that a gait has to survive (per square root of model time), for how long (model time),
 #: and in how many runs of it at once: as many as fit into the vector registers.
 NOISE, DURATION, RUNS = 0.01, 500.0, 8
-#: After that the network is left in peace for so many periods, and must be back on its gait:
-#: this near, degrees.
+#: Noise-free periods after that, and largest phase error then, degrees.
 PEACE, BACK = 30, 1.0
 #: Phase errors (degrees) in any few cycles under noise beyond which the gait was left for a while.
 LOST, CYCLES = 60.0, 4

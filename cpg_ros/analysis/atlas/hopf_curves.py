@@ -182,7 +182,7 @@ class Boundary(ShortRepr):
         gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
         codimension_two: points on it where a second condition holds.
-        losses: whether the gait is lost softly or hard at places on it where a multiplier of
+        losses: whether the loss is supercritical at points on it where a multiplier of
             stable orbits crosses the unit circle, other than by a fold.
 
     """
@@ -198,7 +198,7 @@ class Boundary(ShortRepr):
         return np.asarray((self.points[:, :2] - chart.low) / chart.size)
 
     def __str__(self) -> str:
-        met = [name for name, soft in (('soft', True), ('hard', False))
+        met = [name for name, soft in (('supercritical', True), ('subcritical', False))
                if any(loss.soft is soft for loss in self.losses)]
         return (f'{self.kind} of {" and ".join(self.gaits)}'
                 + (f' ({" and ".join(met)})' if met else ''))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether a gait is lost softly or hard, at places on a curve where it loses stability."""
+"""Orbits over the plane of an atlas, and whether their losses of stability are supercritical."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
