@@ -33,7 +33,7 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.arclength import newton
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
-from cpg_ros.dynamics.hopf import HopfPoint, ON_AXIS, SPARE
+from cpg_ros.dynamics.hopf import HopfPoint, ON_AXIS, SPARE, tracked_roots
 from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -274,7 +274,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     small = ON_AXIS * max(1.0, float(curve.fractions[:, 2].max()))
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
-        count = _tracked_block([split[which] for _, split in points])
+        count = tracked_roots([split[which] for _, split in points], SPARE + 2)
 
         def others(fraction: np.ndarray, which: int = which, count: int = count) -> np.ndarray:
             point, split = curve.at(fraction)
@@ -290,13 +290,6 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
                 if root.imag > -REAL * place[2] or block.real:
                     _enter(found, _crossing(curve, gait, place, block, root), curve.chart)
     return found
-
-
-def _tracked_block(along: list[Block]) -> int:
-    """How many roots of a class can cross on the curve, the critical ones among them."""
-    if not any(one.past.any() for one in along):
-        return along[0].network.variables
-    return SPARE + 2 + max(len(one.right_of(0.0)) for one in along)
 
 
 def _crossing(curve: _Curve, gait: str, place: np.ndarray, block: Block, root: complex
