@@ -32,7 +32,7 @@ from cpg_ros.dynamics.floquet import Multipliers, multipliers
 import numpy as np
 import scipy
 
-#: Share of the way between two points of a branch to which a crossing is located.
+#: Fraction of the way between two points of a branch to which a crossing is located.
 EXACT = 1e-7
 #: A multiplier whose logarithm stays this small is neutral, not crossing.
 NEUTRAL = 1e-6
@@ -72,7 +72,7 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
     Args:
         branch: of orbits.
         judged: multipliers of its points, where they are known already.
-        exact: share of the way between two points to which a crossing is located.
+        exact: fraction of the way between two points to which a crossing is located.
 
     """
     spectra = [spectrum.subspaces for spectrum in judged or map(
@@ -114,7 +114,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
 
 
 def _between(left: CurvePoint, right: CurvePoint, fraction: float) -> CurvePoint | None:
-    """Return the curve's point at a share of the way in the value or, if that stays, the period.
+    """Return the point a fraction of the way in the value or, if that stays, in the period.
 
     Raises:
         NoOrbit: it cannot be resolved.
@@ -140,7 +140,7 @@ class _Gap:
         self.width = abs(ends[1].value - ends[0].value)
 
     def at(self, fraction: float) -> tuple[BranchPoint, list[np.ndarray]]:
-        """Return the point at a share of the way, with the multipliers of each subspace.
+        """Return the point at a fraction of the way, with the multipliers of each subspace.
 
         Raises:
             NoOrbit: it cannot be resolved.

@@ -53,10 +53,10 @@ from scipy.optimize import brentq, minimize_scalar
 # Cusps of fold curves: where two folds of a branch meet and none is left.
 
 #: How far along a branch the second fold is looked for, and how far beyond the last fold of a
-#: curve its cusp is, in shares of the first parameter's range.
+#: curve its cusp is, in fractions of the first parameter's range.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
 BEYOND = (0.00125, 0.005, 0.02)
-#: To what the extremum is located along a branch, and the cusp, in shares.
+#: To what the extremum is located along a branch, and the cusp, in fractions.
 ALONG, EXACT = 1e-7, 1e-13
 #: Smaller orbits end in rest, not in a cusp.
 SMALLEST = 0.02
@@ -141,7 +141,7 @@ STEP, SHORTEST = 1.0 / 24.0, 1.0 / 800.0
 SHARES = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
 #: Powers of 1/T in the series of a saddle node.
 POWERS = 0, 2, 3, 4
-#: Differences this small, in shares of the range, are rounding: the limit has been reached.
+#: Differences this small, in fractions of the range, are rounding: the limit has been reached.
 ROUNDING = 1e-11
 
 
@@ -242,7 +242,7 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
 REACHES = (0.01, 0.03, 0.1, 0.3)
 #: Smaller orbits are rest.
 REST = 5e-3
-#: Edges that are tried for a gait, points of a branch, and curves this close, in shares, are one.
+#: Edges tried for a gait, points of a branch, and distance, in fractions, of equal curves.
 TRIED, MOST, SAME = 8, 80, 0.02
 
 
@@ -309,7 +309,7 @@ def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float) -
 
 def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
     """Return the branch in the row of an edge."""
-    orbit = solve_from_wave(chart.at_share(edge.here), gait, edge.wave, edge.period)
+    orbit = solve_from_wave(chart.at_fractions(edge.here), gait, edge.wave, edge.period)
     return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
                           most=MOST)
 
@@ -353,7 +353,7 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: floa
 
 
 def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step: float) -> bool:
-    """Whether a fold lies about where the two before it lead, a step in shares later."""
+    """Whether a fold lies about where the two before it lead, a step in fractions later."""
     if len(last) < 3:
         return True
     (a, one), (b, two), (c, three) = last
@@ -381,13 +381,13 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: How far beside the Bautin point a branch is started, in shares of the ranges, the amplitude of
-#: its first orbit, its longest step, and points at most.
-BESIDE, AMPLITUDE, LONGEST, BAUTIN_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: A fold this far, in shares, from its Hopf point is another one; the curve's end that is this
+#: Distances from the Bautin point, in fractions of the ranges, at which a branch is started, the
+#: amplitude of its first orbit, its longest step, and points at most.
+BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
+#: A fold this far, in fractions, from its Hopf point is another one; the curve's end that is this
 #: close to the Bautin point ends there.
 NEAR, END = 0.2, 0.02
-#: A curve that stays this close to another one, in shares, is that.
+#: A curve that stays this close to another one, in fractions, is that.
 SAME_CURVE = 3e-3
 
 
@@ -468,7 +468,7 @@ def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
                 branch = continue_from_hopf(
                     hopf.network, hopf.block.symmetry, hopf.omega, line, chart.second.low,
                     chart.second.high, rest=hopf.state, vector=hopf.eigenvector,
-                    amplitude=AMPLITUDE, longest_step=LONGEST, most=BAUTIN_POINTS)
+                    amplitude=AMPLITUDE, longest_step=LONGEST, most=MOST_POINTS)
             except (CpgError, np.linalg.LinAlgError):
                 continue
             for fold in branch.folds[:1]:

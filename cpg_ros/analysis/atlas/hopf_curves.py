@@ -40,12 +40,12 @@ import numpy as np
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
-#: Newton's method: steps, and where it ends; differences for its matrix, in shares.
+#: Newton's method: steps, and where it ends; differences for its matrix, in fractions.
 NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
 
 
 class HopfCondition:
-    """Two real equations in (p1, p2, omega), the parameters in shares of their ranges."""
+    """Two real equations in (p1, p2, omega), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, mode: tuple[int, ...]) -> None:
         """Take the plane and the class whose root crosses."""
@@ -53,7 +53,7 @@ class HopfCondition:
 
     def values(self, fraction: np.ndarray) -> np.ndarray:
         """Return the real and the imaginary part of the determinant, shape (2,)."""
-        network = self.chart.at_share(fraction[:2])
+        network = self.chart.at_fractions(fraction[:2])
         block = block_at(network, equilibrium(network), self.mode)
         matrix = characteristic_matrix(1j * fraction[2], block.now, block.past, network.delay)[0]
         found = np.linalg.det(matrix)
@@ -79,10 +79,10 @@ def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> Hopf
     Args:
         chart: the plane.
         gait: whose.
-        fraction: (p1, p2, omega), the parameters in shares of their ranges.
+        fraction: (p1, p2, omega), the parameters in fractions of their ranges.
 
     """
-    network = chart.at_share(fraction[:2])
+    network = chart.at_fractions(fraction[:2])
     conditions = [HopfCondition(chart, block.mode)
                   for block in blocks(network, equilibrium(network)) if block.gait == gait]
     return min(conditions, key=lambda one: float(np.abs(one.values(fraction)).max()))
@@ -127,7 +127,7 @@ class HopfStart(ShortRepr):
     Attributes:
         gait: whose.
         mode: its class.
-        fraction: (p1, p2, omega), the parameters in shares of their ranges.
+        fraction: (p1, p2, omega), the parameters in fractions of their ranges.
 
     """
 
@@ -165,9 +165,9 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     return found
 
 
-#: Steps in shares of the ranges, and points of a curve at most.
+#: Steps in fractions of the ranges, and points of a curve at most.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: A beginning this close to a curve, in shares of the ranges, lies on it. Two classes share a
+#: A beginning this close to a curve, in fractions of the ranges, lies on it. Two classes share a
 #: curve if a few points on it, so many, are solutions of both.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 

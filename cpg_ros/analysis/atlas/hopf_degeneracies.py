@@ -41,7 +41,7 @@ from scipy.optimize import brentq
 
 # Where a curve of Hopf points ends inside the plane: Bogdanov-Takens and zero-Hopf points.
 
-#: How far from a curve's last point, in shares of the ranges, its end is looked for.
+#: How far from a curve's last point, in fractions of the ranges, its end is looked for.
 REACH = 0.03
 #: Newton's method: steps, where it ends, differences for its matrix, and what may be left.
 NEWTON, EXACT, DIFFERENCE, LEFT = 30, 1e-12, 1e-6, 1e-9
@@ -52,11 +52,11 @@ Equations = Callable[[np.ndarray], np.ndarray]
 
 
 class _End:
-    """Equations in (state, p1, p2, ...), the parameters in shares of their ranges."""
+    """Equations in (state, p1, p2, ...), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, symmetry: Symmetry, fraction: np.ndarray) -> None:
         self.chart, self.symmetry = chart, symmetry
-        network = chart.at_share(fraction[:2])
+        network = chart.at_fractions(fraction[:2])
         self.rest = equilibrium(network)
         self.moves = not odd(network) and network.at_rest() is None
         self.together = next(one for one in classes(network)
@@ -66,7 +66,7 @@ class _End:
     def _split(self, unknowns: np.ndarray) -> tuple[np.ndarray, Expansion]:
         """Return the rates of the state, where it moves, and the expansion about it."""
         fraction = unknowns[self.free:self.free + 2]
-        network = self.chart.at_share(fraction)
+        network = self.chart.at_fractions(fraction)
         if not self.moves:
             return np.zeros(0), Expansion(network, equilibrium(network))
         state = unknowns[:self.free]
@@ -111,13 +111,13 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
         chart: the plane.
         gait: whose.
         mode: the class of the critical root.
-        fractions: points of the curve, (p1, p2, omega), the parameters in shares, shape (n, 3).
+        fractions: points of the curve, (p1, p2, omega), the parameters in fractions, shape (n, 3).
 
     """
     if len(fractions) < 3:
         return
     for last, before in ((fractions[0], fractions[1]), (fractions[-1], fractions[-2])):
-        network = chart.at_share(last[:2])
+        network = chart.at_fractions(last[:2])
         block = block_at(network, equilibrium(network), mode)
         end = _End(chart, block.symmetry, last)
         start = np.concatenate([end.rest[:end.free], last])
@@ -142,13 +142,13 @@ def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
                 and np.abs(fraction - last[:2]).max() < REACH)
 
 
-#: Share of the way between two points of a curve to which a zero is bracketed.
+#: Fraction of the way between two points of a curve to which a zero is bracketed.
 BRACKET = 1e-14
 #: At a pole a test function changes its sign, too; at a zero it is this small against both sides.
 VANISHED = 1e-5
 #: A Lyapunov coefficient this small against the curve's largest one is 0 but for rounding.
 ROUNDING = 1e-9
-#: Two points this close in shares of the ranges, with frequencies this close, are one.
+#: Two points this close in fractions of the ranges, with frequencies this close, are one.
 SAME = 1e-7
 #: A root's imaginary part this small against omega is that of a real one.
 REAL = 1e-6
@@ -168,7 +168,7 @@ class _Curve:
         """Return the Hopf point at (p1, p2, omega), and the blocks of all classes."""
         key = fraction.tobytes()
         if key not in self._known:
-            network, line = self.chart.at_share(fraction[:2]), self.chart.second.line
+            network, line = self.chart.at_fractions(fraction[:2]), self.chart.second.line
             rest = equilibrium(network)
             split = blocks(network, rest)
             block = next(block for block in split if block.mode == self.condition.mode)
@@ -177,7 +177,7 @@ class _Curve:
         return self._known[key]
 
     def between(self, one: np.ndarray, other: np.ndarray, way: float) -> np.ndarray:
-        """Return the curve's point at a share of the way between two of its points.
+        """Return the curve's point at a fraction of the way between two of its points.
 
         Raises:
             ArithmeticError: Newton's method has lost it.

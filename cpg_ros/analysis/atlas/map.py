@@ -43,7 +43,7 @@ STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
          'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
-#: Points this close, in shares of the ranges, have one marker.
+#: Points this close, in fractions of the ranges, have one marker.
 TOGETHER = 2e-3
 
 

@@ -39,10 +39,10 @@ from scipy.optimize import brentq
 
 #: n of 1:n -> 2 cos(2 pi / n).
 SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
-#: Newton's method: steps, where it ends, differences for its matrix, all in shares.
+#: Newton's method: steps, where it ends, differences for its matrix, all in fractions.
 RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
-#: How far from a point of the curve a resonance may lie, in shares, and from how close to its sum
-#: an end is tried.
+#: Largest distance of a resonance from a point of the curve, in fractions, and difference from its
+#: sum within which an end is tried.
 REACH, CLOSE = 0.08, 0.5
 #: What product and sum may miss by, and resonances this close are one.
 LEFT, SAME = 1e-8, 1e-5
@@ -56,7 +56,7 @@ def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.n
         plane: its last orbit is that at the first point.
         part: number of the subspace of the pair.
         rank: how many larger multipliers that has.
-        fractions: points of the curve in shares of the ranges.
+        fractions: points of the curve in fractions of the ranges.
 
     """
     found: list[np.ndarray] = []
@@ -127,7 +127,7 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
     return None if found is None or not left < LEFT else (found, left)
 
 
-#: Curves of a gait at most, points of each, steps in shares of the ranges.
+#: Curves of a gait at most, points of each, steps in fractions of the ranges.
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
 #: How well g is zero, differences for its slope, and Newton's steps.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
@@ -137,7 +137,7 @@ Distance = Callable[[np.ndarray], float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Edge(ShortRepr):
-    """Two neighbours on the grid between which multipliers cross, in shares of the ranges."""
+    """Two neighbours on the grid between which multipliers cross, in fractions of the ranges."""
 
     here: np.ndarray
     there: np.ndarray
@@ -183,7 +183,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
 def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]:
     plane = OrbitPlane(chart, gait)
     one, other = edge.here, edge.there
-    plane.last = solve_from_wave(chart.at_share(one), gait, edge.wave, edge.period)
+    plane.last = solve_from_wave(chart.at_fractions(one), gait, edge.wave, edge.period)
     before, after = spectrum(plane.last), spectrum(plane.orbit(other))
     for part, (left, right) in enumerate(zip(before, after, strict=True)):
         counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
@@ -203,16 +203,16 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
         crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
         kind = ('torus' if abs(crossing.imag) > REAL else
                 'branch point' if crossing.real > 0.0 else 'period doubling')
-        at_share = plane.last
+        crossing_orbit = plane.last
         ways, special = [], []
         for way in (-1.0, 1.0):
-            plane.last = at_share
+            plane.last = crossing_orbit
             ways.append([(new, plane.last) for new in _continue_edge(g, fraction, way)])
             if kind == 'torus':
-                plane.last = at_share
+                plane.last = crossing_orbit
                 along = [fraction, *(new for new, _ in ways[-1])]
                 special.append([*resonances(plane, part, rank, along)][::int(way)])
-        curve = [*ways[0][::-1], (fraction, at_share), *ways[1]]
+        curve = [*ways[0][::-1], (fraction, crossing_orbit), *ways[1]]
         yield Boundary(kind, (gait,), chart.low + np.array([new for new, _ in curve]) * chart.size,
                        tuple(chain(*special)),
                        tuple(stability_losses(plane, part, rank, curve)))

@@ -46,14 +46,14 @@ class OrbitPlane:
         self.last: Orbit | None = None
 
     def orbit(self, fraction: np.ndarray) -> Orbit:
-        """Solve at a point given in shares of the ranges.
+        """Solve at a point given in fractions of the ranges.
 
         Raises:
             NoOrbit: there is none beside the last one.
 
         """
         assert self.last is not None
-        found = solve_beside(self.chart.at_share(fraction), self.last)
+        found = solve_beside(self.chart.at_fractions(fraction), self.last)
         if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
             raise NoOrbit('the orbit has shrunk')
         return found
@@ -100,7 +100,7 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
         plane: of the curve.
         part: number of the subspace in which a multiplier crosses the unit circle.
         rank: how many larger ones that has.
-        curve: its points in shares of the ranges, and orbits beside them.
+        curve: its points in fractions of the ranges, and orbits beside them.
 
     """
     args = np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(curve)).astype(int))
