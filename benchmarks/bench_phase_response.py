@@ -58,7 +58,7 @@ class Kicked:
 
 def directly(orbit: Orbit, step: float) -> np.ndarray:
     """Return the phase response at TIMES by simulation, shape (times, cells, variables)."""
-    network, gain = orbit.network, stability(orbit).args
+    network, gain = orbit.network, stability(orbit).lock_gain
     leading = multipliers(orbit, gain).leading
     cycles = math.ceil(math.log(1e-8) / math.log(max(leading, 1e-4)))
     steps, unit = math.ceil(cycles * orbit.period / step), np.eye(network.components)

@@ -14,21 +14,65 @@
 
 """The report of ``analyze`` on a parameter set: as text, and as JSON."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 import math
-from typing import Any
+from typing import Any, cast
 
-from cpg_ros.analysis.papers.commentary import COMMENTARIES, Commentary
+from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
+from cpg_ros.analysis.papers.liu_zhang import published_normal_form
 from cpg_ros.common.command_line import table
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
 from cpg_ros.dynamics.hopf import hopf_points, HopfPoint
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.dynamics.stability import GaitAssessment, nearest_threshold
+from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Network, ParameterLine
 import numpy as np
+
+# Statements of the papers on Hopf points of their networks, beside the computed ones.
+
+def _published_numbers(point: HopfPoint) -> dict[str, float]:
+    """Real parts of the normal form by the formulas of Liu & Zhang (2024)."""
+    form = published_normal_form(point)
+    return {'k1_published': form.k1.real, 'k2_published': form.k2.real}
+
+
+def _theorem(point: HopfPoint) -> tuple[str, dict[str, Any]]:
+    """Verdict of theorem 4.2 of Buono & Golubitsky (2001)."""
+    verdict = theorem_verdict(cast(Quadruped, point.network), point.gait)
+    return str(verdict), {'theorem_4_2': {
+        'applies': verdict.applies, 'stable': verdict.stable, 'says': str(verdict)}}
+
+
+@dataclass(frozen=True)
+class Commentary:
+    """Statements of a paper on the Hopf points of its network; none for other networks.
+
+    Attributes:
+        heads: of columns in a table of Hopf points.
+        explained: explanation of these columns.
+        title: above the remarks.
+        numbers: of the columns, name -> number.
+        remark: statement on a point as text and in plain types.
+
+    """
+
+    heads: tuple[str, ...] = ()
+    explained: str = ''
+    title: str = ''
+    numbers: Callable[[HopfPoint], dict[str, float]] = lambda point: {}
+    remark: Callable[[HopfPoint], tuple[str, dict[str, Any]]] = lambda point: ('', {})
+
+
+#: Network -> commentary.
+COMMENTARIES = {
+    'delayed': Commentary(("k1'", "k2'"), "k1', k2' as\nLiu & Zhang print them, which is wrong; ",
+                          numbers=_published_numbers),
+    'quadruped': Commentary(title='Buono & Golubitsky at these points:', remark=_theorem)}
+
 
 #: Error of the multiplier along the orbit from which the report mentions it.
 UNSURE = 1e-6
@@ -224,7 +268,7 @@ class Analysis(ShortRepr):
         """Return lines on the equilibrium and its Hopf points."""
         _, parts, rest, why = self._found
         if why:
-            return [f'Stand: {why}.']
+            return [f'Equilibrium: {why}.']
         lines = [*(self._roots(parts, rest) if self.delay else self._eigenvalues(parts, rest)), '']
         where = (f'up to a delay of {self.longest:g}' if self.delay else
                  f'with {self.along} from {self.span[0]:g} to {self.span[1]:g}')
@@ -236,15 +280,15 @@ class Analysis(ShortRepr):
         block = max(parts, key=lambda one: one.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
         place = '' if odd(self.network) else f' at {_state(self.network, rest)}'
-        return [f'Rest{place}: {count} with positive real part; the rightmost is '
+        return [f'Equilibrium{place}: {count} with positive real part; the rightmost is '
                 f'{_root(block.leading)} per model time, of mode '
                 f'({", ".join(map(str, block.mode))}).']
 
     def _eigenvalues(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
         rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
         rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
-        return [f'Stand: {_state(self.network, rest)}; eigenvalues per model time by symmetry '
-                'class:', *(f'  {line}' for line in table(rows))]
+        return [f'Equilibrium: {_state(self.network, rest)}; eigenvalues per model time by '
+                'symmetry class:', *(f'  {line}' for line in table(rows))]
 
     def _points(self, where: str) -> list[str]:
         """Return a table of the Hopf points."""

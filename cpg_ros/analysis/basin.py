@@ -22,17 +22,19 @@ it, and what it does in the end is compared with the orbit and with the gaits' s
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
-from cpg_ros.analysis.analysis_report import Analysis
 from cpg_ros.common.command_line import progress_bar, table
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.orbit import Orbit, signal_symmetry
-from cpg_ros.dynamics.settling import last_cycle, SettledCycle
+from cpg_ros.dynamics.settling import last_cycle, LimitCycle
 from cpg_ros.networks.network import Network
 import numpy as np
 from scipy.stats import binomtest
+
+if TYPE_CHECKING:
+    from cpg_ros.analysis.analysis_report import Analysis
 
 #: Cycles of a run, its points that are kept of each, and states that run at a time.
 CYCLES, KEPT, TOGETHER = 100, 64, 64
@@ -149,7 +151,7 @@ def end_of(run: Trajectory, orbit: Orbit) -> str:
     return f'another {gait}' if gait == orbit.gait else gait
 
 
-def _is(cycle: SettledCycle, orbit: Orbit) -> bool:
+def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
     """Whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
     points = len(cycle.signals)
     exact = orbit(np.arange(points) / points * orbit.period)
@@ -165,7 +167,7 @@ def _is(cycle: SettledCycle, orbit: Orbit) -> bool:
     return False
 
 
-def _named(cycle: SettledCycle, network: Network) -> str:
+def _named(cycle: LimitCycle, network: Network) -> str:
     """Name the gait whose symmetry a cycle has, and no more; or unknown."""
     signals = cycle.signals[:, :network.cells]
     for gait in network.gaits():
@@ -181,7 +183,7 @@ def _named(cycle: SettledCycle, network: Network) -> str:
 
 # The basins that ``analyze --basin N`` reports: as text, and as JSON.
 
-def basins(analysis: Analysis, count: int, seed: int) -> dict[str, Basin]:
+def basins(analysis: 'Analysis', count: int, seed: int) -> dict[str, Basin]:
     """Find the basin of each gait that attracts by itself, or else with the default gain."""
     gains = {one.gait: 0.0 if one.stable else one.default_gain for one in analysis.existing
              if one.stable or one.stable_with_default_gain}

@@ -53,8 +53,8 @@ class StabilityLoss:
         """Return it as a line."""
         verdict = self.form.verdict
         if self.form.soft is not None:
-            verdict += (f': {BEYOND[self.point.kind]} attracts beside it, and grows from it'
-                        if self.form.soft else ': nothing beside it attracts, the gait jumps')
+            verdict += (f': {BEYOND[self.point.kind]} branches off and is stable'
+                        if self.form.soft else ': no stable motion nearby, the gait jumps')
         return (f'{self.gait} loses stability at {along} {self.point.value:.6g} '
                 f'({self.point.kind}), {verdict}')
 

@@ -30,8 +30,8 @@ from cpg_ros.dynamics.orbit import extra_symmetry
 from cpg_ros.dynamics.settling import (
     ALIVE,
     last_cycle,
+    LimitCycle,
     population_run,
-    SettledCycle,
     SPAN,
     start_states,
 )
@@ -289,7 +289,7 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
     return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
 
 
-def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, SettledCycle | None]:
+def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, LimitCycle | None]:
     """Score a set by its simulation; also return its cycle if that is worth solving for."""
     symmetry, cells = network.symmetry(gait), network.cells
     first = symmetry.first
@@ -319,7 +319,7 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Set
     return score, cycle if near and shortfall == 0.0 else None
 
 
-def _proven(score: Score, cycle: SettledCycle, gait: str) -> Score:
+def _proven(score: Score, cycle: LimitCycle, gait: str) -> Score:
     """Solve for the exact orbit of a set that ends near its gait, from its cycle."""
     symmetry = score.network.symmetry(gait)
     orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)

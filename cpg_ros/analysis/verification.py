@@ -32,8 +32,7 @@ import numpy as np
 #: Noise that a gait has to survive (per square root of model time), for how long (model time),
 #: and in how many runs of it at once: as many as fit into the vector registers.
 NOISE, DURATION, RUNS = 0.01, 500.0, 8
-#: After that the network is left in peace for so many periods, and must be back on its gait:
-#: this near, degrees.
+#: Noise-free periods after that, and largest phase error then, degrees.
 PEACE, BACK = 30, 1.0
 #: Phase errors (degrees) in any few cycles under noise beyond which the gait was left for a while.
 LOST, CYCLES = 60.0, 4
@@ -143,8 +142,9 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
         preset, orbit = exact_preset(Preset(gait, score.network, score.state, score.period))
     except NoOrbit as error:
         raise NotVerified(str(error)) from error
-    leading = multipliers(orbit).leading
-    if leading >= 1.0:
+    spectrum = multipliers(orbit)
+    leading = spectrum.leading
+    if not spectrum.attracts:
         raise NotVerified(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
     signals = orbit_signals(orbit)
     if waveform_shortfall(signals, orbit.symmetry) > 0.0:

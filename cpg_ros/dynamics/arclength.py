@@ -21,10 +21,10 @@ control of bifurcation problems*, 1991). The parameter is an unknown like all ot
 fold, where it turns round, is a point like all others.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 import math
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from cpg_ros.common.errors import CpgError, ShortRepr
 import numpy as np
@@ -120,6 +120,124 @@ GROWN = 3.0
 ALIGNED = 0.9
 #: No step may take more than this share of the amplitude, so that none leaps over the rest state.
 SHARE = 0.6
+
+
+Place = TypeVar('Place')
+
+
+def derivatives(values: Callable[[np.ndarray], Any], x: np.ndarray, difference: float
+                ) -> np.ndarray:
+    """Return the derivatives of a function by its arguments, from central differences.
+
+    Args:
+        values: function of m numbers, or of one.
+        x: its argument, shape (n,).
+        difference: of the argument.
+
+    Returns:
+        Shape (m, n), or (n,) if the function has one number.
+
+    """
+    return np.array([(values(x + step) - values(x - step)) / (2.0 * difference)
+                     for step in difference * np.eye(x.size)]).T
+
+
+def newton(equations: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, steps: int,
+           tolerance: float, difference: float, longest: float) -> np.ndarray | None:
+    """Solve n equations in n unknowns by Newton's method; None where it does not converge.
+
+    Args:
+        equations: residuals, shape (n,), at unknowns, shape (n,).
+        x: unknowns to start from.
+        steps: at most.
+        tolerance: largest change in the last step.
+        difference: of the unknowns, for the derivatives.
+        longest: change of an unknown in a step from which on the solution is lost.
+
+    Raises:
+        LinAlgError: the derivatives are singular.
+
+    """
+    for _ in range(steps):
+        change = np.linalg.solve(derivatives(equations, x, difference), equations(x))
+        x = x - change
+        if not np.abs(change).max() < longest:
+            return None
+        if np.abs(change).max() < tolerance:
+            return x
+    return None
+
+
+def continue_steps(advance: Callable[[Place, float], Place | None], here: Place, first: float,
+                   shortest: float, longest: float) -> Iterator[Place]:
+    """Yield solutions ahead of one, with shorter steps where one fails and longer ones after.
+
+    Args:
+        advance: from a solution by a step to the next one; None where none is found.
+        here: solution to start from.
+        first: first step.
+        shortest: step below which the continuation ends, as at the edge of the range.
+        longest: step.
+
+    """
+    step = first
+    while step >= shortest:
+        ahead = advance(here, step)
+        if ahead is None:
+            step *= 0.5
+            continue
+        yield ahead
+        here, step = ahead, min(1.5 * step, longest)
+
+
+def continue_along_tangents(
+        correct: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray] | None],
+        start: np.ndarray, tangent: np.ndarray, steps: tuple[float, float, float], *,
+        aligned: float, most: int) -> Iterator[np.ndarray]:
+    """Yield points ahead on a curve, until it ends, is lost or returns to the start.
+
+    Args:
+        correct: from a guess and the tangent it was predicted along to a point of the curve and
+            the unit tangent there, either way; None where there is none.
+        start: point of the curve, shape (n,).
+        tangent: unit tangent there, in the direction to continue in.
+        steps: first, shortest and longest.
+        aligned: least cosine of the angle between the tangents of two neighbours.
+        most: points.
+
+    """
+    def advance(here: tuple[np.ndarray, np.ndarray], step: float
+                ) -> tuple[np.ndarray, np.ndarray] | None:
+        point, before = here
+        ahead = correct(point + step * before, before)
+        if ahead is None or np.linalg.norm(ahead[0] - point) > 2.0 * step:
+            return None
+        cosine = ahead[1] @ before
+        return (ahead[0], np.sign(cosine) * ahead[1]) if abs(cosine) >= aligned else None
+
+    for count, (point, _) in enumerate(continue_steps(advance, (start, tangent), *steps), 1):
+        yield point
+        if count == most or (count > 5 and np.linalg.norm(point - start) < 0.5 * steps[2]):
+            return
+
+
+def offsets(curve: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Return the vectors from a point to the nearest point of each chord of a curve.
+
+    Args:
+        curve: points in order, shape (n, d).
+        point: shape (d,).
+
+    Returns:
+        Shape (n - 1, d), or (1, d) for a curve of one point.
+
+    """
+    if len(curve) < 2:
+        return curve - point
+    chords = np.diff(curve, axis=0)
+    fraction = np.clip(((point - curve[:-1]) * chords).sum(axis=1) / np.maximum(
+        (chords**2).sum(axis=1), 1e-30), 0.0, 1.0)
+    return np.asarray(curve[:-1] + fraction[:, None] * chords - point)
 
 
 class NoOrbit(CpgError):
@@ -257,9 +375,17 @@ def fixed_unknown(size: int, which: int) -> np.ndarray:
     return border
 
 
-def predict_and_correct(place: CurvePoint, step: float) -> CurvePoint | None:
-    """Return the point a step along the tangent, in the same discretisation."""
-    return correct_point(place.curve, place.z + step * place.tangent, place.tangent)
+def predict_and_correct(place: CurvePoint, step: float) -> CurvePoint:
+    """Return the point a step along the tangent, in the same discretisation.
+
+    Raises:
+        NoOrbit: Newton's method does not converge.
+
+    """
+    found = correct_point(place.curve, place.z + step * place.tangent, place.tangent)
+    if found is None:
+        raise NoOrbit('the curve is lost')
+    return found
 
 
 def point_at_value(place: CurvePoint, value: float) -> CurvePoint | None:
@@ -284,10 +410,7 @@ def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | No
 
     """
     def gap(step: float) -> float:
-        found = predict_and_correct(here, way * step)
-        if found is None:
-            raise np.linalg.LinAlgError('no point')
-        return found.value - value
+        return predict_and_correct(here, way * step).value - value
 
     reach, sign = 1e-3, math.copysign(1.0, here.value - value)
     try:
@@ -297,19 +420,14 @@ def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | No
         ahead = (scipy.optimize.brentq(gap, 0.0, reach, xtol=1e-2 * reach)
                  if sign * gap(0.0) > 0.0 else 0.0)
         near = predict_and_correct(here, way * ahead)
-    except np.linalg.LinAlgError:
+    except NoOrbit:
         return None
-    return point_at_value(near, value) if near is not None and near.rate else None
+    return point_at_value(near, value) if near.rate else None
 
 
 def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
     """Return the fold that lies up to about a step before a point; None if it cannot be found."""
-    def rate(back: float) -> float:
-        found = predict_and_correct(after, back)
-        if found is None:
-            raise np.linalg.LinAlgError('no point')
-        return found.rate
-
+    rate = rate_along(after)
     try:
         # Where the fold is the point itself, to rounding, it may also be found after it.
         last = 0.0 if rate(0.0) * after.rate > 0.0 else 0.1 * step
@@ -317,15 +435,21 @@ def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
             return None
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                back = scipy.optimize.brentq(rate, -reach * step, last, xtol=1e-9 * step,
-                                             rtol=1e-12)
-                found = predict_and_correct(after, back)
-                return None if found is None else resolve_point(found.curve, found.z,
-                                                                found.tangent)
-    except (np.linalg.LinAlgError, NoOrbit):
+                fold = predict_and_correct(after, scipy.optimize.brentq(
+                    rate, -reach * step, last, xtol=1e-9 * step, rtol=1e-12))
+                return resolve_point(fold.curve, fold.z, fold.tangent)
+    except NoOrbit:
         # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
         return None
     return None
+
+
+def rate_along(point: CurvePoint) -> Callable[[float], float]:
+    """Return the derivative of the parameter by the arclength, as a function of the step.
+
+    The function raises NoOrbit where Newton's method does not converge.
+    """
+    return lambda step: predict_and_correct(point, step).rate
 
 
 def _room(here: CurvePoint) -> float:

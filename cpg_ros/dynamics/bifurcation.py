@@ -22,22 +22,17 @@ what happens in two of them at one place is not mistaken for a pair.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
 
-from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import CurvePoint, NoOrbit
-from cpg_ros.dynamics.continuation import Branch, BranchPoint, continue_from_disturbance
+from cpg_ros.dynamics.continuation import Branch, BranchPoint
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
-from cpg_ros.dynamics.orbit import extra_symmetry
-from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.networks.network import ParameterLine
-from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 import scipy
 
-#: Share of the way between two points of a branch to which a crossing is located.
+#: Fraction of the way between two points of a branch to which a crossing is located.
 EXACT = 1e-7
 #: A multiplier whose logarithm stays this small is neutral, not crossing.
 NEUTRAL = 1e-6
@@ -77,11 +72,11 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
     Args:
         branch: of orbits.
         judged: multipliers of its points, where they are known already.
-        exact: share of the way between two points to which a crossing is located.
+        exact: fraction of the way between two points to which a crossing is located.
 
     """
-    spectra = [_parts(one) for one in judged or (multipliers(point.orbit)
-                                                 for point in branch.points)]
+    spectra = [spectrum.subspaces for spectrum in judged or map(
+        multipliers, (point.orbit for point in branch.points))]
     found: list[Bifurcation] = []
     gaps: dict[int, _Gap] = {}
     for k, part, rank in _crossings(branch, spectra):
@@ -102,12 +97,6 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
     return tuple(found)
 
 
-def _parts(judged: Multipliers) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first, that of the gait's class without 1 first."""
-    return [part[np.argsort(-np.abs(part), kind='stable')] for part in
-            (judged.within, *judged.parts)]
-
-
 def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
                ) -> Iterator[tuple[int, int, int]]:
     """Yield the number of the point before, of the subspace, and how many there are larger."""
@@ -125,7 +114,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
 
 
 def _between(left: CurvePoint, right: CurvePoint, fraction: float) -> CurvePoint | None:
-    """Return the curve's point at a share of the way in the value or, if that stays, the period.
+    """Return the point a fraction of the way in the value or, if that stays, in the period.
 
     Raises:
         NoOrbit: it cannot be resolved.
@@ -151,7 +140,7 @@ class _Gap:
         self.width = abs(ends[1].value - ends[0].value)
 
     def at(self, fraction: float) -> tuple[BranchPoint, list[np.ndarray]]:
-        """Return the point at a share of the way, with the multipliers of each subspace.
+        """Return the point at a fraction of the way, with the multipliers of each subspace.
 
         Raises:
             NoOrbit: it cannot be resolved.
@@ -162,7 +151,7 @@ class _Gap:
             if place is None:
                 raise NoOrbit('no orbit between two points of a branch')
             point = BranchPoint(place.value, place.curve.orbit(place.z), place)
-            self._known[fraction] = point, _parts(multipliers(point.orbit))
+            self._known[fraction] = point, multipliers(point.orbit).subspaces
         return self._known[fraction]
 
 
@@ -181,76 +170,3 @@ def _located(gap: _Gap, part: int, rank: int, exact: float) -> Bifurcation | Non
     else:
         kind = 'period doubling' if mu.real < 0.0 else 'branch point'
     return Bifurcation(kind, point, mu, part)
-
-
-# Onto the branch that leaves at a branch point or a period doubling.
-
-#: Shares of the disturbance that are tried, and points of a cycle at which symmetry is tested.
-AMPLITUDES, POINTS = (0.02, 0.005, 0.06), 96
-#: What a symmetry may miss by, over the disturbance.
-SAME = 1e-3
-
-
-def switch_branch(bifurcation: Bifurcation, along: ParameterLine, low: float, high: float,
-                  most: int = 60) -> Branch:
-    """Follow the branch that leaves at a branch point or a period doubling.
-
-    Args:
-        bifurcation: of a branch of orbits.
-        along: the line it was found on.
-        low: least value.
-        high: greatest value.
-        most: points at most.
-
-    Raises:
-        InputError: what leaves at a torus point are no periodic orbits.
-        NoOrbit: Newton's method finds no orbit beside the point.
-
-    """
-    orbit, doubled = bifurcation.point.orbit, bifurcation.kind == 'period doubling'
-    if bifurcation.kind == 'torus':
-        raise InputError(f'at the torus point at {along} {bifurcation.value:g} no branch of '
-                         'periodic orbits leaves')
-    cycles = 2 if doubled else 1
-    disturbance = orbit_method(orbit.network).floquet.mode(orbit, bifurcation.part,
-                                                        -1.0 if doubled else 1.0)
-    theta = np.arange(POINTS) / POINTS
-    symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)
-    for amplitude in AMPLITUDES:
-        try:
-            found = continue_from_disturbance(
-                orbit.network, symmetry, along, low, high,
-                lambda theta: orbit(cycles * theta * orbit.period),
-                lambda theta: disturbance(cycles * theta), cycles * orbit.period,
-                amplitude=amplitude, most=most)
-        except NoOrbit:
-            continue
-        if not extra_symmetry(found.points[0].orbit):
-            return found
-    raise NoOrbit(f'no orbit was found near the {bifurcation.kind} at {along} '
-                  f'{bifurcation.value:g}')
-
-
-def kept(symmetry: Symmetry, disturbance: np.ndarray, doubled: bool) -> Symmetry:
-    """Return the symmetry that an orbit has left once it is disturbed.
-
-    Args:
-        symmetry: of the orbit.
-        disturbance: at even times of a cycle, of two if doubled, shape (points, components).
-        doubled: whether two cycles become one.
-
-    """
-    x = disturbance[:, :symmetry.group.cells]
-    size, shifts = np.abs(disturbance).max(), {}
-    for name, shift in symmetry.shifts:
-        choices = (shift / 2, shift / 2 + Fraction(1, 2)) if doubled else (shift,)
-        image = x[:, list(symmetry.group.elements[name])]
-        for choice in choices:
-            turned = np.roll(x, -round(float(choice) * len(x)), axis=0)
-            if np.abs(image - turned).max() < SAME * size:
-                shifts[name] = choice
-                break
-    # Two cycles that differ are no negatives of one another.
-    half = np.roll(x, len(x) // 2, axis=0)
-    odd = symmetry.odd and not doubled and bool(np.abs(x + half).max() < SAME * size)
-    return Symmetry.of(symmetry.group, shifts, symmetry.variables, odd)

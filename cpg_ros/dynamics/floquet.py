@@ -59,6 +59,11 @@ class Multipliers(ShortRepr):
     trivial: complex
     parts: tuple[np.ndarray, ...] = ()
 
+    @property
+    def subspaces(self) -> list[np.ndarray]:
+        """Those of each subspace, largest first: the class without the trivial one, then parts."""
+        return [by_size(part) for part in (self.within, *self.parts)]
+
     def _summary(self) -> str:
         return (f'leading within {self.leading_within:.6g}, transverse '
                 f'{self.leading_transverse:.6g}, gain {self.gain:.6g}, error {self.error:.0e}')
@@ -99,8 +104,8 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
     """
     rest, trivial = orbit_method(orbit.network).floquet.within(orbit)
     parts = orbit_method(orbit.network).floquet.transverse(orbit, gain)
-    return Multipliers(orbit.period, gain, _sorted(rest),
-                       _sorted(np.concatenate([np.zeros(0), *parts])), trivial, parts)
+    return Multipliers(orbit.period, gain, by_size(rest),
+                       by_size(np.concatenate([np.zeros(0), *parts])), trivial, parts)
 
 
 def leading_within(orbit: Orbit) -> float:
@@ -108,7 +113,8 @@ def leading_within(orbit: Orbit) -> float:
     return float(np.abs(orbit_method(orbit.network).floquet.within(orbit)[0]).max(initial=0.0))
 
 
-def _sorted(values: np.ndarray) -> np.ndarray:
+def by_size(values: np.ndarray) -> np.ndarray:
+    """Return multipliers by falling modulus."""
     return values[np.argsort(-np.abs(values), kind='stable')]
 
 

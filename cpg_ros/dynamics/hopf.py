@@ -481,7 +481,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
         equilibrium(line.at(network, low))
     found: list[HopfPoint] = []
     for which in range(len(classes(network))):
-        count = _tracked_block([split(value)[which] for value in grid if split(value)])
+        count = tracked_roots([split(value)[which] for value in grid if split(value)])
         known: list[tuple[float, float]] = []
         for rank in range(count):
             def real_part(value: float, at: tuple[int, int, int] = (which, count, rank)) -> float:
@@ -500,11 +500,11 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
     return sorted(found, key=lambda point: (round(point.value, 9), point.omega, point.mode))
 
 
-def _tracked_block(along: list[Block]) -> int:
-    """How many roots of a class can cross on the grid: without a delay, all."""
+def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
+    """Return how many roots of a class can cross along some blocks: without a delay, all."""
     if not any(one.past.any() for one in along):
         return along[0].network.variables
-    return SPARE + max(len(one.right_of(0.0)) for one in along)
+    return spare + max(len(one.right_of(0.0)) for one in along)
 
 
 def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:

@@ -179,7 +179,8 @@ class OrbitNormalForm(ShortRepr):
     @property
     def verdict(self) -> str:
         """In words."""
-        return f'cannot tell: {self.why}' if self.why else 'soft' if self.soft else 'hard'
+        return f'cannot tell: {self.why}' if self.why else (
+            'supercritical' if self.soft else 'subcritical')
 
     def _summary(self) -> str:
         return f'{self.verdict}, c = {self.cubic:.6g}'

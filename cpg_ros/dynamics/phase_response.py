@@ -12,28 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gait reduced to its phase: what a weak periodic input, noise or another generator does to it.
+"""Phase reduction of a gait: its response to a weak periodic input and to noise.
 
 To first order in a weak input p(t) to the rates, the phase in cycles obeys
 ``phi' = 1/T + Z(phi T) . p(t)``, Z the phase response. Averaged over a cycle, a sinusoidal input
 locks it within a range of frequencies whose half-width is the harmonic of Z (Pikovsky, Rosenblum &
-Kurths, *Synchronization*, ch. 7), white noise makes it diffuse, and another generator moves it by
-a function of how far that is ahead (Kuramoto, *Chemical Oscillations, Waves, and Turbulence*).
+Kurths, *Synchronization*, ch. 7), and white noise makes it diffuse.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.orbit import Orbit, Waveforms
 from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.networks.equations import Field
-from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import legendre
-from scipy.special import chdtri
 
 # Phase response curves: how far a small input to a variable of a cell shifts a gait's phase.
 
@@ -133,18 +128,8 @@ def phase_response(orbit: Orbit) -> PhaseResponse:
     return PhaseResponse(orbit, orbit_method(orbit.network).floquet.adjoint(orbit))
 
 
-#: Even points of a cycle over which averages are taken, and at which simulations are kept.
-POINTS, KEPT = 2048, 32
-#: Rates that one generator adds to another: of states of that and of itself, (m, components).
-Coupling = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-class SimulatedDiffusion(NamedTuple):
-    """A coefficient from simulations with the ends of its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
+#: Even points of a cycle over which averages are taken.
+POINTS = 2048
 
 
 def _over_a_cycle(response: PhaseResponse) -> np.ndarray:
@@ -169,34 +154,6 @@ def locking(response: PhaseResponse, periods: int = 1) -> np.ndarray:
     return np.asarray(np.abs(terms))
 
 
-def entrainment_range(response: PhaseResponse, cell: int, variable: str, amplitude: float,
-                      periods: int = 1) -> tuple[float, float]:
-    """Return the lowest and highest frequency of an input that locks a gait, to first order.
-
-    Args:
-        response: of the gait.
-        cell: that the input reaches, from 1.
-        variable: to whose rate ``amplitude cos(2 pi f t)`` is added.
-        amplitude: in units of the variable per model time.
-        periods: of the input in a cycle of the gait.
-
-    Returns:
-        The two edges of the Arnold tongue, f in cycles per model time.
-
-    Raises:
-        InputError: there is no such cell or variable.
-
-    """
-    network = response.orbit.network
-    if not 1 <= cell <= network.cells:
-        raise InputError(f'cell {cell} is not from 1 to {network.cells}')
-    if variable not in network.states:
-        raise InputError(f"'{variable}' is not one of {', '.join(network.states)}")
-    half = abs(amplitude) * locking(response, periods)[cell - 1, network.states.index(variable)]
-    middle = 1.0 / response.orbit.period
-    return float(periods * (middle - half)), float(periods * (middle + half))
-
-
 def phase_diffusion(response: PhaseResponse, noise: float) -> float:
     """Return the coefficient D by which weak white noise makes the phase diffuse.
 
@@ -210,59 +167,3 @@ def phase_diffusion(response: PhaseResponse, noise: float) -> float:
 
     """
     return float(0.5 * noise**2 * (_over_a_cycle(response)**2).sum(axis=(1, 2)).mean())
-
-
-def simulated_diffusion(orbit: Orbit, noise: float, *, runs: int = 256, cycles: int = 40,
-                        lock: tuple[float, Symmetry] | None = None, seed: int = 0
-                        ) -> SimulatedDiffusion:
-    """Estimate the same coefficient from simulations of the whole network.
-
-    The phase is that of the first harmonic of cell 1 over a cycle; what else the noise does to it
-    stays bounded, and counts the less the more cycles there are.
-
-    Args:
-        orbit: where the simulations start.
-        noise: as of phase_diffusion.
-        runs: number of simulations.
-        cycles: of each simulation, after the first.
-        lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
-        seed: of the noise.
-
-    """
-    every = max(1, int(np.ceil(2.0 * orbit.period / orbit.network.step / KEPT)))
-    histories = ([orbit] * runs if orbit.network.delay
-                 else np.repeat(orbit(np.zeros(1)), runs, axis=0))
-    run = simulate(orbit.network, histories, (cycles + 1) * orbit.period,
-                   orbit.period / (KEPT * every), every=every, noise=noise, lock=lock, seed=seed,
-                   progress=False)
-    signal = run.x[:, :KEPT * (cycles + 1), 0].reshape(runs, cycles + 1, KEPT)
-    waves = signal @ np.exp(-2j * np.pi * np.arange(KEPT) / KEPT)
-    turns = np.unwrap(np.angle(waves), axis=1) / (2.0 * np.pi)
-    sizes = np.array([1.0, *(chdtri(runs - 1, p) / (runs - 1) for p in (0.025, 0.975))])
-    spread = np.var(turns[:, -1] - turns[:, 0], ddof=1) / (2.0 * cycles * orbit.period)
-    return SimulatedDiffusion(*(float(one) for one in spread / sizes))
-
-
-def coupling_function(response: PhaseResponse, other: Orbit, coupling: Coupling,
-                      leads: np.ndarray) -> np.ndarray:
-    """Average what a coupling to another generator does to the phase over a cycle.
-
-    With two generators of frequencies f and the functions H and H' of each, the second one's lead
-    obeys ``lead' = f' - f + H'(-lead) - H(lead)``: where that is 0 and falls they stay together.
-
-    Args:
-        response: of the generator that the coupling moves.
-        other: the other generator's orbit, of about the same period.
-        coupling: what is added to the rates.
-        leads: by how much the other one is ahead, cycles, shape (n,).
-
-    Returns:
-        H in cycles per model time, shape (n,).
-
-    """
-    orbit = response.orbit
-    theta = np.arange(POINTS) / POINTS
-    own, z = orbit(theta * orbit.period), _over_a_cycle(response).swapaxes(1, 2)
-    z = z.reshape(POINTS, -1)
-    return np.array([(z * coupling(other((theta + lead) * other.period), own)).sum(axis=1).mean()
-                     for lead in leads])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits sought by letting the network run, held in the gait's symmetry, until it repeats."""
+"""Limit cycles that simulations settle on, of a network by itself or held in a symmetry."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,8 +25,6 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-# The settled cycles of networks, many of which are simulated at once.
-
 #: Model time that every set is simulated for, and between the states that are kept.
 SPAN, KEPT_FRACTION = 500.0, 0.1
 #: Steps of the network's real-time step at once: still more exact than adaptive methods with
@@ -36,21 +34,23 @@ COARSE_STEPS = 2.5
 DISTURBANCE = 0.05
 #: Cycles that are averaged, and points of one.
 AVERAGED, POINTS = 3, 256
-#: Below this range of the first variable nothing oscillates.
+#: Range of the first variable below which nothing oscillates.
 ALIVE = 0.05
 #: A state has come back when it is this near, over the range of the states.
 RETURNED = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SettledCycle(ShortRepr):
-    """The cycle in which a network settles, from a simulation.
+class LimitCycle(ShortRepr):
+    """The cycle that a simulation repeats in the end.
 
     Attributes:
         run: the simulation.
         begin: where cell 1 peaks for the last time but one, model time.
         period: in model time.
         signals: mean of the last cycles on even points, shape (POINTS, components).
+        drift: largest difference between states whole periods apart, over the range of the
+            states; infinite where there are fewer than three.
 
     """
 
@@ -58,6 +58,7 @@ class SettledCycle(ShortRepr):
     begin: float
     period: float
     signals: np.ndarray
+    drift: float
 
     def __call__(self, theta: np.ndarray) -> np.ndarray:
         """States at times in cycles from such a peak on, 0 to 1, shape (m, components)."""
@@ -95,15 +96,23 @@ def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajector
                     progress=False)
 
 
-def last_cycle(run: Trajectory, cells: int) -> SettledCycle | None:
+def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = ALIVE
+               ) -> LimitCycle | None:
     """Find a simulation's cycle; None where it rests, runs away or does not repeat.
 
-    Cycles begin where the liveliest cell crosses its middle upwards, which it does fast; of
-    several such crossings in a cycle the whole state tells which belong together.
+    Cycles begin where the cell of the largest range crosses its middle upwards, which it does
+    fast; of several such crossings in a cycle the whole state tells which belong together.
+
+    Args:
+        run: simulation.
+        cells: number of cells.
+        first: step from which on the simulation repeats; by default its middle.
+        least: range of the first variable below which nothing oscillates.
+
     """
-    half = run.t.size // 2
+    half = run.t.size // 2 if first is None else first
     span = np.ptp(run.x[half:, :cells], axis=0)
-    if not span.max() >= ALIVE:
+    if not np.isfinite(run.x[-1]).all() or not span.max() >= least:
         return None
     cell = int(span.argmax())
     v = run.x[half:, cell]
@@ -117,18 +126,21 @@ def last_cycle(run: Trajectory, cells: int) -> SettledCycle | None:
         under = run(between)[:, cell] < middle
         low, high = np.where(under, between, low), np.where(under, high, between)
     states = run(high)
-    gaps = np.abs(states[:-1] - states[-1]).max(axis=1) / np.ptp(run.x[half:], axis=0).max()
+    size = np.ptp(run.x[half:], axis=0).max()
+    gaps = np.abs(states[:-1] - states[-1]).max(axis=1) / size
     if gaps.min() > RETURNED:
         return None
     back = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
     period = float(high[-1] - high[back])
+    same = states[::back - len(gaps)]
+    drift = float(np.abs(same - same[0]).max() / size) if len(same) > 2 else np.inf
     cycles = min(AVERAGED, int(high[-1] / period))
     times = high[-1] + period * (np.arange(cycles * POINTS) / POINTS - cycles)
     signals = run(times).reshape(cycles, POINTS, -1).mean(axis=0)
     # An orbit begins where cell 1 peaks, and so must the guess at it. The first of the crossings
     # is past the middle of the run, so that two periods fit in before the last one.
     begin = high[-1] + period * (signals[:, 0].argmax() / POINTS - 2.0)
-    return SettledCycle(run, float(begin), period, signals)
+    return LimitCycle(run, float(begin), period, signals, drift)
 
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
@@ -143,27 +155,13 @@ LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
 #: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
 #: their size, where they repeat: neither changes any more.
 RESTING, REPEATING = 1e-9, 1e-3
+#: Range of the first variable below which a network held in a symmetry does not oscillate.
+SMALLEST = 1e-3
 #: How well what the network settles on has to repeat the gait's shifts, over its range, and from
 #: where on it has a further symmetry.
 KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]
-
-
-@dataclass(frozen=True)
-class LimitCycle:
-    """What a simulation repeats.
-
-    Attributes:
-        path: states over times in cycles, from a peak of cell 1 on.
-        period: model time.
-        drift: difference between the first and the last state that should be one, over the size.
-
-    """
-
-    path: Path
-    period: float
-    drift: float
 
 
 class _Past:
@@ -182,14 +180,14 @@ class _Past:
         return self._run.slopes[self._nodes(times)]
 
 
-def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
-           hold: float = HOLD) -> tuple[Path, float] | None:
-    """Let the network run from a state and find its period: (states over cycles, period).
+def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
+           ) -> LimitCycle | None:
+    """Simulate from a state, locked to a symmetry, and return the cycle that follows.
 
-    None where it comes to rest or repeats nothing within three of the given periods.
+    None where the network comes to rest or repeats nothing within three of the given periods.
     """
     step = min(network.step, period / 400.0)
-    lock = (hold, symmetry) if hold else None
+    lock = HOLD, symmetry
     history: History = start
     early = 0 if network.delay_parameter else SETTLING // 4
     if early:
@@ -200,36 +198,12 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
         history = run.x[-1]
     rest = SETTLING + 3 - early
     run = simulate(network, history, rest * period, step, lock=lock, progress=False)
-    found = _cycle(run, int((rest - 3) * period / step))
-    return None if found is None else (found.path, found.period)
+    return last_cycle(run, network.cells, int((rest - 3) * period / step), SMALLEST)
 
 
 def _ends(run: Trajectory, first: int) -> bool:
     """Whether the network rests from a step on, or has left all bounds."""
     return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
-
-
-def _cycle(run: Trajectory, first: int) -> LimitCycle | None:
-    """Find what a simulation repeats from a step on."""
-    v, rise = run.x[first:, 0], run.slopes[first:, 0]
-    if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
-        return None
-    peaks = first + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
-    peaks = peaks[run.x[peaks, 0] > v.max() - 0.02 * np.ptp(v)]
-    if peaks.size < 2:
-        return None
-    size = np.ptp(run.x[first:], axis=0).max()
-    gaps = np.abs(run.x[peaks[1:]] - run.x[peaks[0]]).max(axis=1) / size
-    close = np.flatnonzero(gaps < max(0.05, 1.5 * gaps.min()))
-    if gaps.min() > 0.2:
-        return None
-    begin, found = run.t[peaks[0]], float(run.t[peaks[1 + close[0]]] - run.t[peaks[0]])
-    # Of a cycle with several peaks alike, those that are one and the same point.
-    same = peaks[::1 + close[0]]
-    fraction = run.slopes[same, 0] / (run.slopes[same, 0] - run.slopes[same + 1, 0])
-    states = run(run.t[same] + fraction * run.t[1])
-    drift = float(np.abs(states - states[0]).max() / size) if len(same) > 2 else np.inf
-    return LimitCycle(lambda theta: run(begin + theta * found), found, drift)
 
 
 def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
@@ -276,13 +250,13 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
             for x, slopes in zip(batch.x, batch.slopes, strict=True):
                 run = Trajectory(batch.t, x, slopes)
                 first = steps * 3 // 4 - before
-                found = _cycle(run, first)
-                settled = _ends(run, first) or (found is not None and found.drift <= REPEATING)
+                cycle = last_cycle(run, network.cells, first, SMALLEST)
+                settled = _ends(run, first) or (cycle is not None and cycle.drift <= REPEATING)
                 if not settled:
                     histories.append(_Past(run))
-                if ((settled or steps >= LOOKED[-1]) and found is not None
-                        and _fits(found.path, symmetry)):
-                    yield found.path, found.period
+                if ((settled or steps >= LOOKED[-1]) and cycle is not None
+                        and _fits(cycle, symmetry)):
+                    yield cycle, cycle.period
             before = steps
 
 

@@ -27,6 +27,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits, CoexistingOrbits
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import (
+    ATTRACTS,
     attracts_with,
     leading_within,
     Multipliers,
@@ -40,7 +41,7 @@ from cpg_ros.networks.network import Network
 
 # Stability of a gait: whether it attracts, and with what symmetry gain.
 
-#: Decay that the chosen gain gives transverse disturbances, per model time.
+#: Decay that the lock gain gives transverse disturbances, per model time.
 RATE = 0.5
 
 
@@ -50,13 +51,13 @@ class Stability:
 
     Attributes:
         enough: symmetry gain (1/model time) that makes transverse disturbances decay.
-        args: the gain to run with: that, with a margin.
+        lock_gain: gain to run with: that, with a margin.
         flaw: why the gait does not attract whatever the gain, or ''.
 
     """
 
     enough: float
-    args: float
+    lock_gain: float
     flaw: str
 
 
@@ -67,13 +68,13 @@ def stability(orbit: Orbit) -> Stability:
     """
     bound = orbit.network.sufficient_gain(RATE)
     if bound is None:
-        enough, args = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
+        enough, gain = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
     else:
-        enough = args = bound
+        enough = gain = bound
     leading = leading_within(orbit)
-    flaw = '' if leading < 1.0 else (
+    flaw = '' if leading < ATTRACTS else (
         f'a disturbance within its own symmetry class grows {leading:.4g} times a stride')
-    return Stability(enough, args, flaw)
+    return Stability(enough, gain, flaw)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,7 +139,7 @@ class GaitAssessment(ShortRepr):
     @cached_property
     def default_gain(self) -> float:
         """The gain the generator would choose, 1/model time."""
-        return stability(self._orbit).args
+        return sufficient_gain(self._orbit, RATE)
 
     @cached_property
     def stable_with_default_gain(self) -> bool:

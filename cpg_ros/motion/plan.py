@@ -324,7 +324,7 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         if key == 'velocity':
             cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
         raise OutOfLimits(cause, message, excess, key)
-    gain = judged.args if gain < 0.0 else gain
+    gain = judged.lock_gain if gain < 0.0 else gain
     return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
                     in_place, span, speed, stands.fractions)
 

@@ -333,8 +333,8 @@ def test_how_gaits_lose_their_stability_is_printed_and_drawn(capsys, tmp_path):
         assert loss['value'] == pytest.approx(-0.5328, abs=1e-4)
         assert loss['gait'] == 'run' and loss['soft'] is False and loss['cubic'] > 0.0
     assert main(arguments) == 0
-    assert ('run loses stability at w_21=w_12=w_43=w_34 -0.532807 (torus), hard: nothing beside '
-            'it attracts, the gait jumps') in capsys.readouterr().out
+    assert ('run loses stability at w_21=w_12=w_43=w_34 -0.532807 (torus), subcritical: no '
+            'stable motion nearby, the gait jumps') in capsys.readouterr().out
 
 
 def test_phase_responses_are_printed_and_drawn(capsys, tmp_path):

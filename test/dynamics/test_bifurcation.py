@@ -16,8 +16,8 @@
 
 from functools import cache
 
-from cpg_ros.common.errors import InputError
-from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
+from branch_switching import switch_branch
+from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
@@ -122,10 +122,3 @@ def test_a_simulation_keeps_to_the_branch_that_leaves():
     run = simulate(orbit.network, orbit, orbit.period, orbit.network.delay / 400, progress=False)
     # Disturbances grow three times in a period: errors of the method stay small.
     assert run.x == pytest.approx(orbit(run.t), abs=1e-7)
-
-
-def test_no_branch_of_orbits_leaves_at_a_torus_point():
-    branch, found = pace()
-    torus = next(one for one in found if one.kind == 'torus')
-    with pytest.raises(InputError, match='torus point at alpha=beta'):
-        switch_branch(torus, branch.along, 0.05, 0.52)

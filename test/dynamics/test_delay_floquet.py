@@ -124,7 +124,7 @@ def test_the_smallest_gain_parts_growth_from_decay(name):
     smallest = smallest_gain(orbit)
     assert 0.0 < smallest < orbit.network.sufficient_gain(0.5)
     assert multipliers(orbit, smallest).leading_transverse == pytest.approx(1.0, abs=1e-6)
-    assert multipliers(orbit, stability(orbit).args).leading < 1.0
+    assert multipliers(orbit, stability(orbit).lock_gain).leading < 1.0
     outside = np.eye(8) - projector(orbit)
     shape = outside @ SHAPE
     for factor, sign in ((0.95, 1.0), (1.05, -1.0)):

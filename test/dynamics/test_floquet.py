@@ -124,12 +124,13 @@ def test_small_disturbances_grow_by_the_multipliers(network, name):
 @EVERY
 def test_shipped_gaits_attract(network, name):
     orbit, mine, judged = solved(network, name)
-    assert judged.flaw == '' and multipliers(orbit, judged.args).leading < 1.0
+    assert judged.flaw == '' and multipliers(orbit, judged.lock_gain).leading < 1.0
     # The gain chosen lets what is transverse decay by RATE at least, and none is spent beyond.
-    slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - judged.args
-    assert slowest <= -RATE + 1e-9 and (judged.args == 0.0 or slowest >= -RATE - 1e-9)
+    gain = judged.lock_gain
+    slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - gain
+    assert slowest <= -RATE + 1e-9 and (gain == 0.0 or slowest >= -RATE - 1e-9)
     enough = smallest_gain(orbit)
-    assert judged.enough == enough <= judged.args
+    assert judged.enough == enough <= judged.lock_gain
     assert np.abs(mine.transverse).max(initial=0.0) <= np.exp(enough * orbit.period) + 1e-9
 
 
@@ -140,7 +141,7 @@ def test_shipped_gaits_survive_noise(network, name):
     readout = PhaseReadout(orbit, cells, np.zeros((cells.size, 6)), cells, 3)
     scratch = np.zeros((2, cells.size))
     runs = simulate(orbit.network, [orbit, orbit], 500.0, orbit.network.step, every=20,
-                    lock=(judged.args, orbit.symmetry), noise=0.01, seed=3)
+                    lock=(judged.lock_gain, orbit.symmetry), noise=0.01, seed=3)
     for x, slopes in zip(runs.x, runs.slopes, strict=True):
         phases, clocks = np.empty((len(x), cells.size)), readout.clocks(0.0)
         for k, now in enumerate(zip(x, slopes, slopes, strict=True)):
@@ -187,7 +188,7 @@ def test_a_gait_attracts_only_if_disturbances_outside_its_class_decay_too():
     alone = multipliers(orbit)
     assert np.abs(alone.within).max() < 1.0 < np.abs(alone.transverse).max()
     assert not alone.attracts
-    locked = multipliers(orbit, stability(orbit).args)
+    locked = multipliers(orbit, stability(orbit).lock_gain)
     assert np.abs(locked.transverse).max() < 1.0 and locked.attracts
 
 

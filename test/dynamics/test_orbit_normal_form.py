@@ -16,7 +16,8 @@
 
 from dataclasses import replace
 
-from cpg_ros.dynamics.bifurcation import bifurcations, switch_branch
+from branch_switching import switch_branch
+from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
@@ -63,7 +64,7 @@ def test_a_torus_has_the_closed_form(kind, alpha):
     wanted = network.cubic()
     assert found.cubic.real == pytest.approx(wanted.real, rel=1e-5)
     assert abs(found.cubic.imag) == pytest.approx(abs(wanted.imag), rel=1e-5)
-    assert found.soft == (found.verdict == 'soft') == (wanted.real < 0.0)
+    assert found.soft == (found.verdict == 'supercritical') == (wanted.real < 0.0)
 
 
 def point_of(network, preset, line, near):

@@ -57,7 +57,7 @@ def shifts(orbit, pairs, times, step):
 
     With a symmetry lock with which the gait attracts, until all else has decayed.
     """
-    gain = stability(orbit).args
+    gain = stability(orbit).lock_gain
     leading = multipliers(orbit, gain).leading
     cycles = math.ceil(math.log(1e-8) / math.log(max(leading, 1e-4)))
     steps = math.ceil(cycles * orbit.period / step)

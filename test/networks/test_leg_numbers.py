@@ -130,7 +130,7 @@ def test_simulation_and_orbit_agree_on_six_legs(gait):
     orbit = solve_preset(preset)
     network = preset.network
     run = simulate(network, orbit, 3.0 * orbit.period, network.step,
-                   lock=(stability(orbit).args, orbit.symmetry))
+                   lock=(stability(orbit).lock_gain, orbit.symmetry))
     assert np.abs(run.x[:, :12] - orbit(run.t)).max() < 1e-6
 
 

@@ -63,7 +63,7 @@ def test_every_gait_is_an_orbit_of_the_papers_equations_and_attracts(network, ga
     end = followed(preset.network, orbit(np.zeros(1))[0], orbit.period)
     assert np.abs(end - orbit(np.zeros(1))[0]).max() < 1e-7
     assert orbit.residual < 1e-9 and stability(orbit).flaw == ''
-    assert multipliers(orbit, stability(orbit).args).attracts
+    assert multipliers(orbit, stability(orbit).lock_gain).attracts
     assert multipliers(orbit).trivial == pytest.approx(1.0, abs=1e-9)
     # Cell 1 peaks at phase 0, and every cell does what its phase and wave say.
     theta = np.linspace(0.0, 1.0, 37)
@@ -101,7 +101,7 @@ def test_simulation_and_orbit_agree_and_noise_is_survived(network, gait):
     assert off(phases, orbit.phases) < 1e-3
     judged = stability(orbit)
     noisy = simulate(preset.network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=3,
-                     lock=(judged.args, orbit.symmetry), progress=False)
+                     lock=(judged.lock_gain, orbit.symmetry), progress=False)
     period, phases = rhythm(noisy, orbit.period, kind.cells)
     assert period == pytest.approx(orbit.period, rel=0.01)
     assert off(phases, orbit.phases) < 0.03

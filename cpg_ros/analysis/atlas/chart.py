@@ -131,17 +131,17 @@ class ParameterPlane:
         whole = find_network(self.network)(**self.base)
         return self.second.line.at(self.first.line.at(whole, one), other)
 
-    def at_share(self, fraction: np.ndarray) -> Network:
-        """Return the network at a point given in shares of the ranges, shape (2,)."""
+    def at_fractions(self, fraction: np.ndarray) -> Network:
+        """Return the network at a point given in fractions of the ranges, shape (2,)."""
         return self.at(*self.values_at(fraction))
 
     def values_at(self, fraction: np.ndarray) -> tuple[float, float]:
-        """Return the values on both axes at a point given in shares of the ranges, shape (2,)."""
+        """Return the values on both axes at a point in fractions of the ranges, shape (2,)."""
         one, other = (self.low + fraction * self.size).tolist()
         return one, other
 
     def fraction(self, point: tuple[int, int]) -> np.ndarray:
-        """Return a point of the grid, given by row and column, in shares of the ranges."""
+        """Return a point of the grid, given by row and column, in fractions of the ranges."""
         return np.array(point) / (self.first.count - 1, self.second.count - 1)
 
     def as_dict(self) -> dict[str, Any]:

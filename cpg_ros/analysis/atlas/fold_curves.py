@@ -26,15 +26,17 @@ from typing import Any
 
 from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, crossed, HopfCondition
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition, on_curve
 from cpg_ros.analysis.atlas.orbit_curves import Edge
 from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.arclength import (
+    continue_steps,
     CurvePoint,
     fixed_unknown,
     NoOrbit,
     predict_and_correct,
+    rate_along,
     resolve_point,
 )
 from cpg_ros.dynamics.continuation import (
@@ -51,10 +53,10 @@ from scipy.optimize import brentq, minimize_scalar
 # Cusps of fold curves: where two folds of a branch meet and none is left.
 
 #: How far along a branch the second fold is looked for, and how far beyond the last fold of a
-#: curve its cusp is, in shares of the first parameter's range.
+#: curve its cusp is, in fractions of the first parameter's range.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
 BEYOND = (0.00125, 0.005, 0.02)
-#: To what the extremum is located along a branch, and the cusp, in shares.
+#: To what the extremum is located along a branch, and the cusp, in fractions.
 ALONG, EXACT = 1e-7, 1e-13
 #: Smaller orbits end in rest, not in a cusp.
 SMALLEST = 0.02
@@ -76,9 +78,9 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, 
         return None
     try:
         reach, sign = _pair(fold)
-        middle, _ = _extremum(_rates(fold), reach, sign)
+        middle, _ = _extremum(rate_along(fold), reach, sign)
         base = predict_and_correct(fold, middle)
-        if base is None or base.amplitude < SMALLEST:
+        if base.amplitude < SMALLEST:
             return None
 
         def place(value: float) -> CurvePoint:
@@ -90,7 +92,7 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, 
             return found
 
         def dip(value: float) -> float:
-            return _extremum(_rates(place(value)), reach, sign)[1]
+            return _extremum(rate_along(place(value)), reach, sign)[1]
 
         for fraction in BEYOND:
             far = one + way * fraction * chart.size[0]
@@ -99,23 +101,14 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, 
             if dip(far) > 0.0 > dip(one):
                 cusp = brentq(dip, *sorted((one, far)), xtol=EXACT * chart.size[0], rtol=1e-15)
                 there = place(cusp)
-                middle, left = _extremum(_rates(there), reach, sign)
+                middle, left = _extremum(rate_along(there), reach, sign)
                 found = predict_and_correct(there, middle)
-                if found is None or abs(left) > 1e-6 or abs(middle) > 0.9 * reach:
+                if abs(left) > 1e-6 or abs(middle) > 0.9 * reach:
                     return None
                 return CodimensionTwo('cusp', gait, (float(cusp), found.value), abs(left))
     except (NoOrbit, np.linalg.LinAlgError, ValueError):
         return None
     return None
-
-
-def _rates(at: CurvePoint) -> Callable[[float], float]:
-    def rate(step: float) -> float:
-        found = predict_and_correct(at, step)
-        if found is None:
-            raise NoOrbit('no point')
-        return found.rate
-    return rate
 
 
 def _pair(fold: CurvePoint) -> tuple[float, float]:
@@ -125,7 +118,7 @@ def _pair(fold: CurvePoint) -> tuple[float, float]:
         NoOrbit: there is none so close.
 
     """
-    rate = _rates(fold)
+    rate = rate_along(fold)
     for reach in CUSP_REACHES:
         left, right = rate(-reach), rate(reach)
         if left * right > 0.0:
@@ -142,13 +135,13 @@ def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tupl
 
 # Curves in two parameters on which the period of a gait's orbits grows without bound.
 
-#: Steps of the first parameter in shares of its range.
-LONG_PERIOD_STEP, LONG_PERIOD_SHORTEST = 1.0 / 24.0, 1.0 / 800.0
+#: Longest and shortest steps of the first parameter in fractions of its range.
+STEP, SHORTEST = 1.0 / 24.0, 1.0 / 800.0
 #: Shares of the largest period at which the second parameter is solved for, by law.
 SHARES = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
 #: Powers of 1/T in the series of a saddle node.
 POWERS = 0, 2, 3, 4
-#: Differences this small, in shares of the range, are rounding: the limit has been reached.
+#: Differences this small, in fractions of the range, are rounding: the limit has been reached.
 ROUNDING = 1e-11
 
 
@@ -187,20 +180,19 @@ def _continue_long_period(chart: ParameterPlane, place: CurvePoint, one: float, 
                           fractions: tuple[float, ...]
               ) -> list[tuple[float, float]]:
     """Follow orbits of one large period from a place on, in a direction of the first parameter."""
+    def advance(here: tuple[float, tuple[float, CurvePoint]], step: float
+                ) -> tuple[float, tuple[float, CurvePoint]] | None:
+        value = here[0] + way * step * chart.size[0]
+        limit = (_limit(chart, here[1][1], value, fractions)
+                 if chart.first.low <= value <= chart.first.high else None)
+        return limit and (value, limit)
+
     found: list[tuple[float, float]] = []
-    step = LONG_PERIOD_STEP
-    while step >= LONG_PERIOD_SHORTEST:
-        new = one + way * step * chart.size[0]
-        limit = (_limit(chart, place, new, fractions)
-                 if chart.first.low <= new <= chart.first.high else None)
-        if limit is None:
-            # Beyond the edge, too: up to it.
-            step *= 0.5
-            continue
-        if not chart.second.low <= limit[0] <= chart.second.high:
+    for value, (limit, _) in continue_steps(advance, (one, (place.value, place)), STEP, SHORTEST,
+                                            STEP):
+        if not chart.second.low <= limit <= chart.second.high:
             break
-        found.append((new, limit[0]))
-        place, one, step = limit[1], new, min(LONG_PERIOD_STEP, 1.5 * step)
+        found.append((value, limit))
     return found
 
 
@@ -246,12 +238,11 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
     return float(first - (first - second)**2 / bend)
 
 
-#: Steps of the first parameter in shares of its range, and how far along a branch its turn is
-#: looked for.
-STEP, SHORTEST, REACHES = 1.0 / 24.0, 1.0 / 800.0, (0.01, 0.03, 0.1, 0.3)
+#: Arclengths along a branch within which its fold is searched.
+REACHES = (0.01, 0.03, 0.1, 0.3)
 #: Smaller orbits are rest.
 REST = 5e-3
-#: Edges that are tried for a gait, points of a branch, and curves this close, in shares, are one.
+#: Edges tried for a gait, points of a branch, and distance, in fractions, of equal curves.
 TRIED, MOST, SAME = 8, 80, 0.02
 
 
@@ -290,8 +281,8 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
 
 
 def _known(chart: ParameterPlane, found: list[Boundary], one: float, other: float) -> bool:
-    return any((np.abs(curve.points - (one, other)) / chart.size).max(axis=1).min() < SAME
-               for curve in found)
+    point = (np.array([one, other]) - chart.low) / chart.size
+    return any(on_curve(curve, chart, point, SAME) for curve in found)
 
 
 def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float) -> Boundary:
@@ -318,7 +309,7 @@ def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float) -
 
 def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
     """Return the branch in the row of an edge."""
-    orbit = solve_from_wave(chart.at_share(edge.here), gait, edge.wave, edge.period)
+    orbit = solve_from_wave(chart.at_fractions(edge.here), gait, edge.wave, edge.period)
     return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
                           most=MOST)
 
@@ -337,35 +328,32 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: floa
         The value on the first axis and the fold, of each.
 
     """
-    found: list[tuple[float, CurvePoint]] = []
-    size, step = chart.size[0], STEP
-    before: tuple[Any, float] | None = None
-    while step >= SHORTEST:
-        new = one + way * step * size
-        guess = fold.z
-        if before is not None and before[0].size == fold.z.size:
-            guess = fold.z + (fold.z - before[0]) * (new - one) / (one - before[1])
-        ahead = None
-        if chart.first.low <= new <= chart.first.high:
-            ahead = _next(chart, fold, new, guess)
-        if ahead is None or ahead.amplitude < REST or not _on_course(chart, [
-                *found[-2:], (new, ahead)], step):
-            # Another fold of the branch is none of this curve.
-            # Beyond a Bautin point what is left is the Hopf point, where branches turn, too.
-            # Beyond the edge, too: up to it.
-            step *= 0.5
-            continue
-        if not chart.second.low <= ahead.value <= chart.second.high:
+    path = [(one, fold)]
+
+    def advance(here: tuple[float, CurvePoint], step: float) -> tuple[float, CurvePoint] | None:
+        (value, last), guess = here, here[1].z
+        new = value + way * step * chart.size[0]
+        if not chart.first.low <= new <= chart.first.high:
+            return None
+        if len(path) > 1 and path[-2][1].z.size == guess.size:
+            guess = guess + (guess - path[-2][1].z) * (new - value) / (value - path[-2][0])
+        ahead = _next(chart, last, new, guess)
+        # Beyond a Bautin point the Hopf point remains, where branches turn, too. A fold off the
+        # course is another one of the branch.
+        if ahead is None or ahead.amplitude < REST or not _on_course(
+                chart, [*path[1:][-2:], (new, ahead)], step):
+            return None
+        return new, ahead
+
+    for here in continue_steps(advance, (one, fold), STEP, SHORTEST, STEP):
+        if not chart.second.low <= here[1].value <= chart.second.high:
             break
-        before = fold.z, one
-        fold, one = ahead, new
-        found.append((one, ahead))
-        step = min(STEP, 1.5 * step)
-    return found
+        path.append(here)
+    return path[1:]
 
 
 def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step: float) -> bool:
-    """Whether a fold lies about where the two before it lead, a step in shares later."""
+    """Whether a fold lies about where the two before it lead, a step in fractions later."""
     if len(last) < 3:
         return True
     (a, one), (b, two), (c, three) = last
@@ -382,13 +370,7 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
         near = resolve_point(moved, guess, fold.tangent)
         if near is None:
             return None
-
-        def rate(step: float) -> float:
-            place = predict_and_correct(near, step)
-            if place is None:
-                raise np.linalg.LinAlgError('no point')
-            return place.rate
-
+        rate = rate_along(near)
         for reach in REACHES:
             if rate(-reach) * rate(reach) < 0.0:
                 return predict_and_correct(near, brentq(rate, -reach, reach, xtol=1e-11))
@@ -399,14 +381,14 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: How far beside the Bautin point a branch is started, in shares of the ranges, the amplitude of
-#: its first orbit, its longest step, and points at most.
-BESIDE, AMPLITUDE, LONGEST, BAUTIN_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: A fold this far, in shares, from its Hopf point is another one; the curve's end that is this
+#: Distances from the Bautin point, in fractions of the ranges, at which a branch is started, the
+#: amplitude of its first orbit, its longest step, and points at most.
+BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
+#: A fold this far, in fractions, from its Hopf point is another one; the curve's end that is this
 #: close to the Bautin point ends there.
 NEAR, END = 0.2, 0.02
-#: A curve that stays this close to another one, in shares, is that.
-BAUTIN_SAME = 3e-3
+#: A curve that stays this close to another one, in fractions, is that.
+SAME_CURVE = 3e-3
 
 
 def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
@@ -429,13 +411,12 @@ def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary
     """Leave out fold curves that run along one before them, which may have been met elsewhere."""
     kept: list[Boundary] = []
     for curve in curves:
-        fractions = (curve.points[:, :2] - chart.low) / chart.size
+        fractions = curve.fractions(chart)
         some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
         if curve.kind != 'fold' or not any(
                 one.kind == 'fold' and one.gaits == curve.gaits
-                and all(crossed(one, chart, fraction - 0.5 * BAUTIN_SAME,
-                                fraction + 0.5 * BAUTIN_SAME)
-                        for fraction in some) for one in kept):
+                and all(on_curve(one, chart, fraction, SAME_CURVE) for fraction in some)
+                for one in kept):
             kept.append(curve)
     return kept
 
@@ -478,16 +459,16 @@ def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
             place = condition.corrected(fraction + way * beside * tangent, tangent)
             if place is None:
                 continue
-            one, other = chart.values_at(place[0][:2])
+            one, other = chart.values_at(place[:2])
             if not (chart.first.low <= one <= chart.first.high
                     and chart.second.low <= other <= chart.second.high):
                 continue
             try:
-                hopf = hopf_at(chart.at(one, other), line, mode, float(place[0][2]))
+                hopf = hopf_at(chart.at(one, other), line, mode, float(place[2]))
                 branch = continue_from_hopf(
                     hopf.network, hopf.block.symmetry, hopf.omega, line, chart.second.low,
                     chart.second.high, rest=hopf.state, vector=hopf.eigenvector,
-                    amplitude=AMPLITUDE, longest_step=LONGEST, most=BAUTIN_POINTS)
+                    amplitude=AMPLITUDE, longest_step=LONGEST, most=MOST_POINTS)
             except (CpgError, np.linalg.LinAlgError):
                 continue
             for fold in branch.folds[:1]:

@@ -24,7 +24,7 @@ import itertools
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import COARSE, ParameterPlane
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, ChartLine, crossed
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, ChartLine, on_curve
 from cpg_ros.analysis.atlas.row_job import AtlasRow, NONE
 from cpg_ros.common.errors import ShortRepr
 import numpy as np
@@ -185,8 +185,9 @@ def uncrossed_edges(chart: ParameterPlane, gait: str, sheet: GaitMap, curves: It
                for one, other in itertools.pairwise(columns))]
     for axis, one, other in pairs:
         here, there = chart.fraction(one), chart.fraction(other)
+        middle, reach = 0.5 * (here + there), float(np.abs(here - there).max())
         if sheet.label[one] != sheet.label[other] and not any(
-                crossed(curve, chart, here, there) for curve in own):
+                on_curve(curve, chart, middle, reach) for curve in own):
             low, high = ((chart.low + fraction * chart.size).tolist() for fraction in (here,
                                                                                        there))
             yield ChartLine(chart, (gait,), axis, low[1 - axis], low[axis], high[axis])

@@ -22,11 +22,16 @@ AUTO-07p and DDE-BIFTOOL do). For the delayed network Delta = i omega - A - B ex
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
 from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.dynamics.arclength import (
+    continue_along_tangents,
+    derivatives,
+    newton,
+    offsets,
+)
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import hopf_points
@@ -35,12 +40,12 @@ import numpy as np
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
-#: Newton's method: steps, and where it ends; differences for its matrix, in shares.
+#: Newton's method: steps, and where it ends; differences for its matrix, in fractions.
 NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
 
 
 class HopfCondition:
-    """Two real equations in (p1, p2, omega), the parameters in shares of their ranges."""
+    """Two real equations in (p1, p2, omega), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, mode: tuple[int, ...]) -> None:
         """Take the plane and the class whose root crosses."""
@@ -48,52 +53,24 @@ class HopfCondition:
 
     def values(self, fraction: np.ndarray) -> np.ndarray:
         """Return the real and the imaginary part of the determinant, shape (2,)."""
-        network = self.chart.at_share(fraction[:2])
+        network = self.chart.at_fractions(fraction[:2])
         block = block_at(network, equilibrium(network), self.mode)
         matrix = characteristic_matrix(1j * fraction[2], block.now, block.past, network.delay)[0]
         found = np.linalg.det(matrix)
         return np.array([found.real, found.imag])
 
-    def slopes(self, fraction: np.ndarray) -> np.ndarray:
-        """Return their derivatives, shape (2, 3)."""
-        return slopes(self.values, fraction, DIFFERENCE)
-
     def tangent(self, fraction: np.ndarray) -> np.ndarray:
         """Return the unit tangent of the curve, either way, shape (3,)."""
-        return np.linalg.svd(self.slopes(fraction))[2][-1]
+        return np.linalg.svd(derivatives(self.values, fraction, DIFFERENCE))[2][-1]
 
-    def corrected(self, fraction: np.ndarray,
-                  tangent: np.ndarray) -> tuple[np.ndarray, int] | None:
-        """Solve in the plane normal to a tangent; also how many steps it took; None if lost."""
-        for count in range(NEWTON):
-            try:
-                matrix = np.vstack([self.slopes(fraction), tangent])
-                move = np.linalg.solve(matrix, np.append(-self.values(fraction), 0.0))
-            except (np.linalg.LinAlgError, CpgError, ArithmeticError):
-                return None
-            fraction = fraction + move
-            if not np.abs(move).max() < 0.5:
-                return None
-            if np.abs(move).max() < EXACT:
-                return fraction, count
-        return None
-
-
-def slopes(values: Callable[[np.ndarray], Any], fraction: np.ndarray, difference: float
-           ) -> np.ndarray:
-    """Return the derivatives of a function by its arguments, from central differences.
-
-    Args:
-        values: of m numbers, or of one.
-        fraction: its argument, shape (n,).
-        difference: of the argument.
-
-    Returns:
-        Shape (m, n), or (n,) if the function has one number.
-
-    """
-    return np.array([(values(fraction + step) - values(fraction - step)) / (2.0 * difference)
-                     for step in difference * np.eye(fraction.size)]).T
+    def corrected(self, guess: np.ndarray, tangent: np.ndarray) -> np.ndarray | None:
+        """Solve in the plane normal to a tangent; None where Newton's method is lost."""
+        try:
+            return newton(
+                lambda fraction: np.append(self.values(fraction), tangent @ (fraction - guess)),
+                guess, steps=NEWTON, tolerance=EXACT, difference=DIFFERENCE, longest=0.5)
+        except (np.linalg.LinAlgError, CpgError, ArithmeticError):
+            return None
 
 
 def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> HopfCondition:
@@ -102,10 +79,10 @@ def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> Hopf
     Args:
         chart: the plane.
         gait: whose.
-        fraction: (p1, p2, omega), the parameters in shares of their ranges.
+        fraction: (p1, p2, omega), the parameters in fractions of their ranges.
 
     """
-    network = chart.at_share(fraction[:2])
+    network = chart.at_fractions(fraction[:2])
     conditions = [HopfCondition(chart, block.mode)
                   for block in blocks(network, equilibrium(network)) if block.gait == gait]
     return min(conditions, key=lambda one: float(np.abs(one.values(fraction)).max()))
@@ -150,7 +127,7 @@ class HopfStart(ShortRepr):
     Attributes:
         gait: whose.
         mode: its class.
-        fraction: (p1, p2, omega), the parameters in shares of their ranges.
+        fraction: (p1, p2, omega), the parameters in fractions of their ranges.
 
     """
 
@@ -188,9 +165,9 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     return found
 
 
-#: Steps in shares of the ranges, and points of a curve at most.
+#: Steps in fractions of the ranges, and points of a curve at most.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: A beginning this close to a curve, in shares of the ranges, lies on it. Two classes share a
+#: A beginning this close to a curve, in fractions of the ranges, lies on it. Two classes share a
 #: curve if a few points on it, so many, are solutions of both.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 
@@ -205,7 +182,7 @@ class Boundary(ShortRepr):
         gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
         codimension_two: points on it where a second condition holds.
-        losses: whether the gait is lost softly or hard at places on it where a multiplier of
+        losses: whether the loss is supercritical at points on it where a multiplier of
             stable orbits crosses the unit circle, other than by a fold.
 
     """
@@ -216,8 +193,12 @@ class Boundary(ShortRepr):
     codimension_two: tuple[CodimensionTwo, ...] = ()
     losses: tuple[LossOnCurve, ...] = ()
 
+    def fractions(self, chart: ParameterPlane) -> np.ndarray:
+        """Return the points in fractions of the ranges of a plane, shape (n, 2)."""
+        return np.asarray((self.points[:, :2] - chart.low) / chart.size)
+
     def __str__(self) -> str:
-        met = [name for name, soft in (('soft', True), ('hard', False))
+        met = [name for name, soft in (('supercritical', True), ('subcritical', False))
                if any(loss.soft is soft for loss in self.losses)]
         return (f'{self.kind} of {" and ".join(self.gaits)}'
                 + (f' ({" and ".join(met)})' if met else ''))
@@ -229,27 +210,17 @@ def _inside(fraction: np.ndarray) -> bool:
 
 
 def _continue_hopf(condition: HopfCondition, start: np.ndarray, way: float) -> list[np.ndarray]:
-    here, step = start, FIRST
-    tangent = way * condition.tangent(start)
-    found: list[np.ndarray] = []
-    while len(found) < MOST and step >= SHORTEST:
-        ahead = condition.corrected(here + step * tangent, tangent)
-        new = tangent if ahead is None else condition.tangent(ahead[0])
-        if ahead is None or abs(new @ tangent) < 0.95 or not _inside(ahead[0]):
-            # Beyond the edge, too: up to it by ever shorter steps.
-            step *= 0.5
-            continue
-        here, tangent = ahead[0], new * np.sign(new @ tangent)
-        found.append(here)
-        if len(found) > 5 and np.linalg.norm(here - start) < 0.5 * step:
-            break
-        if ahead[1] <= 4:
-            step = min(1.5 * step, LONGEST)
-    return found
+    def correct(guess: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        point = condition.corrected(guess, tangent)
+        return (None if point is None or not _inside(point) else
+                (point, condition.tangent(point)))
+
+    return [*continue_along_tangents(correct, start, way * condition.tangent(start),
+                                     (FIRST, SHORTEST, LONGEST), aligned=0.95, most=MOST)]
 
 
 @dataclass(eq=False)
-class _Followed:
+class _HopfCurve:
     gaits: list[str]
     modes: set[tuple[int, ...]]
     fractions: np.ndarray
@@ -262,7 +233,7 @@ class _Followed:
             condition = HopfCondition(chart, start.mode)
             for fraction in self.fractions[::max(1, len(self.fractions) // CHECKED)]:
                 exact = condition.corrected(fraction, condition.tangent(fraction))
-                if exact is None or np.abs(exact[0] - fraction).max() > SHARED:
+                if exact is None or np.abs(exact - fraction).max() > SHARED:
                     return False
             self.modes.add(start.mode)
         if start.gait not in self.gaits:
@@ -272,7 +243,7 @@ class _Followed:
 
 def curves_from(chart: ParameterPlane, starts: Iterable[HopfStart]) -> list[Boundary]:
     """Follow the curves of Hopf points through some; each is listed once, with all its gaits."""
-    curves: list[_Followed] = []
+    curves: list[_HopfCurve] = []
     for start in starts:
         if any(curve.holds(chart, start) for curve in curves):
             continue
@@ -280,9 +251,9 @@ def curves_from(chart: ParameterPlane, starts: Iterable[HopfStart]) -> list[Boun
         exact = condition.corrected(start.fraction, condition.tangent(start.fraction))
         if exact is None:
             continue
-        back, ahead = (_continue_hopf(condition, exact[0], way) for way in (-1.0, 1.0))
-        curves.append(_Followed([start.gait], {start.mode},
-                                np.array([*back[::-1], exact[0], *ahead])))
+        back, ahead = (_continue_hopf(condition, exact, way) for way in (-1.0, 1.0))
+        curves.append(_HopfCurve([start.gait], {start.mode},
+                                 np.array([*back[::-1], exact, *ahead])))
     low, size = np.append(chart.low, 0.0), np.append(chart.size, 1.0)
     return [Boundary('Hopf', tuple(curve.gaits), low + curve.fractions * size) for curve in curves]
 
@@ -300,26 +271,13 @@ def hopf_curves(chart: ParameterPlane, gaits: tuple[str, ...],
     return curves_from(chart, chain(*run(hopf_starts, [*lines_across(chart, gaits)])))
 
 
-def crossed(curve: Boundary, chart: ParameterPlane, here: np.ndarray, there: np.ndarray) -> bool:
-    """Whether a curve crosses between two neighbours, given in shares, or close to them."""
-    points = (curve.points[:, :2] - chart.low) / chart.size
-    middle, reach = 0.5 * (here + there), np.abs(here - there).max()
-    one, ahead = points[:-1], np.diff(points, axis=0)
-    if not len(ahead):
-        return bool(np.abs(points - middle).max() < reach)
-    fraction = np.clip(((middle - one) * ahead).sum(axis=1) / np.maximum(
-        (ahead**2).sum(axis=1), 1e-30), 0.0, 1.0)
-    return bool((np.abs(one + fraction[:, None] * ahead - middle).max(axis=1) < reach).any())
+def on_curve(curve: Boundary, chart: ParameterPlane, point: np.ndarray, reach: float) -> bool:
+    """Whether a point lies on a curve, up to a distance; both in fractions of the ranges."""
+    return bool((np.abs(offsets(curve.fractions(chart), point)).max(axis=1) < reach).any())
 
 
 def _on(curve: np.ndarray, start: np.ndarray) -> bool:
-    """Whether a point lies on a curve, between its points."""
-    if len(curve) < 2:
-        return bool(np.abs(curve - start).max() < SAME)
-    one, other = curve[:-1], curve[1:]
-    ahead = other - one
-    fraction = np.clip(((start - one) * ahead).sum(axis=1) / np.maximum(
-        (ahead**2).sum(axis=1), 1e-30), 0.0, 1.0)
-    gap = np.abs(one + fraction[:, None] * ahead - start)
+    """Whether a Hopf point, (p1, p2, omega), lies on a curve, between its points."""
+    gap = np.abs(offsets(curve, start))
     gap[:, 2] /= max(1.0, abs(start[2]))
     return bool((gap.max(axis=1) < SAME).any())

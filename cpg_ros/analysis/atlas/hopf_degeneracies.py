@@ -28,11 +28,12 @@ from itertools import pairwise
 import math
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition, slopes
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition
 from cpg_ros.common.errors import CpgError
+from cpg_ros.dynamics.arclength import newton
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
-from cpg_ros.dynamics.hopf import HopfPoint, ON_AXIS, SPARE
+from cpg_ros.dynamics.hopf import HopfPoint, ON_AXIS, SPARE, tracked_roots
 from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -40,7 +41,7 @@ from scipy.optimize import brentq
 
 # Where a curve of Hopf points ends inside the plane: Bogdanov-Takens and zero-Hopf points.
 
-#: How far from a curve's last point, in shares of the ranges, its end is looked for.
+#: How far from a curve's last point, in fractions of the ranges, its end is looked for.
 REACH = 0.03
 #: Newton's method: steps, where it ends, differences for its matrix, and what may be left.
 NEWTON, EXACT, DIFFERENCE, LEFT = 30, 1e-12, 1e-6, 1e-9
@@ -51,11 +52,11 @@ Equations = Callable[[np.ndarray], np.ndarray]
 
 
 class _End:
-    """Equations in (state, p1, p2, ...), the parameters in shares of their ranges."""
+    """Equations in (state, p1, p2, ...), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, symmetry: Symmetry, fraction: np.ndarray) -> None:
         self.chart, self.symmetry = chart, symmetry
-        network = chart.at_share(fraction[:2])
+        network = chart.at_fractions(fraction[:2])
         self.rest = equilibrium(network)
         self.moves = not odd(network) and network.at_rest() is None
         self.together = next(one for one in classes(network)
@@ -65,7 +66,7 @@ class _End:
     def _split(self, unknowns: np.ndarray) -> tuple[np.ndarray, Expansion]:
         """Return the rates of the state, where it moves, and the expansion about it."""
         fraction = unknowns[self.free:self.free + 2]
-        network = self.chart.at_share(fraction)
+        network = self.chart.at_fractions(fraction)
         if not self.moves:
             return np.zeros(0), Expansion(network, equilibrium(network))
         state = unknowns[:self.free]
@@ -93,19 +94,13 @@ def _determinant(block: Block, root: complex) -> complex:
 
 def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Apply Newton's method; return the solution and its largest residual, or None."""
-    unknowns = start
     try:
-        for _ in range(NEWTON):
-            move = np.linalg.solve(slopes(equations, unknowns, DIFFERENCE), equations(unknowns))
-            unknowns = unknowns - move
-            if not np.abs(move).max() < 1.0:
-                return None
-            if np.abs(move).max() < EXACT:
-                left = float(np.abs(equations(unknowns)).max())
-                return (unknowns, left) if left < LEFT else None
+        found = newton(equations, start, steps=NEWTON, tolerance=EXACT, difference=DIFFERENCE,
+                       longest=1.0)
+        left = math.inf if found is None else float(np.abs(equations(found)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
         return None
-    return None
+    return None if found is None or not left < LEFT else (found, left)
 
 
 def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
@@ -116,13 +111,13 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
         chart: the plane.
         gait: whose.
         mode: the class of the critical root.
-        fractions: points of the curve, (p1, p2, omega), the parameters in shares, shape (n, 3).
+        fractions: points of the curve, (p1, p2, omega), the parameters in fractions, shape (n, 3).
 
     """
     if len(fractions) < 3:
         return
     for last, before in ((fractions[0], fractions[1]), (fractions[-1], fractions[-2])):
-        network = chart.at_share(last[:2])
+        network = chart.at_fractions(last[:2])
         block = block_at(network, equilibrium(network), mode)
         end = _End(chart, block.symmetry, last)
         start = np.concatenate([end.rest[:end.free], last])
@@ -147,13 +142,13 @@ def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
                 and np.abs(fraction - last[:2]).max() < REACH)
 
 
-#: Share of the way between two points of a curve to which a zero is bracketed.
+#: Fraction of the way between two points of a curve to which a zero is bracketed.
 BRACKET = 1e-14
 #: At a pole a test function changes its sign, too; at a zero it is this small against both sides.
 VANISHED = 1e-5
 #: A Lyapunov coefficient this small against the curve's largest one is 0 but for rounding.
 ROUNDING = 1e-9
-#: Two points this close in shares of the ranges, with frequencies this close, are one.
+#: Two points this close in fractions of the ranges, with frequencies this close, are one.
 SAME = 1e-7
 #: A root's imaginary part this small against omega is that of a real one.
 REAL = 1e-6
@@ -173,7 +168,7 @@ class _Curve:
         """Return the Hopf point at (p1, p2, omega), and the blocks of all classes."""
         key = fraction.tobytes()
         if key not in self._known:
-            network, line = self.chart.at_share(fraction[:2]), self.chart.second.line
+            network, line = self.chart.at_fractions(fraction[:2]), self.chart.second.line
             rest = equilibrium(network)
             split = blocks(network, rest)
             block = next(block for block in split if block.mode == self.condition.mode)
@@ -182,7 +177,7 @@ class _Curve:
         return self._known[key]
 
     def between(self, one: np.ndarray, other: np.ndarray, way: float) -> np.ndarray:
-        """Return the curve's point at a share of the way between two of its points.
+        """Return the curve's point at a fraction of the way between two of its points.
 
         Raises:
             ArithmeticError: Newton's method has lost it.
@@ -192,7 +187,7 @@ class _Curve:
         found = self.condition.corrected(one + way * (other - one), tangent)
         if found is None:
             raise ArithmeticError('the curve is lost')
-        return found[0]
+        return found
 
     def zeros(self, test: Test, small: float) -> Iterator[np.ndarray]:
         """Yield the places at which a test function changes its sign through 0.
@@ -237,8 +232,7 @@ def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[Codimensi
         curve: of Hopf points, as ``hopf_curves`` returns it.
 
     """
-    fractions = np.column_stack([(curve.points[:, :2] - chart.low) / chart.size,
-                                 curve.points[:, 2]])
+    fractions = np.column_stack([curve.fractions(chart), curve.points[:, 2]])
     found: list[CodimensionTwo] = []
     for k, gait in enumerate(curve.gaits):
         condition = condition_of(chart, gait, fractions[len(fractions) // 2])
@@ -280,7 +274,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     small = ON_AXIS * max(1.0, float(curve.fractions[:, 2].max()))
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
-        count = _tracked_block([split[which] for _, split in points])
+        count = tracked_roots([split[which] for _, split in points], SPARE + 2)
 
         def others(fraction: np.ndarray, which: int = which, count: int = count) -> np.ndarray:
             point, split = curve.at(fraction)
@@ -296,13 +290,6 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
                 if root.imag > -REAL * place[2] or block.real:
                     _enter(found, _crossing(curve, gait, place, block, root), curve.chart)
     return found
-
-
-def _tracked_block(along: list[Block]) -> int:
-    """How many roots of a class can cross on the curve, the critical ones among them."""
-    if not any(one.past.any() for one in along):
-        return along[0].network.variables
-    return SPARE + 2 + max(len(one.right_of(0.0)) for one in along)
 
 
 def _crossing(curve: _Curve, gait: str, place: np.ndarray, block: Block, root: complex

@@ -25,11 +25,11 @@ from itertools import chain, pairwise
 
 from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, slopes
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, on_curve
 from cpg_ros.analysis.atlas.orbit_plane import OrbitPlane, spectrum, stability_losses
 from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.arclength import continue_along_tangents, derivatives, newton, NoOrbit
 from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.floquet import ATTRACTS
 import numpy as np
@@ -39,10 +39,10 @@ from scipy.optimize import brentq
 
 #: n of 1:n -> 2 cos(2 pi / n).
 SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
-#: Newton's method: steps, where it ends, differences for its matrix, all in shares.
+#: Newton's method: steps, where it ends, differences for its matrix, all in fractions.
 RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
-#: How far from a point of the curve a resonance may lie, in shares, and from how close to its sum
-#: an end is tried.
+#: Largest distance of a resonance from a point of the curve, in fractions, and difference from its
+#: sum within which an end is tried.
 REACH, CLOSE = 0.08, 0.5
 #: What product and sum may miss by, and resonances this close are one.
 LEFT, SAME = 1e-8, 1e-5
@@ -56,7 +56,7 @@ def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.n
         plane: its last orbit is that at the first point.
         part: number of the subspace of the pair.
         rank: how many larger multipliers that has.
-        fractions: points of the curve in shares of the ranges.
+        fractions: points of the curve in fractions of the ranges.
 
     """
     found: list[np.ndarray] = []
@@ -107,7 +107,8 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
     target = np.exp(2j * np.pi / n)
 
     def gaps(fraction: np.ndarray) -> np.ndarray:
-        some = spectrum(plane.orbit(fraction))[part]
+        plane.last = plane.orbit(fraction)
+        some = spectrum(plane.last)[part]
         one = complex(some[np.abs(some - target).argmin()])
         if abs(one.imag) > REAL * REAL:
             product, total = abs(one)**2, 2.0 * one.real
@@ -118,21 +119,15 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
         return np.array([product - 1.0, total - SUMS[n]])
 
     try:
-        for _ in range(RESONANCE_STEPS):
-            plane.last = plane.orbit(fraction)
-            move = np.linalg.solve(slopes(gaps, fraction, RESONANCE_DIFFERENCE), gaps(fraction))
-            fraction = fraction - move
-            if not np.abs(move).max() < REACH:
-                return None
-            if np.abs(move).max() < RESONANCE_TOLERANCE:
-                left = float(np.abs(gaps(fraction)).max())
-                return (fraction, left) if left < LEFT else None
+        found = newton(gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
+                       difference=RESONANCE_DIFFERENCE, longest=REACH)
+        left = np.inf if found is None else float(np.abs(gaps(found)).max())
     except (CpgError, np.linalg.LinAlgError, IndexError):
         return None
-    return None
+    return None if found is None or not left < LEFT else (found, left)
 
 
-#: Curves of a gait at most, points of each, steps in shares of the ranges.
+#: Curves of a gait at most, points of each, steps in fractions of the ranges.
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
 #: How well g is zero, differences for its slope, and Newton's steps.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
@@ -142,7 +137,7 @@ Distance = Callable[[np.ndarray], float]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Edge(ShortRepr):
-    """Two neighbours on the grid between which multipliers cross, in shares of the ranges."""
+    """Two neighbours on the grid between which multipliers cross, in fractions of the ranges."""
 
     here: np.ndarray
     there: np.ndarray
@@ -174,8 +169,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
     for edge in crossed:
         middle = 0.5 * (edge.here + edge.there)
         reach = np.abs(edge.here - edge.there).max()
-        known = [(one.points[:, :2] - chart.low) / chart.size for one in found]
-        if any(np.abs(points - middle).max(axis=1).min() < 1.5 * reach for points in known):
+        if any(on_curve(curve, chart, middle, 1.5 * reach) for curve in found):
             continue
         try:
             found += _through(chart, gait, edge)
@@ -189,7 +183,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
 def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]:
     plane = OrbitPlane(chart, gait)
     one, other = edge.here, edge.there
-    plane.last = solve_from_wave(chart.at_share(one), gait, edge.wave, edge.period)
+    plane.last = solve_from_wave(chart.at_fractions(one), gait, edge.wave, edge.period)
     before, after = spectrum(plane.last), spectrum(plane.orbit(other))
     for part, (left, right) in enumerate(zip(before, after, strict=True)):
         counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
@@ -209,16 +203,16 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
         crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
         kind = ('torus' if abs(crossing.imag) > REAL else
                 'branch point' if crossing.real > 0.0 else 'period doubling')
-        at_share = plane.last
+        crossing_orbit = plane.last
         ways, special = [], []
         for way in (-1.0, 1.0):
-            plane.last = at_share
+            plane.last = crossing_orbit
             ways.append([(new, plane.last) for new in _continue_edge(g, fraction, way)])
             if kind == 'torus':
-                plane.last = at_share
+                plane.last = crossing_orbit
                 along = [fraction, *(new for new, _ in ways[-1])]
                 special.append([*resonances(plane, part, rank, along)][::int(way)])
-        curve = [*ways[0][::-1], (fraction, at_share), *ways[1]]
+        curve = [*ways[0][::-1], (fraction, crossing_orbit), *ways[1]]
         yield Boundary(kind, (gait,), chart.low + np.array([new for new, _ in curve]) * chart.size,
                        tuple(chain(*special)),
                        tuple(stability_losses(plane, part, rank, curve)))
@@ -227,36 +221,29 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
 
 def _continue_edge(g: Distance, start: np.ndarray, way: float) -> Iterator[np.ndarray]:
     """Yield points of g = 0 from one on, until the plane ends or the orbit is lost."""
-    here, step, count = start, STEP, 0
-    normal = slopes(g, here, DIFFERENCE)
-    tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
-    while count < MOST and step > SHORTEST:
+    def correct(guess: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         try:
-            new, across = _onto(g, here + step * tangent, normal)
+            point, slope = _onto(g, guess, _normal(tangent))
         except (NoOrbit, np.linalg.LinAlgError):
-            step *= 0.5
-            continue
-        ahead = np.array([-across[1], across[0]]) / np.linalg.norm(across)
-        ahead *= np.sign(ahead @ tangent) or 1.0
-        if (ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step
-                or (new < 0.0).any() or (new > 1.0).any()):
-            # Beyond the edge, too: up to it by shorter steps.
-            step *= 0.5
-            continue
-        here, tangent, normal = new, ahead, across
-        yield here
-        count, step = count + 1, min(1.5 * step, STEP)
-        if count > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
-            break
+            return None
+        return None if (point < 0.0).any() or (point > 1.0).any() else (point, _normal(slope))
+
+    return continue_along_tangents(
+        correct, start, way * _normal(derivatives(g, start, DIFFERENCE)), (STEP, SHORTEST, STEP),
+        aligned=0.8, most=MOST)
+
+
+def _normal(vector: np.ndarray) -> np.ndarray:
+    """Return the unit vector a quarter turn ahead of one in the plane."""
+    return np.array([-vector[1], vector[0]]) / np.linalg.norm(vector)
 
 
 def _onto(g: Distance, fraction: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Apply Newton's method normal to the curve; return the point on it and the slope of g."""
+    """Apply Newton's method along a unit vector; return the point on it and the slope of g."""
     for _ in range(NEWTON):
         value = g(fraction)
         if abs(value) < EXACT:
-            return fraction, slopes(g, fraction, DIFFERENCE)
-        unit = normal / np.linalg.norm(normal)
-        along = (g(fraction + DIFFERENCE * unit) - value) / DIFFERENCE
-        fraction = fraction - value / along * unit
+            return fraction, derivatives(g, fraction, DIFFERENCE)
+        along = (g(fraction + DIFFERENCE * normal) - value) / DIFFERENCE
+        fraction = fraction - value / along * normal
     raise NoOrbit('the curve is lost')

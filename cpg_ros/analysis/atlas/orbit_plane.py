@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether a gait is lost softly or hard, at places on a curve where it loses stability."""
+"""Orbits over the plane of an atlas, and whether their losses of stability are supercritical."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,8 +34,7 @@ ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
     """Multipliers of each subspace, largest first; that of the class first, without 1."""
-    return [part[np.argsort(-np.abs(part), kind='stable')]
-            for part in subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)]
+    return subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)
 
 
 class OrbitPlane:
@@ -47,14 +46,14 @@ class OrbitPlane:
         self.last: Orbit | None = None
 
     def orbit(self, fraction: np.ndarray) -> Orbit:
-        """Solve at a point given in shares of the ranges.
+        """Solve at a point given in fractions of the ranges.
 
         Raises:
             NoOrbit: there is none beside the last one.
 
         """
         assert self.last is not None
-        found = solve_beside(self.chart.at_share(fraction), self.last)
+        found = solve_beside(self.chart.at_fractions(fraction), self.last)
         if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
             raise NoOrbit('the orbit has shrunk')
         return found
@@ -101,7 +100,7 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
         plane: of the curve.
         part: number of the subspace in which a multiplier crosses the unit circle.
         rank: how many larger ones that has.
-        curve: its points in shares of the ranges, and orbits beside them.
+        curve: its points in fractions of the ranges, and orbits beside them.
 
     """
     args = np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(curve)).astype(int))

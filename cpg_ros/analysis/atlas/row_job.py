@@ -20,23 +20,22 @@ from dataclasses import dataclass
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import ParameterPlane
+from cpg_ros.analysis.basin import basin
 from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.floquet import ATTRACTS, by_size, multipliers, sufficient_gain
 from cpg_ros.dynamics.fourier import orbit as collocation
-from cpg_ros.dynamics.fourier.floquet import SPAN, Variation
+from cpg_ros.dynamics.fourier.floquet import leading as fourier_leading
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.hopf import hopf_points
-from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
 from cpg_ros.dynamics.solve_orbit import solve_beside, solve_from_path, solve_orbit
-from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.dynamics.stability import RATE
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
-from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
 
 #: What is known of a gait at a point: no orbit, one that its own class leaves, one that attracts
 #: with a symmetry lock, one that attracts by itself.
@@ -45,9 +44,8 @@ NONE, UNSTABLE, LOCKED, STABLE = range(4)
 KEPT = 65
 #: Multipliers of a subspace that Arnoldi's method computes.
 LEADING = 4
-#: Random starts about rest: how many, how far, for how many periods, and how near to the orbit,
-#: over its range, a run has come that ends in it.
-STARTS, SCATTER, PERIODS, NEAR = 8, 1.0, 25, 0.15
+#: Random states from which the basin of an orbit is estimated.
+STARTS = 8
 #: Steps that a branch from a Hopf point may have; known orbits that are led to a point, and in
 #: how many steps.
 MOST, TRIED, STEPS = 60, 3, (1, 4)
@@ -102,7 +100,7 @@ class _Finder:
             if np.isclose(orbit.period, periods, rtol=1e-6).any():
                 continue
             periods.append(orbit.period)
-            judged = _judged(orbit)
+            judged = _assess(orbit)
             if best is None or judged['label'] > best[1]['label']:
                 best = orbit, judged
             if best[1]['label'] >= LOCKED:
@@ -114,7 +112,7 @@ class _Finder:
             orbit, judged = best
             point_data |= judged | {'wave': _wave(orbit)}
             if self.row.basin:
-                point_data['basin'] = basin(orbit, point_data['lock'])
+                point_data['basin'] = basin(orbit, STARTS, gain=point_data['lock']).fraction
         return point_data
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
@@ -190,14 +188,14 @@ class _Finder:
         return self._branches
 
 
-def _judged(orbit: Orbit) -> dict[str, Any]:
+def _assess(orbit: Orbit) -> dict[str, Any]:
     """Return the stability of an orbit, and its numbers."""
     within, leading, unstable = leading_multipliers(orbit)
     attracts = leading < ATTRACTS
     return {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
             'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
             'leading': leading, 'leading_within': within, 'unstable': unstable,
-            'lock': 0.0 if attracts else lock_of(orbit)}
+            'lock': 0.0 if attracts else sufficient_gain(orbit, RATE)}
 
 
 def _proper(orbit: Orbit) -> Iterator[Orbit]:
@@ -227,12 +225,6 @@ def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period
     return orbit
 
 
-def lock_of(orbit: Orbit) -> float:
-    """Return the gain of the symmetry lock that the generator would choose, 1/model time."""
-    bound = orbit.network.sufficient_gain(RATE)
-    return float(stability(orbit).args if bound is None else bound)
-
-
 def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
     """Return the largest multiplier in the class, the largest of all, and how many lie outside.
 
@@ -246,7 +238,7 @@ def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
 
 def subspace_multipliers(orbit: Orbit, exact: float = 1e-6, trivial: float = 1e-4,
                          halvings: int = 4) -> list[np.ndarray]:
-    """Return the multipliers of each subspace; those of the class first, without the trivial one.
+    """Return multipliers by subspace, largest first; the class's without the trivial one first.
 
     Args:
         orbit: with a delay, the largest ones of each subspace are computed by Arnoldi's method.
@@ -256,57 +248,5 @@ def subspace_multipliers(orbit: Orbit, exact: float = 1e-6, trivial: float = 1e-
 
     """
     if not isinstance(orbit, FourierOrbit):
-        spectrum = multipliers(orbit)
-        return [spectrum.within, *spectrum.parts]
-    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
-    for halving in range(halvings):
-        equation = Variation(orbit, n * 2**halving)
-        inside = _largest(equation, equation.inside, exact)
-        if np.abs(inside - 1.0).min() <= trivial:
-            break
-    return [np.delete(inside, np.abs(inside - 1.0).argmin()),
-            *(_largest(equation, part, exact) for part in equation.outside)]
-
-
-def _largest(equation: Variation, columns: np.ndarray, exact: float) -> np.ndarray:
-    """Return the largest multipliers in a subspace of the variational equation."""
-    size, later = equation.period_map(columns, 0.0)
-    if size > 3 * LEADING + 24:
-        operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
-        start = np.random.default_rng(0).standard_normal(size)
-        try:
-            return eigs(operator, k=LEADING, ncv=20, tol=exact, v0=start, maxiter=15,
-                        return_eigenvectors=False)
-        except ArpackError:
-            pass  # all of them, then
-    return np.linalg.eigvals(later(np.eye(size)))
-
-
-def basin(orbit: Orbit, lock: float) -> float:
-    """Return the share of random starts that end in an orbit, with the lock that it needs."""
-    network = orbit.network
-    rng = np.random.default_rng(0)
-    rest = orbit(np.arange(16) / 16 * orbit.period).mean(axis=0)
-    starts = rest + SCATTER * rng.standard_normal((STARTS, network.components)) * max(
-        float(orbit.levels[0, 0, 1]), 0.1)
-    step = network.step
-    run = simulate(network, starts, PERIODS * orbit.period, step,
-                   lock=(lock, orbit.symmetry) if lock else None, progress=False)
-    last = max(2, int(1.2 * orbit.period / step))
-    theta = np.arange(64) / 64
-    wanted = orbit(theta * orbit.period)
-    size = np.ptp(wanted[:, 0])
-    ended = 0
-    for x in run.x:
-        tail = x[-last:]
-        if not np.isfinite(tail).all():
-            continue
-        # Where the last cycle peaks as the orbit does.
-        peak = int(tail[:len(tail) - int(orbit.period / step), 0].argmax()) if len(
-            tail) > orbit.period / step else 0
-        places = peak + np.round(theta * orbit.period / step).astype(int)
-        inside = places < len(tail)
-        seen = tail[places[inside]]
-        gaps = [np.abs(np.roll(wanted, -k, axis=0)[inside] - seen).max() for k in range(64)]
-        ended += bool(min(gaps) < NEAR * size)
-    return float(ended) / STARTS
+        return multipliers(orbit).subspaces
+    return [by_size(part) for part in fourier_leading(orbit, LEADING, exact, trivial, halvings)]

@@ -12,28 +12,34 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Buono & Golubitsky (2001): the six primary gaits, Tables 1, 2, 4 and 13, section 7, Figure 2.
+"""Buono & Golubitsky (2001): the primary gaits, sections 2.3, 3 and 7, and appendix A.
 
 Phases are measured on simulations of all eight cells that start off the gait and run free of any
-lock; they are not prescribed to a solver.
+lock; they are not prescribed to a solver. Results on groups come from an exhaustive search.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
+from itertools import permutations
 
-from cpg_ros.analysis.papers.rhythm import (
+from cpg_ros.analysis.papers.row import (
     cell_constants,
+    Citation,
     disturbed_start,
+    Picture,
     primary_gaits,
+    ReproducedRow,
     Rhythm,
     rhythm,
+    trajectories,
 )
-from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow, trajectories
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
-from cpg_ros.networks.symmetry import label, Z4_Z2
+from cpg_ros.networks.symmetry import admissible_pairs, GAITS, label, Permutation, Z4_Z2
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
@@ -194,3 +200,345 @@ def constants() -> Iterator[ReproducedRow | Picture]:
                         note=f'read off the compiled rates, with i = {CURRENT}')
     yield at.formula('tau ten widths v4 from v3, over its least', 'cosh(5)', np.cosh(5.0),
                      found['tau_far'])
+
+
+Subgroup = frozenset[Permutation]
+
+
+def cycles(text: str, cells: int) -> Permutation:
+    """Read a permutation written in cycles of cells from 1, such as '(1 2)(3 8)'."""
+    image = list(range(cells))
+    for cycle in text.strip('()').split(')('):
+        members = [int(part) - 1 for part in cycle.split()]
+        for here, there in zip(members, members[1:] + members[:1], strict=True):
+            image[here] = there
+    return tuple(image)
+
+
+def after(outer: Permutation, inner: Permutation) -> Permutation:
+    """Return the product: first the inner one."""
+    return tuple(outer[i] for i in inner)
+
+
+def inverse(element: Permutation) -> Permutation:
+    """Return the inverse."""
+    return tuple(sorted(range(len(element)), key=element.__getitem__))
+
+
+def generated(*generators: Permutation) -> Subgroup:
+    """Return the subgroup that permutations generate."""
+    found = {tuple(range(len(generators[0])))}
+    waiting = list(found)
+    while waiting:
+        element = waiting.pop()
+        for generator in generators:
+            image = after(generator, element)
+            if image not in found:
+                found.add(image)
+                waiting.append(image)
+    return frozenset(found)
+
+
+def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
+    """``g S g^-1``."""
+    return frozenset(after(after(by, one), inverse(by)) for one in subgroup)
+
+
+@cache
+def all_subgroups(group: Subgroup) -> frozenset[Subgroup]:
+    """Every subgroup; those of D4 need two generators at most, and no other group is used."""
+    return frozenset(generated(a, b) for a in group for b in group)
+
+
+def cyclic(h: Subgroup, k: Subgroup) -> bool:
+    """Whether k is normal in h with a cyclic quotient."""
+    return k <= h and all(conjugate(g, k) == k for g in h) and any(
+        generated(g, *k) == h for g in h)
+
+
+#: Section 3's D4, and the names of section 2.3.
+OMEGA, KAPPA = cycles('(1 3 5 7)(2 4 6 8)', 8), cycles('(1 2)(3 8)(5 6)(7 4)', 8)
+HALF = after(OMEGA, OMEGA)
+D4 = generated(OMEGA, KAPPA)
+ONE = tuple(range(8))
+NAMES = {'D4': D4, 'D2s': generated(KAPPA, HALF), 'D2p': generated(after(KAPPA, OMEGA), HALF),
+         'Z4': generated(OMEGA), '1': generated(ONE), 'Z2s': generated(KAPPA),
+         'Z2p': generated(after(KAPPA, OMEGA)), 'Z2': generated(HALF)}
+TYPES = ('Z4 in D4', 'D2p in D4', 'D2s in D4', 'Z2 in Z4', 'Z2 in D2p', 'Z2p in D2p',
+         'Z2 in D2s', 'Z2s in D2s', '1 in Z4', '1 in Z2', '1 in Z2p', '1 in Z2s')
+
+
+def _name(subgroup: Subgroup) -> str:
+    return next(name for name, one in NAMES.items()
+                if any(conjugate(g, one) == subgroup for g in D4))
+
+
+def solutions() -> list[tuple[Subgroup, Subgroup]]:
+    """All pairs (K, H) of D4 that Theorem 2.2 admits with H larger than K."""
+    every = all_subgroups(D4)
+    return [(k, h) for h in every for k in every if k < h and cyclic(h, k)]
+
+
+def dihedral() -> Iterator[ReproducedRow | Picture]:
+    """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
+    at = Citation(AUTHORS, 'section 2.3')
+    classes = {frozenset(conjugate(g, one) for g in D4) for one in all_subgroups(D4)}
+    yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))
+    types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4)
+             for k, h in solutions()}
+    yield at.number('types of periodic solutions with H larger than K', '12', len(types))
+    found = {f'{_name(k)} in {_name(h)}' for k, h in solutions()}
+    yield at.word('those types', ', '.join(TYPES), ', '.join(
+        [name for name in TYPES if name in found] + sorted(found - set(TYPES))))
+    quarter = {f'{_name(k)} in {_name(h)}' for k, h in solutions() if len(h) == 4 * len(k)}
+    yield at.word('those with a quarter-period phase shift', '1 in Z4',
+                  ', '.join(sorted(quarter)))
+    at = Citation(AUTHORS, 'Theorem 3.2')
+    yield at.holds('kappa omega = omega^3 kappa',
+                   after(KAPPA, OMEGA) == after(after(HALF, OMEGA), KAPPA))
+    half = [(k, h) for k, h in solutions()
+            if KAPPA in h - k and len(k) > 1 and after(KAPPA, KAPPA) in k]
+    yield at.number('types with kappa as a half-period shift and a spatial symmetry', '3',
+                    len(half), erratum=(15, '4'),
+                    note='K in H: ' + ', '.join(sorted(f'{_name(k)} in {_name(h)}'
+                                                       for k, h in half)))
+    for k, h, phase in ((NAMES['D2p'], D4, '0'), (NAMES['Z2'], NAMES['D2s'], '0'),
+                        (generated(after(KAPPA, HALF)), NAMES['D2s'], '1/2')):
+        yield at.phases(f'{_name(k)} in {_name(h)}: phase of RH (cell 5) against LH (cell 1)',
+                        phase, [0.0 if HALF in k else 0.5 * (HALF in h)],
+                        note='H/K is Z2: what is in H but not in K shifts by half a period')
+
+
+#: Figure 4: the largest subgroups of each, up to conjugation.
+FIGURE_4 = {'D4': 'D2s, D2p, Z4', 'D2s': 'Z2s, Z2', 'D2p': 'Z2p, Z2', 'Z4': 'Z2', 'Z2s': '1',
+            'Z2p': '1', 'Z2': '1'}
+
+
+def lattice() -> Iterator[ReproducedRow | Picture]:
+    """Figure 4: the subgroups of D4, and which contain which."""
+    for name, printed in FIGURE_4.items():
+        below = [one for one in all_subgroups(D4) if one < NAMES[name]]
+        largest = {_name(one) for one in below if not any(one < other for other in below)}
+        yield Citation(AUTHORS, 'Figure 4').word(
+            f'largest subgroups of {name}, up to conjugation', printed,
+            ', '.join([one for one in printed.split(', ') if one in largest]
+                      + sorted(largest - set(printed.split(', ')))))
+
+
+def four_cells() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 3.1: conjugation by the walk's four-cycle."""
+    at = Citation(AUTHORS, 'Theorem 3.1')
+    turn = cycles('(1 3 2 4)', 4)
+    for one, other in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
+                       ('(1 2)(3 4)', '(1 2)(3 4)')):
+        image = after(after(turn, cycles(one, 4)), inverse(turn))
+        yield at.word(f'(1 3 2 4) {one} (1 3 2 4)^-1', other, _written(image))
+
+
+def _written(element: Permutation) -> str:
+    """Return a permutation in cycles from 1, without the cells it leaves in place."""
+    left, text = [i for i in range(len(element)) if element[i] != i], ''
+    while left:
+        cycle = [left[0]]
+        while element[cycle[-1]] != cycle[0]:
+            cycle.append(element[cycle[-1]])
+        text += f'({" ".join(str(i + 1) for i in cycle)})'
+        left = [i for i in left if i not in cycle]
+    return text
+
+
+@cache
+def assignments() -> tuple[tuple[str, ...], ...]:
+    """All assignments F of two cells to each leg with F(1) = LH that satisfy eq. 3.2.
+
+    Cells that share a leg are carried by every symmetry to cells that share one.
+    """
+    symmetries = list(Z4_Z2.elements.values())
+    found = []
+    for partition in _pairings(tuple(range(8))):
+        pairs = {frozenset(pair) for pair in partition}
+        if all(frozenset(g[i] for i in pair) in pairs for g in symmetries for pair in pairs):
+            own = next(pair for pair in partition if 0 in pair)
+            others = [pair for pair in partition if pair != own]
+            for legs in permutations(LEGS[1:]):
+                leg = {i: name for pair, name in zip((own, *others), (LEGS[0], *legs),
+                                                     strict=True) for i in pair}
+                found.append(tuple(leg[i] for i in range(8)))
+    return tuple(found)
+
+
+def _pairings(cells: tuple[int, ...]) -> Iterator[list[tuple[int, int]]]:
+    if not cells:
+        yield []
+        return
+    first, rest = cells[0], cells[1:]
+    for other in rest:
+        for more in _pairings(tuple(i for i in rest if i != other)):
+            yield [(first, other), *more]
+
+
+#: Table 4: legs of cells 1 to 8.
+TABLE_4 = {'zig-zag': 'LH RH LF RF LH RH LF RF', 'criss-cross': 'LH RH LF RF RH LH RF LF'}
+#: Table 3.
+TABLE_3 = 'LH RH LF RF LF RF LH RH'
+
+
+def legs() -> Iterator[ReproducedRow | Picture]:
+    """Theorem 3.3, Tables 3 and 4."""
+    at = Citation(AUTHORS, 'Theorem 3.3')
+    allowed = assignments()
+    yield at.number('assignments with F(1) = LH and eq. 3.2, no more asked', '2', len(allowed),
+                    erratum=(16, '18'))
+    proven = [' '.join(F) for F in allowed if F[1:4] == LEGS[1:]]
+    yield at.number('assignments if also F(2) = RH, F(3) = LF, F(4) = RF, as in the proof', '2',
+                    len(proven))
+    at = Citation(AUTHORS, 'Table 4')
+    names = dict(zip(TABLE_4, sorted(proven, key=lambda F: F.split()[4] != 'LH'), strict=True))
+    for name, printed in TABLE_4.items():
+        yield at.word(f'legs of cells 1 to 8, {name} network', printed, names[name])
+    shared = TABLE_3.split()
+    pairs = {frozenset(i for i in range(8) if shared[i] == leg) for leg in LEGS}
+    kept = all(frozenset(g[i] for i in pair) in pairs
+               for g in Z4_Z2.elements.values() for pair in pairs)
+    yield Citation(AUTHORS, 'Table 3').holds(
+        'the assignment of Table 3 is none that eq. 3.2 allows', not kept)
+
+
+# Buono & Golubitsky (2001), appendix A: Theorem A.1 with its conditions, by computation.
+
+#: Points of Fix(K) at random, and what is 0.
+POINTS, ZERO = 400, 1e-9
+#: Names of the conditions, in the order of the paper.
+CONDITIONS = ('A.2', 'A.3', 'A.5', 'A.6')
+#: A multiplier this far from the unit circle belongs to a hyperbolic orbit.
+HYPERBOLIC = 1e-3
+
+Representation = Callable[[Permutation], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Action:
+    """A finite group that acts on R^n by orthogonal matrices."""
+
+    group: Subgroup
+    matrix: Representation
+
+    def fixed(self, subgroup: Subgroup) -> np.ndarray:
+        """Return an orthonormal basis of Fix(subgroup), shape (n, dimension)."""
+        projector = np.mean([self.matrix(g) for g in subgroup], axis=0)
+        values, vectors = np.linalg.eigh(0.5 * (projector + projector.T))
+        basis: np.ndarray = vectors[:, values > 0.5]
+        return basis
+
+    def normaliser(self, subgroup: Subgroup) -> Subgroup:
+        """Return N(subgroup)."""
+        return frozenset(g for g in self.group if conjugate(g, subgroup) == subgroup)
+
+    def failing(self, k: Subgroup, h: Subgroup) -> list[str]:
+        """Return which of the conditions A.2, A.3, A.5 and A.6 a pair does not meet."""
+        basis = self.fixed(k)
+        points = basis @ np.random.default_rng(0).standard_normal((basis.shape[1], POINTS))
+        isotropy = all(np.abs(self.matrix(g) @ points - points).max() > ZERO
+                       for g in self.group - k)
+        dimension = basis.shape[1]
+        met = {'A.2': isotropy, 'A.3': dimension >= 2,
+               'A.5': isotropy and self._keeps_a_component(k, h, basis, points),
+               'A.6': dimension != 2 or h in (k, self.normaliser(k))}
+        return [name for name in CONDITIONS if not met[name]]
+
+    def _keeps_a_component(self, k: Subgroup, h: Subgroup, basis: np.ndarray, points: np.ndarray
+                           ) -> bool:
+        """Whether h fixes a component of Fix(K) - L_K, which only hyperplanes divide."""
+        normals = []
+        for g in self.group - k:
+            # (g - 1) on Fix(K) has rank 1 where Fix(g) meets it in a hyperplane.
+            _, sizes, rows = np.linalg.svd((self.matrix(g) - np.eye(len(basis))) @ basis)
+            if (sizes > ZERO).sum() == 1:
+                normals.append(basis @ rows[0])
+        if not normals:
+            return True
+        signs = np.sign(np.array(normals) @ points)
+        same = np.ones(points.shape[1], dtype=bool)
+        for g in h:
+            same &= (np.sign(np.array(normals) @ (self.matrix(g) @ points)) == signs).all(axis=0)
+        return bool(same.any())
+
+
+def of_cells(group: Subgroup, variables: int) -> Action:
+    """Return how permutations act on cells with some variables."""
+    def matrix(g: Permutation) -> np.ndarray:
+        found: np.ndarray = np.kron(np.eye(variables), np.eye(len(g))[np.argsort(g)])
+        return found
+
+    return Action(group, matrix)
+
+
+def _quadruped_pairs() -> list[tuple[Subgroup, Subgroup]]:
+    named = Z4_Z2.elements
+    return [(frozenset(named[name] for name in pair.k), frozenset(named[name] for name in pair.h))
+            for pair in admissible_pairs(Z4_Z2)]
+
+
+def conditions() -> Iterator[ReproducedRow | Picture]:
+    """Theorem A.1: conditions A.2 to A.6 for cells with two variables, and the example."""
+    at = Citation(AUTHORS, 'Theorem A.1')
+    pairs = _quadruped_pairs()
+    every = frozenset(Z4_Z2.elements.values())
+    dihedral = [(k, h) for k in all_subgroups(D4) for h in all_subgroups(D4) if cyclic(h, k)]
+    for name, group, some in (('Z4 x Z2', every, pairs), ('D4', D4, dihedral)):
+        action = of_cells(group, 2)
+        failing = [set(action.failing(k, h)) for k, h in some]
+        for condition in CONDITIONS:
+            yield at.holds(f'{name}, eight cells with two variables: all pairs with cyclic H/K '
+                           f'meet ({condition})',
+                           not any(condition in one for one in failing),
+                           note=f'{len(some)} pairs')
+        gaps = [action.fixed(k).shape[1] - action.fixed(generated(g, *k)).shape[1]
+                for k, _ in some for g in group - k]
+        yield Citation(AUTHORS, 'eq. A.7').holds(
+            f'{name}: a further symmetry takes at least two dimensions from Fix(K)',
+            min(gaps) >= 2, note=f'at least {min(gaps)}')
+        full = [action.fixed(k).shape[1] == 2 for k, _ in some]
+        yield Citation(AUTHORS, 'appendix A').holds(
+            f'{name}: dim Fix(K) = 2 only where K is the whole group',
+            all(len(k) == len(group) for (k, _), two in zip(some, full, strict=True) if two))
+    turn = (1, 2, 3, 0)
+    z4 = generated(turn)
+
+    def rotation(g: Permutation) -> np.ndarray:
+        angle = 0.5 * np.pi * g[0]
+        return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+    half = generated(tuple(turn[i] for i in turn))
+    yield Citation(AUTHORS, 'eq. A.6').word(
+        'conditions that H = Z2, K = 1 of Z4 acting on the plane by rotations does not meet',
+        'A.6', ', '.join(Action(z4, rotation).failing(generated(tuple(range(4))), half)))
+
+
+def one_variable() -> Iterator[ReproducedRow | Picture]:
+    """Section 4: no robust trot with one-dimensional cells, unless there is a delay."""
+    at = Citation(AUTHORS, 'section 4')
+    every, named = frozenset(Z4_Z2.elements.values()), Z4_Z2.elements
+    action = of_cells(every, 1)
+    failing = {}
+    for gait, (j, k) in GAITS.items():
+        shifts = {name: (j * a + 2 * k * b) % 4 for name, (a, b) in _exponents().items()}
+        spatial = frozenset(named[name] for name, shift in shifts.items() if not shift)
+        failing[gait] = action.failing(spatial, every)
+    ruled_out = ', '.join(gait for gait in GAITS if failing[gait])
+    yield at.holds('robust trots cannot occur with one-dimensional cells, by Theorem A.1',
+                   bool(failing['trot']),
+                   note=f'({", ".join(failing["trot"])}) is not met; ruled out: {ruled_out}')
+    network = Delayed.presets()['liu2024_trot'].network
+    orbit = solve_orbit(network, 'trot')
+    found = multipliers(orbit)
+    gap = float(np.abs(np.abs(np.concatenate([found.within, found.transverse])) - 1.0).min())
+    yield at.holds('a delay escapes that: one-dimensional cells have a hyperbolic trot with it',
+                   network.variables == 1 and orbit.residual < 1e-8 and gap > HYPERBOLIC,
+                   note=f'Liu & Zhang (2024), period {orbit.period:.4f}, residual '
+                        f'{orbit.residual:.0e}; the theorem is on ordinary differential equations')
+
+
+def _exponents() -> dict[str, tuple[int, int]]:
+    """Name of an element of Z4 x Z2 -> its exponents of omega and kappa."""
+    return {name: (element[0] // 2, element[0] % 2) for name, element in Z4_Z2.elements.items()}

@@ -18,8 +18,15 @@ import cmath
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from cpg_ros.analysis.papers.rhythm import primary_gaits, rhythm
-from cpg_ros.analysis.papers.row import Citation, Paper, Picture, ReproducedRow, trajectories
+from cpg_ros.analysis.papers.row import (
+    Citation,
+    Paper,
+    Picture,
+    primary_gaits,
+    ReproducedRow,
+    rhythm,
+    trajectories,
+)
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import first_hopf, HopfPoint, NormalForm

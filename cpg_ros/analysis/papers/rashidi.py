@@ -17,13 +17,16 @@
 from collections.abc import Iterator
 from functools import cache
 
-from cpg_ros.analysis.papers.rhythm import cell_constants, disturbed_start, Rhythm, rhythm
 from cpg_ros.analysis.papers.row import (
+    cell_constants,
     Citation,
+    disturbed_start,
     Paper,
     PHASE,
     Picture,
     ReproducedRow,
+    Rhythm,
+    rhythm,
     trajectories,
 )
 from cpg_ros.dynamics.floquet import multipliers
@@ -244,7 +247,7 @@ def secondary() -> Iterator[ReproducedRow | Picture]:
             yield from _table_5(gait, seen)
         if gait in NOT_REACHED:
             found = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
-            reached = seen.gait == gait and found.leading < 1.0
+            reached = seen.gait == gait and found.attracts
             yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),

@@ -202,21 +202,29 @@ class Variation:
         size, later = self.period_map(columns, gain)
         return np.linalg.eigvals(later(np.eye(size)))
 
-    def largest(self, which: int, gain: float, exact: float) -> float:
-        """Return the modulus of the largest in a subspace outside, by Arnoldi's method if many."""
-        size, later = self.period_map(self.outside[which], gain)
+    def leading(self, columns: np.ndarray, gain: float, count: int, exact: float) -> np.ndarray:
+        """Return the largest multipliers in a subspace, by Arnoldi's method where there are many.
+
+        Args:
+            columns: as of march.
+            gain: as of march.
+            count: number of multipliers, at least; all where there are few.
+            exact: relative tolerance of Arnoldi's method.
+
+        """
+        size, later = self.period_map(columns, gain)
         if size > FEW:
             arpack = scipy.sparse.linalg
             operator = arpack.LinearOperator((size, size),
                                              matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
             # The last gain's answer is a good start.
-            start = self._vectors.get(which, np.random.default_rng(0).standard_normal(size))
+            start = self._vectors.get(id(columns), np.random.default_rng(0).standard_normal(size))
             with suppress(arpack.ArpackError):
-                found, vectors = arpack.eigs(operator, k=2, ncv=24, tol=exact, v0=start,
+                found, vectors = arpack.eigs(operator, k=count, ncv=24, tol=exact, v0=start,
                                              maxiter=20)
-                self._vectors[which] = vectors.real.sum(axis=1)
-                return float(np.abs(found).max())
-        return float(np.abs(np.linalg.eigvals(later(np.eye(size)))).max())
+                self._vectors[id(columns)] = vectors.real.sum(axis=1)
+                return np.asarray(found)
+        return np.linalg.eigvals(later(np.eye(size)))
 
 
 def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
@@ -235,18 +243,43 @@ def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]
 def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
     """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
     equation = variation(orbit)[0]
-    return max((equation.largest(which, gain, exact) for which in range(len(equation.outside))),
-               default=0.0)
+    return max((float(np.abs(equation.leading(part, gain, 2, exact)).max())
+                for part in equation.outside), default=0.0)
+
+
+def leading(orbit: FourierOrbit, count: int, exact: float, trivial: float, halvings: int
+            ) -> list[np.ndarray]:
+    """Return the largest multipliers of each subspace, the class's without the trivial one first.
+
+    Args:
+        orbit: of a network with a delay.
+        count: number of multipliers of each subspace.
+        exact: relative tolerance of Arnoldi's method.
+        trivial: error of the trivial multiplier above which the elements are halved.
+        halvings: of the elements, at most.
+
+    """
+    equation, inside = _resolved(orbit, trivial, halvings, lambda equation: equation.leading(
+        equation.inside, 0.0, count, exact))
+    return [np.delete(inside, np.abs(inside - 1.0).argmin()),
+            *(equation.leading(part, 0.0, count, exact) for part in equation.outside)]
 
 
 @lru_cache(maxsize=4)
 def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
     """Return the variational equation, fine enough, and the multipliers within the class."""
+    return _resolved(orbit, TRIVIAL, HALVINGS, lambda equation: equation.multipliers(
+        equation.inside, 0.0))
+
+
+def _resolved(orbit: FourierOrbit, trivial: float, halvings: int,
+              solve: Callable[[Variation], np.ndarray]) -> tuple[Variation, np.ndarray]:
+    """Return the variational equation on elements that resolve the multiplier 1, and solve's."""
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
-    for halving in range(HALVINGS):
+    for halving in range(halvings):
         equation = Variation(orbit, n * 2**halving)
-        within = equation.multipliers(equation.inside, 0.0)
-        if np.abs(within - 1.0).min() <= TRIVIAL:
+        within = solve(equation)
+        if np.abs(within - 1.0).min() <= trivial:
             break
     return equation, within
 

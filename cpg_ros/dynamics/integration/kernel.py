@@ -383,7 +383,7 @@ _maker: Callable[[type[Network]], Kernels] = numba_kernels
 
 
 def use(maker: Callable[[type[Network]], Kernels]) -> None:
-    """Let others than numba make the kernels from now on, in all of this process."""
+    """Set the kernel backend of this process."""
     global _maker
     _maker = maker
 

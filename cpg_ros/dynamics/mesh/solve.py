@@ -413,8 +413,8 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                ) -> MeshOrbit | None:
-    found = settle(network, symmetry, start, period)
-    return None if found is None else _accepted(from_path(network, symmetry, *found))
+    cycle = settle(network, symmetry, start, period)
+    return None if cycle is None else _accepted(from_path(network, symmetry, cycle, cycle.period))
 
 
 def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:

@@ -23,15 +23,12 @@ import subprocess
 import sys
 
 from cpg_ros.analysis.papers import (
+    buono_gaits,
     buono_hopf,
     buono_linear,
-    buono_symmetry,
     liu_zhang,
     rashidi,
     reproduce,
-)
-from cpg_ros.analysis.papers import (
-    buono_hopf as buono_proofs,
 )
 from cpg_ros.analysis.papers.reproduction import ERRATA, PAPERS
 from cpg_ros.analysis.papers.row import Citation
@@ -123,11 +120,11 @@ def test_every_erratum_is_in_the_documentation():
 @pytest.mark.parametrize('gait', ['walk', 'bound'])
 def test_the_matrix_of_the_genericity_condition_predicts_the_branch(gait):
     """By the implicit function theorem gamma'(alpha) solves it; beside it Hopf points tell."""
-    matrix, free = buono_proofs.genericity_matrix(gait), buono_proofs.PROOFS[gait][1]
+    matrix, free = buono_hopf.genericity_matrix(gait), buono_hopf.PROOFS[gait][1]
     x, y = matrix[:2, 2]
     # F, G and E by alpha: in E only the bound has it, as nu - 2 alpha + 2 gamma.
     slope = np.linalg.solve(matrix, -np.array([x, y, {'walk': 0.0, 'bound': -2.0}[gait]]))[2]
-    start = buono_proofs._on_line(gait).network
+    start = buono_hopf._on_line(gait).network
     gammas = []
     for off in (-1e-4, 1e-4):
         alpha = start.alpha + off
@@ -141,10 +138,10 @@ def test_theorem_a1_lets_one_variable_have_no_trot_and_two_have_it():
     """K of the trot is Z4(omega kappa): with one variable Fix(K) is a plane cut by a line."""
     named = Z4_Z2.elements
     every = frozenset(named.values())
-    k = buono_symmetry.generated(named['omega kappa'])
-    assert buono_symmetry.of_cells(every, 1).fixed(k).shape == (8, 2)
-    assert buono_symmetry.of_cells(every, 1).failing(k, every) == ['A.5']
-    assert buono_symmetry.of_cells(every, 2).failing(k, every) == []
+    k = buono_gaits.generated(named['omega kappa'])
+    assert buono_gaits.of_cells(every, 1).fixed(k).shape == (8, 2)
+    assert buono_gaits.of_cells(every, 1).failing(k, every) == ['A.5']
+    assert buono_gaits.of_cells(every, 2).failing(k, every) == []
 
 
 def test_the_page_needs_no_other_file(report):
@@ -292,6 +289,6 @@ def test_it_is_installed_as_an_executable():
 
 def test_groups_are_those_known():
     # D4 has ten subgroups; 8! / 2!^4 / 4! = 105 ways to pair eight cells.
-    assert len(buono_symmetry.D4) == 8
-    assert len(buono_symmetry.all_subgroups(buono_symmetry.D4)) == 10
-    assert sum(1 for _ in buono_symmetry._pairings(tuple(range(8)))) == 105
+    assert len(buono_gaits.D4) == 8
+    assert len(buono_gaits.all_subgroups(buono_gaits.D4)) == 10
+    assert sum(1 for _ in buono_gaits._pairings(tuple(range(8)))) == 105
