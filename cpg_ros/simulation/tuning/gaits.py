@@ -18,13 +18,14 @@ CMA-ES (Hansen) looks for the design of a gait with the lowest price over severa
 different friction, with different loads and with pushes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import cycle
 import math
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.motion.description import SERVOS
@@ -36,7 +37,7 @@ from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.robot_setup.walk_recording import calibrated
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
-from cpg_ros.simulation.tuning.foot_path import centre_ahead, Feet, OWN
+from cpg_ros.simulation.tuning.foot_path import centre_ahead, FootTrajectoryFit, OWN
 from cpg_ros.simulation.tuning.gait_design import (
     AIMS,
     Design,
@@ -47,6 +48,10 @@ from cpg_ros.simulation.tuning.gait_design import (
     ROWS,
 )
 import numpy as np
+from scipy.stats import binomtest
+
+#: Points of a generation of CMA-ES.
+GENERATION = 12
 
 # What tuning finds for a gait.
 
@@ -154,8 +159,8 @@ REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
 #: Least share of a gait's usual frequencies that is tried where the joints are slow, and how far
 #: below their limit of speed its gentlest start then begins.
 SLOWEST, ROOM = 0.3, 0.9
-#: Designs in a generation, and how far about the start the first ones are (1: all there is).
-GENERATION, SPREAD = 12, 0.15
+#: How far about the start the first designs are (1: the whole range).
+SPREAD = 0.15
 #: Starts that are tried first: how much gentler than the usual one.
 GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
@@ -172,7 +177,7 @@ class Tuner:
                 has fewer than four legs.
 
         """
-        self._cma = cma_es()
+        cma_es()
         if len(robot.legs) < 4:
             raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
                                   'are not tuned, as they need balance, and foot paths alone do '
@@ -183,7 +188,7 @@ class Tuner:
         body = self.batch.body
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
             + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
-        self.feet = Feet(self.batch.body, self.batch.parts)
+        self.feet = FootTrajectoryFit(self.batch.body, self.batch.parts)
         self.scale = self.feet.length / LENGTH
         # Designs are of robots whose feet bear alike.
         self.ahead = centre_ahead(body, self.batch.parts)
@@ -273,19 +278,17 @@ class Tuner:
         aims, prices = self._starts(gait)
         aim, first, cheapest = aims[int(prices.argmin())], float(prices[0]), float(prices.min())
         best = aim.start
-        search = self._cma.CMAEvolutionStrategy(
-            aim.place, SPREAD, {'bounds': [0.0, 1.0], 'seed': seed + 1, 'popsize': GENERATION,
-                                'verbose': -9})
-        tried = len(aims)
-        while tried < evaluations:
-            places = search.ask()
-            designs = [aim.design(place) for place in places]
+
+        def generation(points: Sequence[np.ndarray], _: int) -> list[float]:
+            nonlocal best, cheapest
+            designs = [aim.design(point) for point in points]
             prices = self.prices(gait, designs, aim)
-            search.tell(places, prices.tolist())
-            tried += len(places)
-            update(min(tried, evaluations))
             if prices.min() < cheapest:
                 best, cheapest = designs[int(prices.argmin())], float(prices.min())
+            return prices.tolist()
+
+        _, tried = cma_search(aim.start_point, SPREAD, (0.0, 1.0), seed, generation, evaluations,
+                              update, len(aims))
         near = self._nearest
         if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
             # The nearest one, by so much slower that its joints follow.
@@ -417,6 +420,53 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     measured = [one.gait for one in found]
     robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
     return robot, found, missing
+
+
+def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], seed: int,
+               price: Callable[[Sequence[np.ndarray], int], list[float]], evaluations: int,
+               update: Callable[[int], None] = lambda done: None, done: int = 0
+               ) -> tuple[np.ndarray, int]:
+    """Minimise a price by CMA-ES, GENERATION points at a time.
+
+    Args:
+        start: mean of the first generation, shape (n,).
+        spread: its standard deviation.
+        bounds: of each coordinate.
+        seed: the same one gives the same result.
+        price: returns the price of each of some points; takes a seed of its generation's own.
+        evaluations: number of points to try, about.
+        update: takes the number tried so far.
+        done: number tried before.
+
+    Returns:
+        The mean of the last generation, whose best point was partly lucky, and the number tried.
+
+    """
+    search = cma_es().CMAEvolutionStrategy(start, spread, {
+        'bounds': [*bounds], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
+    draws = np.random.default_rng([seed, 1])
+    while done < evaluations:
+        points = search.ask()
+        search.tell(points, price(points, int(draws.integers(2**31))))
+        done += len(points)
+        update(min(done, evaluations))
+    return search.result.xfavorite, done
+
+
+def scaled_gains(gains: Any, names: Sequence[str], logs: Sequence[float],
+                 limits: Mapping[str, Any]) -> dict[str, float]:
+    """Return the named gains times the exponentials of logs, within their limits."""
+    return {name: min(max(getattr(gains, name) * math.exp(log), limits[name].low),
+                      limits[name].high) for name, log in zip(names, logs, strict=True)}
+
+
+def more_than_chance(won: int, lost: int) -> bool:
+    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test).
+
+    The test is one-sided; it is the exact form of McNemar's test.
+    """
+    changed = won + lost
+    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
 
 def cma_es() -> ModuleType:
