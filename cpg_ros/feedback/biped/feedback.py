@@ -28,11 +28,11 @@ from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.biped.tick import tick
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.pattern import GaitRunner, Pattern, smoothstep
+from cpg_ros.motion.pattern import GaitRunner, Pattern
 from cpg_ros.motion.plan import GaitPlan, plan
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.robot import Robot
-from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.motion.strides import smoothstep, StrideCommand
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
