@@ -27,7 +27,7 @@ from cpg_ros.feedback.gains import dimensionless, GAINS, Gains, leg_length, robo
 from cpg_ros.feedback.gait_tables import Timetable
 from cpg_ros.feedback.kinematics import geometry_of, GRAVITY
 from cpg_ros.motion.body_file import OwnFeedback
-from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
@@ -101,12 +101,6 @@ class Benefit:
                 f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
 
-def program_of(robot: Robot, gait: str) -> GaitPlan:
-    """Plan a gait on the robot's first network; errors as of plan."""
-    preset = NETWORKS[robot.networks[0]].presets()[gait]
-    return plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
-
-
 def judged_gaits(robot: Robot) -> list[str]:
     """Return the gaits that feedback is judged in: those with an efference copy that do not hop.
 
@@ -117,7 +111,7 @@ def judged_gaits(robot: Robot) -> list[str]:
     geometry, known = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
     return [gait for gait, motion in robot.motions.items()
             if motion.efference is not None and gait in known
-            and not Timetable(program_of(robot, gait), geometry).hops]
+            and not Timetable(plan_gait(robot, gait), geometry).hops]
 
 
 class FeedbackTrial:
@@ -138,7 +132,7 @@ class FeedbackTrial:
             SimulationError: the model cannot be used.
 
         """
-        plan = program_of(robot, gait)
+        plan = plan_gait(robot, gait)
         self.loop = ClosedLoopBatch(model, plan, kp=kp, kd=kd)
         self.length = leg_length(self.loop.geometry)
         self.speed = FROUDE * math.sqrt(GRAVITY * self.length)

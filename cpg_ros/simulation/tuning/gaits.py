@@ -29,7 +29,7 @@ from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.motion.description import SERVOS
-from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan, PlanError
+from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan_gait, PlanError
 from cpg_ros.motion.robot import Motion, Robot, SteeringTable
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.bodies import OpenLoopBatch, targets
@@ -215,13 +215,11 @@ class Tuner:
 
     def plan(self, gait: str, motion: Motion, network: str = '') -> GaitPlan:
         """Plan a gait on one of the robot's networks or the first; errors as of plan."""
-        preset = NETWORKS[network or self.robot.networks[0]].presets()[gait]
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
             one = (1.0,)
             motion = replace(motion, steering=SteeringTable(one, one, one, one))
-        robot = replace(self.robot, motions={gait: motion})
-        return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        return plan_gait(replace(self.robot, motions={gait: motion}), gait, network=network)
 
     def prices(self, gait: str, designs: Sequence[Design],
                aim: GaitTarget | None = None) -> np.ndarray:
