@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from cpg_ros.feedback.estimate import rpy_of
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.fitting.gaits.steady_stretch import true_runs
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.body import Anatomy, Body, FALLEN
 from cpg_ros.simulation.robot_model import engine
 import numpy as np

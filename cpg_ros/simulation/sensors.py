@@ -19,8 +19,9 @@ from dataclasses import replace
 import math
 
 from cpg_ros.dynamics.integration.compilation import jit_entry
-from cpg_ros.feedback.estimate import fill_quaternion, rpy_of, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.rotations import fill_quaternion, rpy_of
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np

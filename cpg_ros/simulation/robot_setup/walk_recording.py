@@ -21,13 +21,14 @@ from typing import Any
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
-from cpg_ros.feedback.estimate import rpy_of, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.fitting.recordings.bag_storage import opened
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
 from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
 from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.tuning.foot_path import read_geometry

@@ -26,12 +26,13 @@ from typing import Any
 
 from cpg_ros.common.command_line import Parser, progress_bar, run, say, table
 from cpg_ros.common.errors import InputError, needed, ShortRepr
-from cpg_ros.feedback.estimate import fill_quaternion, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.gains import robot_gains
 from cpg_ros.fitting.recordings.bag_writer import BagWriter
 from cpg_ros.motion.plan import GaitPlan, plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.motion.rotations import fill_quaternion
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, PUSH, Scenario, SensorNoise
