@@ -53,25 +53,23 @@ from scipy.stats import binomtest
 #: Points of a generation of CMA-ES.
 GENERATION = 12
 
-# What tuning finds for a gait.
-
-#: Share of the speed aimed at from which a gait is good.
+#: Fraction of the target speed from which a gait is good.
 GOOD = 0.3
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What was found for a gait.
+    """The best design of a gait.
 
     Attributes:
         gait: its name.
         design: of the lowest price.
         price: its price.
         first: price of the usual start.
-        motion: what it makes of the robot.
-        trial: LONG seconds of it on a good floor, nothing disturbing it.
-        aim: speed that it was to reach on this robot, m/s.
-        pace: share of the usual frequencies and speed, for joints that can do no more.
+        motion: of the robot by this design.
+        trial: LONG seconds of it on a good floor, undisturbed.
+        aim: target speed on this robot, m/s.
+        pace: fraction of the usual frequencies and speed that the joints can follow.
 
     """
 
@@ -98,7 +96,7 @@ class Tuned:
             f', at {100.0 * self.pace:.0f} % of the usual pace' if self.pace < 1.0 else '')
 
 
-# What a search is told that finds no design within a robot's limits: which came nearest.
+# The design closest to a robot's limits, for the error message of a failed search.
 
 class NoDesign(SimulationError):
     """None of a gait's designs can be run; the message gives the reason."""
@@ -125,7 +123,7 @@ class ClosestDesign:
 
     @property
     def fraction(self) -> float:
-        """The share of its frequency at which it would keep to its limits of speed."""
+        """Fraction of its frequency at which it would keep to its limits of speed."""
         return 1.0 / (1.0 + self.error.excess) if self.error.key == 'velocity' else 1.0
 
     def __str__(self) -> str:
@@ -156,12 +154,12 @@ MASS = 15.2
 #: Price of a design that the joints cannot follow, what each unit beyond a limit adds, which leads
 #: the search back to what they can, and the price of one that has no gait.
 REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
-#: Least share of a gait's usual frequencies that is tried where the joints are slow, and how far
-#: below their limit of speed its gentlest start then begins.
+#: Least fraction of a gait's usual frequencies that is tried where the joints are slow, and how
+#: far below their limit of speed its gentlest start then begins.
 SLOWEST, ROOM = 0.3, 0.9
 #: How far about the start the first designs are (1: the whole range).
 SPREAD = 0.15
-#: Starts that are tried first: how much gentler than the usual one.
+#: Starts that are tried first: how much gentler they are than the usual one.
 GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -231,20 +229,20 @@ class Tuner:
         Args:
             gait: one of AIMS.
             designs: of it.
-            aim: what it is to reach, instead of the usual.
+            aim: its target, instead of the usual one.
 
         """
         aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
                       hops=aim.hops / math.sqrt(self.scale))
-        found, runs, runnable = np.full(len(designs), NO_GAIT), [], []
+        result, runs, runnable = np.full(len(designs), NO_GAIT), [], []
         for k, design in enumerate(designs):
             motion = self.motion(gait, design)
             try:
                 angles = [targets(self.plan(gait, motion, network), SHORT, self.batch.timestep)
                           for network in self.robot.networks_with(gait)]
             except OutOfLimits as error:
-                found[k] = REFUSED + BEYOND * error.excess
+                result[k] = REFUSED + BEYOND * error.excess
                 if self._nearest is None or error.excess < self._nearest.error.excess:
                     self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
                                                   error)
@@ -255,18 +253,18 @@ class Tuner:
             runnable.append(k)
         prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
                   for trial in self.batch.run(runs)]
-        for k, own in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
-            found[k] = 0.6 * own.mean() + 0.4 * own.max()
-        return found
+        for k, runs_of_k in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
+            result[k] = 0.6 * runs_of_k.mean() + 0.4 * runs_of_k.max()
+        return result
 
     def tune(self, gait: str, evaluations: int, seed: int = 0,
              update: Callable[[int], None] = lambda done: None) -> Tuned:
-        """Look for a gait's best design.
+        """Search for a gait's best design.
 
         Args:
             gait: one of AIMS.
             evaluations: how many designs to try, about.
-            seed: the same one finds the same.
+            seed: the same one gives the same result.
             update: takes the number tried so far.
 
         Raises:
@@ -305,7 +303,7 @@ class Tuner:
                      aim.speed / AIMS[gait].speed)
 
     def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
-        """Return where to begin, gentler and gentler, and slower if the joints cannot follow."""
+        """Return starts, ever gentler, and slower ones if the joints cannot follow any."""
         self._nearest = None
         aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
         prices = self.prices(gait, [one.start for one in aims])
