@@ -30,8 +30,8 @@ def fill_rotation(roll: float, pitch: float, yaw: float, out: np.ndarray) -> Non
 
 def rotation(rpy: tuple[float, ...]) -> np.ndarray:
     """Return the matrix of roll, pitch and yaw in rad, shape (3, 3)."""
-    out = np.empty((3, 3))
-    fill_rotation(*rpy, out)
+    (roll, pitch, yaw), out = rpy, np.empty((3, 3))
+    fill_rotation(roll, pitch, yaw, out)
     return out
 
 
