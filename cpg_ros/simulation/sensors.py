@@ -61,7 +61,8 @@ class SimulatedSensors:
         self._before[:] = rates[:3]
         sensed = self._noise(true)
         self.foot_forces = sensed.foot_forces[0]
-        fill_quaternion(*sensed.rpy[0], imu)
+        roll, pitch, yaw = sensed.rpy[0].tolist()
+        fill_quaternion(roll, pitch, yaw, imu)
         imu[:4] = np.roll(np.copysign(1.0, imu[0]) * imu[:4], -1)
         imu[4:7], imu[7:] = sensed.angular_velocity[0], sensed.acceleration[0]
         self._late.append((stamp, imu))

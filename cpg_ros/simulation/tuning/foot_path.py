@@ -216,8 +216,8 @@ class Leg:
                                   'an axis across the body')
         # From the first of these joints.
         thigh = anchors[-2] - anchors[0]
-        links = (np.zeros(3), thigh, anchors[-1] - anchors[-2], foot - anchors[-1])
-        shape = LegGeometry(tuple(names), tuple(np.sign(turns)), *map(tuple, links), yaw)
+        shape = LegGeometry(tuple(names), tuple(np.sign(turns)), (0.0, 0.0, 0.0), tuple(thigh),
+                            tuple(anchors[-1] - anchors[-2]), tuple(foot - anchors[-1]), yaw)
         geometry = geometry_of(body.robot, BodyGeometry(body.mass, 0.0, {leg: shape}))
         self._row = geometry.rows[list(body.robot.legs).index(leg)]
         angles = [0.0] * (3 - count) + [joint.offset for joint in self.joints]
