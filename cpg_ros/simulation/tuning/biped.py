@@ -172,7 +172,7 @@ def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
     usual = BipedGains.of_body(_body(robot))
     compute = map if executor is None else executor.map
 
-    def changed(logs: Sequence[float]) -> dict[str, float]:
+    def changed(logs: np.ndarray) -> dict[str, float]:
         return {name: float(f'{gain:.{DIGITS}g}')
                 for name, gain in scaled_gains(usual, SEARCHED, logs, GAINS).items()}
 

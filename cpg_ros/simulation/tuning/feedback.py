@@ -375,7 +375,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
     most = math.log(FACTOR)
 
-    def changed(logs: Sequence[float]) -> Gains:
+    def changed(logs: np.ndarray) -> Gains:
         return before._replace(**scaled_gains(before, names, logs, GAINS))
 
     logs, tried = cma_search(np.zeros(len(names)), SPREAD, (-most, most), seed,

@@ -449,7 +449,7 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
     return search.result.xfavorite, done
 
 
-def scaled_gains(gains: Any, names: Sequence[str], logs: Sequence[float],
+def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,
                  limits: Mapping[str, Any]) -> dict[str, float]:
     """Return the named gains times the exponentials of logs, within their limits."""
     return {name: min(max(getattr(gains, name) * math.exp(log), limits[name].low),
