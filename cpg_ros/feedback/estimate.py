@@ -28,6 +28,7 @@ from cpg_ros.feedback.kinematics import (
     slopes_of,
     vertical,
 )
+from cpg_ros.motion.rotations import fill_quaternion
 import numpy as np
 
 # Foot forces from joint torques, for feet without sensors.
@@ -114,23 +115,6 @@ class SensorData(NamedTuple):
     def zeros(cls, runs: int, legs: int, joints: int) -> 'SensorData':
         """Return zeros, to be filled in place."""
         return cls(*(np.zeros((runs, size)) for size in (joints, joints, legs, 3, 3, 3)))
-
-
-def fill_quaternion(roll: float, pitch: float, yaw: float, out: np.ndarray) -> None:
-    """Fill an orientation, w x y z, from its angles, rad."""
-    roll, pitch, yaw = 0.5 * roll, 0.5 * pitch, 0.5 * yaw
-    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    out[0], out[1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
-    out[2], out[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
-
-
-def rpy_of(quaternions: np.ndarray) -> np.ndarray:
-    """Return roll, pitch and yaw of orientations (w x y z), rad, shape (..., 3)."""
-    w, x, y, z = np.moveaxis(quaternions, -1, 0)
-    return np.stack([np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-                     np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-                     np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=-1)
 
 
 @jit

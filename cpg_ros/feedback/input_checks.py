@@ -22,7 +22,7 @@ import math
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.pattern import smoothstep
+from cpg_ros.motion.strides import smoothstep
 
 # Monitoring of the feedback's inputs: whether each is valid, or since when it is not.
 

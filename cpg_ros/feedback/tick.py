@@ -37,6 +37,7 @@ from cpg_ros.feedback.laws import (
     touchdown,
     virtual_stiffness,
 )
+from cpg_ros.feedback.laws.law import low_passed
 from cpg_ros.motion.strides import approach
 import numpy as np
 
@@ -153,8 +154,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         # that move feet or change the frequency, only posture helps a hop.
         turns = tables.turns[old] + mix * (tables.turns[new] - tables.turns[old])
         ground = memory.ground_angles[run]
-        ground[0] = slope.update_ground(ground[0], off.roll, gains, dt)
-        ground[1] = slope.update_ground(ground[1], off.pitch, gains, dt)
+        ground[0] = low_passed(ground[0], off.roll, gains.slope_filter, dt)
+        ground[1] = low_passed(ground[1], off.pitch, gains.slope_filter, dt)
         roll, pitch = off.roll - ground[0], off.pitch - ground[1]
         uphill_x = uphill_y = 0.0
         if gains.slope:
@@ -167,8 +168,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         yielded = placement.yielding(
             off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
             and tables.one_by_one[slot] > 0.0, gains)
-        memory.commanded_turn[run] = sidestep.smooth_turn(
-            memory.commanded_turn[run], planned.turn[run], gains, dt)
+        memory.commanded_turn[run] = low_passed(
+            memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
         memory.sidestep_correction[run] = sidestep.correct_speed(
             memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
             fraction * dt)
@@ -237,7 +238,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         error = turns * pace.velocity_error(off.vx, off.vy, gains)
         if gains.pace and tables.steered[slot]:
             scale += fraction * pace.frequency_change(error, memory.fatigue[run], gains)
-        memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
+        memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
         memory.kp_scale[run], memory.stiff[run] = 1.0, False
         if gains.stiffen:
             # Before the full gait is reached the body is not yet where the efference copy has it.

@@ -18,4 +18,4 @@ Imports ``dynamics``, ``networks`` and ``common``; knows nothing of ROS.
 """
 
 __all__ = ['body_file', 'description', 'export', 'meshes', 'pattern', 'phase_readout', 'plan',
-           'readout', 'robot', 'robot_file', 'strides']
+           'readout', 'robot', 'robot_file', 'rotations', 'strides']

@@ -24,6 +24,7 @@ from xml.etree.ElementTree import Element
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, parse, read_bytes
+from cpg_ros.motion.rotations import rotation
 import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
@@ -173,14 +174,6 @@ class RobotDescription:
                  if link in self.links and self.links[link].radius]
         return max(balls or [(place, 0.0) for place, _, _ in found],
                    key=lambda one: float(np.linalg.norm(one[0] - begin)))
-
-
-def rotation(rpy: tuple[float, ...]) -> np.ndarray:
-    """Return the matrix of roll, pitch and yaw in rad: about the fixed x, then y, then z."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                     [-sp, cp * sr, cp * cr]])
 
 
 # URDF files: joints with their limits and places, links with their masses and feet.

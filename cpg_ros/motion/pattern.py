@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The moving pattern: from programs to joint positions and velocities, tick by tick.
+"""The moving pattern: from plans to joint positions and velocities, tick by tick.
 
 A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
 pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
@@ -23,32 +23,25 @@ move whenever a joint would exceed the speed that the gaits themselves reach, an
 from collections import deque
 from collections.abc import Callable
 import math
-from typing import TypeVar
 
-from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.integration.stepper import Stepper
-from cpg_ros.motion.phase_readout import GaitCells, observe_phases, PhaseMap
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.readout import confine, DrivenJoints, observe, read_retimed, Retiming, Waveform
-from cpg_ros.motion.strides import approach, lengthen, scale, StrideCommand
-from cpg_ros.networks.registry import find_network
+from cpg_ros.motion.readout import confine
+from cpg_ros.motion.strides import come_to_rest, lengthen, scale, smoothstep, StrideCommand
 import numpy as np
 
-# One network running one gait, and the watchdog that compares it with the gait's orbit.
-
-#: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
-#: of the clock by this share of a cycle, for longer than this many strides.
+#: Off the orbit: a cell further away than this fraction of the peak, or the phase behind or ahead
+#: of the clock by this fraction of a cycle, for longer than this many strides.
 FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
 #: Strides the network gets to find its new gait by itself after a transition of 0 s.
 SETTLING = 40.0
-#: At rest: no state changes by more than this share of a cell's range in a stride.
+#: At rest: no state changes by more than this fraction of a cell's range in a stride.
 AT_REST = 0.05
-#: Such a transition starts with at least this share of the new gait in the state.
+#: Such a transition starts with at least this fraction of the new gait in the state.
 KICK = 0.05
 
 
 class GaitRunner:
-    """A network running one program.
+    """A network running one plan, and the watchdog that compares it with the gait's orbit.
 
     Attributes:
         motion: the three that follow, and one of its own, in one array, shape (4, joints).
@@ -61,7 +54,7 @@ class GaitRunner:
 
     def __init__(self, plan: GaitPlan, transition: float,
                  drive: StrideCommand | None = None) -> None:
-        """Run a program, its strides as long as a drive has them, if there is one."""
+        """Run a plan, its strides as long as a drive has them, if there is one."""
         self.transition = transition
         self.progress = 0.0
         self.drive = drive
@@ -75,7 +68,7 @@ class GaitRunner:
         self.follow(plan)
 
     def follow(self, plan: GaitPlan) -> None:
-        """Read joints and judge health by this program from now on."""
+        """Read joints and judge health by this plan from now on."""
         self.plan = plan
         self._least = AT_REST * float(plan.orbit.levels[0, 0, 1])
         self._astray = 0.0
@@ -135,7 +128,7 @@ class GaitRunner:
         self.settling = self._astray = 0.0
 
     def drift_to(self, plan: GaitPlan) -> None:
-        """Take a program's parameters and leave the change to the network's own dynamics.
+        """Take a plan's parameters and leave the change to the network's own dynamics.
 
         A gait in whose class the state has nothing, as between any two gaits on their exact
         orbits, gets a small start; the lock would otherwise hold the network at rest.
@@ -154,24 +147,12 @@ class GaitRunner:
         self.settling, self._calm, self._still = SETTLING, 0.0, 0.0
 
 
-# The smooth step by which ramps, cross-fades and approaches go.
-
-Real = TypeVar('Real', float, np.ndarray)
-
-
-def smoothstep(s: Real) -> tuple[Real, Real]:
-    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
-    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
-
-
-# Absorb jumps of a network's output: the difference decays smoothly.
-
 #: Jumps are absorbed over this time (s).
 ABSORB = 0.3
 
 
 class BumplessTransfer:
-    """What is left of a jump of joint positions and velocities."""
+    """Absorbs a jump of joint positions and velocities: the difference decays smoothly."""
 
     def __init__(self) -> None:
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
@@ -201,18 +182,12 @@ class BumplessTransfer:
             self._jump = (before[0] + dt * before[1] - wanted, before[1] - rate)
         else:
             self._time += dt
-        s = min(1.0, self._time / ABSORB)
-        fraction, share_rate = smoothstep(s)
-        gap, gap_rate = self._jump
-        wanted = wanted + (1.0 - fraction) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
-        rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
-        return wanted, rate
+        gap, gap_rate = come_to_rest(*self._jump, 0.0, ABSORB, min(1.0, self._time / ABSORB))
+        return wanted + gap, rate + gap_rate
 
-
-# The ramp of a pattern between the stand and its gait, or to the stand: a level from 0 to 1.
 
 class Ramp:
-    """A level and its rate, on the way to its target.
+    """A level between the stand and the gait, and its rate, on the way to its target.
 
     Attributes:
         level: 0 at the stand, 1 in the full gait, or where the joints were found.
@@ -259,12 +234,8 @@ class Ramp:
             self._past = 0.0
             self.level, self.rate = end, 0.0
             return
-        fraction, share_rate = smoothstep(s)
-        self.level = start + fraction * (end - start) + s * (1.0 - s)**2 * time * start_rate
-        self.rate = share_rate * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * start_rate
+        self.level, self.rate = come_to_rest(start, start_rate, end, time, s)
 
-
-# Resume a pattern's clock after a stall: from where it stopped, slowed at first.
 
 #: A joint whose command stood still for this time (s) has come to rest.
 HOLD = 0.1
@@ -285,12 +256,12 @@ class StallRecovery:
 
     def begin(self, stall: float) -> None:
         """Slow the clock in after a stall in s: the longer, the more the joints have stopped."""
-        fraction = self._share(self._past / self._time) if self.active else 1.0
+        fraction = self._pace(self._past / self._time) if self.active else 1.0
         self._low = fraction * max(0.0, 1.0 - stall / HOLD)
         self._time = min(LONGEST, stall + self._time - self._past)
         self._past = 0.0
 
-    def _share(self, s: float) -> float:
+    def _pace(self, s: float) -> float:
         return self._low + (1.0 - self._low) * smoothstep(s)[0]
 
     def advance(self, dt: float) -> tuple[float, float]:
@@ -304,40 +275,7 @@ class StallRecovery:
         self._past += dt
         if after == 1.0:
             self._time = self._past = 0.0
-        return way, self._share(after)
-
-
-# Make every kernel of the real-time path ready, compiling those not yet on disk.
-
-def precompile(name: str) -> None:
-    """Run each kernel that a network needs once, on the types the generator uses.
-
-    Args:
-        name: as find_network takes it, and errors as of that.
-
-    """
-    preset = next(iter(find_network(name).presets().values()))
-    network = preset.network
-    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
-                      symmetry=network.symmetry(preset.gait))
-    stepper.advance(2.0 * network.step)
-    some, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
-    joints, one = DrivenJoints(cells, np.zeros((1, 6)), cells), np.ones((1, 3))
-    if network.readout == 'waveform':
-        wave = Waveform(1.0, 1.0, np.zeros(8), table, table)
-        observe(stepper.now, wave, joints, some, some, some)
-        read_retimed(stepper.now, wave, joints, Retiming(np.zeros((4, 2)), np.ones((4, 4)), one),
-                     some, some)
-    else:
-        simulate(network, np.zeros(network.components), network.step, network.step)
-        known = PhaseMap(np.ones((1, 4)), np.ones((1, 4)), np.ones((1, 4, 4)),
-                         np.zeros((1, 2, 2)), some)
-        observe_phases(stepper.now, 1.0, GaitCells(cells, np.zeros(1), one, known), joints,
-                       np.zeros((10, 1)), some, some, some)
-    confine(some, some, np.zeros((3, 1)), 1.0, some, some, np.zeros(1, dtype=bool))
-    approach(some, some, 0.1, some, some)
-    lengthen(some, cells, some, np.zeros((4, 1)))
-    scale(1.0, 1.0, some, cells, some, np.zeros((4, 1)), some, some)
+        return way, self._pace(after)
 
 
 #: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
@@ -349,7 +287,7 @@ SHORTEST = 0.05
 MOST_TRACKS = 4
 #: A joint may cover the shift between the stand and a gait at this many times it a second.
 SHIFTING = 2.0
-#: Share of the bound on speed to keep to at a substep, so that none is passed between two.
+#: Fraction of the bound on speed to keep to at a substep, so that none is passed between two.
 SHORT_OF = 0.997
 
 
@@ -386,7 +324,7 @@ class Pattern:
         self.restart(ramp, enabled)
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
-        """Begin anew at phase 0, with the newest program, from where the joints are."""
+        """Begin anew at phase 0, with the newest plan, from where the joints are."""
         newest = self._tracks[-1]
         newest.reseed(0.0)
         self._tracks = [newest]
@@ -423,7 +361,7 @@ class Pattern:
     # -- requests from other threads ------------------------------------------------------
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
-        """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
+        """Change to a plan over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
         prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
         self._requests.append((plan, prepared if transition > 0.0 else None))
@@ -451,12 +389,12 @@ class Pattern:
 
     @property
     def plan(self) -> GaitPlan:
-        """The newest program in force."""
+        """The newest plan in force."""
         return self._tracks[-1].plan
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
-        """The program that fades out, the newest in force, and the share of that."""
+        """The plan that fades out, the newest in force, and the fraction of that."""
         if len(self._tracks) == 1:
             return self._tracks[0].plan, self._tracks[0].plan, 0.0
         older, newest = self._tracks[-2:]
@@ -594,8 +532,8 @@ class Pattern:
         if moving:
             for track in tracks[1:]:
                 track.progress = min(1.0, track.progress + clock / track.transition)
-                fraction, share_rate = smoothstep(track.progress)
-                fades.append((fraction, share_rate / track.transition))
+                fraction, slope = smoothstep(track.progress)
+                fades.append((fraction, slope / track.transition))
                 frequency += fraction * (track.plan.frequency - frequency)
         if self.drive is not None:
             self.drive.advance(dt)
@@ -607,9 +545,9 @@ class Pattern:
                 self._recover(track)
 
         wanted, rate = first.angle, self._rate_of(first, frequency)
-        for track, (fraction, share_rate) in zip(tracks[1:], fades, strict=True):
+        for track, (fraction, slope) in zip(tracks[1:], fades, strict=True):
             rate = (rate + fraction * (self._rate_of(track, frequency) - rate)
-                    + share_rate * (track.angle - wanted))
+                    + slope * (track.angle - wanted))
             wanted = wanted + fraction * (track.angle - wanted)
         while len(tracks) > 1 and tracks[1].progress >= 1.0:
             del tracks[0]
@@ -643,8 +581,7 @@ class Pattern:
                 wanted + self._offset, rate, dt, (self._wanted, self._rate))
             self._recovering = self.recovering
         else:
-            self._wanted[:] = wanted
-            self._wanted += self._offset
+            np.add(wanted, self._offset, out=self._wanted)
             self._rate[:] = rate
 
     def _rate_of(self, track: GaitRunner, frequency: float) -> np.ndarray:

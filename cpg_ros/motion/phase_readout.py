@@ -34,17 +34,26 @@ import math
 from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.compilation import jit_entry, specialised
+from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.motion import readout
 from cpg_ros.motion.readout import (
+    confine,
     DrivenJoints,
     NoPhase,
+    observe,
     over_cycle,
+    read_retimed,
     retimed_phase,
+    Retiming,
     stance,
     TURN,
+    Waveform,
     WaveReadout,
 )
+from cpg_ros.motion.strides import approach, lengthen, scale
+from cpg_ros.networks.registry import find_network
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -369,3 +378,34 @@ def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
         begin[leg] = known.crests[wave]
         fraction[leg] = stance(evaluate(known.terms[wave], GRID), float(begin[leg]))
     return begin, fraction
+
+
+def precompile(name: str) -> None:
+    """Run each kernel that a network needs once, on the types the generator uses.
+
+    Args:
+        name: as find_network takes it, and errors as of that.
+
+    """
+    preset = next(iter(find_network(name).presets().values()))
+    network = preset.network
+    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
+                      symmetry=network.symmetry(preset.gait))
+    stepper.advance(2.0 * network.step)
+    some, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
+    joints, one = DrivenJoints(cells, np.zeros((1, 6)), cells), np.ones((1, 3))
+    if network.readout == 'waveform':
+        wave = Waveform(1.0, 1.0, np.zeros(8), table, table)
+        observe(stepper.now, wave, joints, some, some, some)
+        read_retimed(stepper.now, wave, joints, Retiming(np.zeros((4, 2)), np.ones((4, 4)), one),
+                     some, some)
+    else:
+        simulate(network, np.zeros(network.components), network.step, network.step)
+        known = PhaseMap(np.ones((1, 4)), np.ones((1, 4)), np.ones((1, 4, 4)),
+                         np.zeros((1, 2, 2)), some)
+        observe_phases(stepper.now, 1.0, GaitCells(cells, np.zeros(1), one, known), joints,
+                       np.zeros((10, 1)), some, some, some)
+    confine(some, some, np.zeros((3, 1)), 1.0, some, some, np.zeros(1, dtype=bool))
+    approach(some, some, 0.1, some, some)
+    lengthen(some, cells, some, np.zeros((4, 1)))
+    scale(1.0, 1.0, some, cells, some, np.zeros((4, 1)), some, some)

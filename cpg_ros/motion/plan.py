@@ -29,6 +29,7 @@ from cpg_ros.motion.phase_readout import joint_readout, PhaseReadout, standing
 from cpg_ros.motion.readout import Duty, extremes, NoPhase, WaveReadout
 from cpg_ros.motion.robot import Joint, Motion, Robot, SteeringTable
 from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
 # Whether the generator can run a gait at all, whatever the robot.
@@ -327,6 +328,18 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     gain = judged.lock_gain if gain < 0.0 else gain
     return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
                     in_place, span, speed, stands.fractions)
+
+
+def plan_gait(robot: Robot, name: str, frequency: float | None = None, amplitude: float = 1.0,
+              network: str = '') -> GaitPlan:
+    """Plan a gait with a preset's own parameters, on a robot's first network unless one is given.
+
+    Without a frequency, the robot file's is used. Other arguments and errors as of plan.
+    """
+    preset = NETWORKS[network or robot.networks[0]].presets()[name]
+    if frequency is None:
+        frequency = robot.motion(name, preset.gait).frequency or 0.0
+    return plan(robot, name, preset, preset.network, frequency, amplitude)
 
 
 def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:

@@ -15,9 +15,26 @@
 """Steering a gait: how long each leg's stride is, and how fast strides follow one another."""
 
 import math
+from typing import TypeVar
 
 from cpg_ros.dynamics.integration.compilation import jit_entry
 import numpy as np
+
+Real = TypeVar('Real', float, np.ndarray)
+
+
+def smoothstep(s: Real) -> tuple[Real, Real]:
+    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
+    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
+
+
+def come_to_rest(start: Real, rate: Real, end: Real | float, time: float, s: float
+                 ) -> tuple[Real, Real]:
+    """Value and rate at a fraction of the cubic from a start and its rate to rest at an end."""
+    fraction, slope = smoothstep(s)
+    return (start + fraction * (end - start) + s * (1.0 - s)**2 * time * rate,
+            slope * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * rate)
+
 
 #: Targets are approached with this time constant, s.
 TIME_CONSTANT = 0.2

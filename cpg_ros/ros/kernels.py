@@ -24,7 +24,7 @@ from typing import Any
 
 from cpg_ros.dynamics.integration.c_kernel import choose
 from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
-from cpg_ros.motion.pattern import precompile
+from cpg_ros.motion.phase_readout import precompile
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import StartError
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus

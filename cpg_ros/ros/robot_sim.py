@@ -36,7 +36,7 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.recorder import RunLog, summary, without_opengl
 from cpg_ros.simulation.robot_model import legs, SimulationError
 from cpg_ros.simulation.scenario import SensorNoise
-from cpg_ros.simulation.sensors import InertialUnit
+from cpg_ros.simulation.sensors import SimulatedSensors
 from cpg_ros.simulation.soft_start import Approach
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 from cpg_ros.simulation.terrain import KINDS as GROUNDS
@@ -56,23 +56,21 @@ from std_srvs.srv import Trigger
 class Measurements:
     """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
-    def __init__(self, node: Node, body: Body, unit: InertialUnit, frame: str,
-                 delay: float = 0.0, force_noise: float = 0.0) -> None:
-        """Publish the motion of a body, and the measurements of an inertial unit on it.
+    def __init__(self, node: Node, body: Body, sensors: SimulatedSensors, frame: str,
+                 delay: float = 0.0) -> None:
+        """Publish the motion of a body, and what its sensors measure.
 
         Args:
             node: that publishes.
             body: that is measured.
-            unit: on it.
+            sensors: of the body.
             frame: of its base.
             delay: of the measurements of joints and feet, s.
-            force_noise: standard deviation of the noise of the feet's, as a share of the force.
 
         """
-        self._body, self._unit, self._holds = body, unit, bool(body.robot.held)
-        self._delay, self._force_noise = round(1e9 * delay), force_noise
+        self._body, self._sensors, self._holds = body, sensors, bool(body.robot.held)
+        self._delay = round(1e9 * delay)
         self._late: deque[tuple[int, list[np.ndarray]]] = deque()
-        self._rng = np.random.default_rng(unit.seed + 1)
         names, feet = body.robot.order, legs(body.robot)
         n = len(names)
         held = tuple(body.robot.held)
@@ -102,27 +100,24 @@ class Measurements:
     def publish(self, stamp: int) -> None:
         """Publish the state of the body; stamp in ns."""
         # What feedback needs comes first.
-        arrived = self._unit.measure(stamp)
+        arrived = self._sensors.measure(stamp)
         if arrived is not None:
             self._imu.publish(arrived[0], arrived[1:])
         body = self._body
-        feet = body.feet
-        if self._force_noise:
-            feet = feet * (1.0 + self._force_noise * self._rng.standard_normal(len(feet)))
-        found = (body.position, body.velocity, body.torque, feet, body.base, body.quaternion,
-                 body.twist, *(body.held if self._holds else ()))
+        values = (body.position, body.velocity, body.torque, self._sensors.foot_forces, body.base,
+                  body.quaternion, body.twist, *(body.held if self._holds else ()))
         if not self._delay:
-            self._send(stamp, found)
+            self._send(stamp, values)
             return
-        self._late.append((stamp, [part.copy() for part in found]))
+        self._late.append((stamp, [part.copy() for part in values]))
         while self._late and self._late[0][0] <= stamp - self._delay:
             self._send(*self._late.popleft())
 
-    def _send(self, stamp: int, found: Sequence[np.ndarray]) -> None:
-        self._block.publish(stamp, found)
+    def _send(self, stamp: int, values: Sequence[np.ndarray]) -> None:
+        self._block.publish(stamp, values)
         age = stamp - self._transformed
         if self._transform is not None and not 0 <= age < self._period:
-            self._transform.publish(stamp, found[4:6])
+            self._transform.publish(stamp, values[4:6])
             self._transformed = stamp
 
 
@@ -272,7 +267,8 @@ SPECS = fixed({
                                 '[m/s^2]', 0.0, 100.0),
     'accelerometer_bias': Spec(0.0, 'bias of each axis of the acceleration [m/s^2]',
                                -100.0, 100.0),
-    'orientation_bias': Spec(0.0, 'bias of roll and pitch in imu [rad]', -0.5, 0.5),
+    'orientation_bias': Spec(0.0, 'size of the bias of roll and of pitch in imu, whose signs '
+                             'noise_seed draws [rad]', -0.5, 0.5),
     'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
     'joint_delay': Spec(0.0, 'the same of joint_states, foot_contacts and odom [s]', 0.0, 1.0),
@@ -323,14 +319,13 @@ class RobotSim(StartedNode):
         self._held = HeldSubscription(self, robot) if robot.held else None
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
-        unit = InertialUnit(self._body, 1.0 / self._rate, SensorNoise(
+        sensors = SimulatedSensors(self._body, 1.0 / self._rate, SensorNoise(
             self._value('imu_delay'), seed=self._value('noise_seed'), **{
                 name: self._value(name) for name in (
                     'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
-                    'accelerometer_bias', 'orientation_bias')}))
-        self._measurements = Measurements(self, self._body, unit,
-                                          *map(self._value, ('base_frame', 'joint_delay',
-                                                               'force_noise')))
+                    'accelerometer_bias', 'orientation_bias', 'force_noise')}))
+        self._measurements = Measurements(self, self._body, sensors,
+                                          *map(self._value, ('base_frame', 'joint_delay')))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0

@@ -25,6 +25,7 @@ from cpg_ros.motion.pattern import GaitRunner
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.run_metrics import cost_of_transport, motor_power
 from cpg_ros.simulation.scenario import PUSH, SensorNoise
 from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
@@ -46,7 +47,8 @@ class BipedOutcome(ShortRepr):
         tilt: largest angle of the base to the vertical, rad.
         steps: touchdowns by the clock.
         flight: share of the time after SETTLING in which no foot touches the ground.
-        cost: of transport: mechanical work, taken positive, by weight and way.
+        cost: of transport: mechanical work of the motors, those of the arms too and none
+            regained, per weight and metre.
         path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
         poses: all of ``qpos`` at these times, shape (n, ...), as ``camera.shoot`` takes it.
 
@@ -164,7 +166,9 @@ class BipedRun:
             was[:] = feedback.memory.swinging
             up = body.axes[2, 2]
             outcome.tilt = max(outcome.tilt, math.acos(min(max(up, -1.0), 1.0)))
-            work += float(np.abs(body.torque * body.velocity).sum()) * dt
+            _, held_speeds, held_torques = body.held
+            work += dt * float(motor_power(body.torque, body.velocity)
+                               + motor_power(held_torques, held_speeds))
             if time > began + SETTLING:
                 c, s = math.cos(feedback.memory.heading[0]), math.sin(feedback.memory.heading[0])
                 x, y = body.rates[:2]
@@ -184,5 +188,5 @@ class BipedRun:
             outcome.flight = flown / count
         way = float(np.linalg.norm(outcome.path[-1, 1:3] - outcome.path[0, 1:3]))
         if way > 0.5:
-            outcome.cost = work / (body.mass * GRAVITY * way)
+            outcome.cost = float(cost_of_transport(work, GRAVITY * body.mass, way))
         return outcome

@@ -19,17 +19,12 @@ import math
 from typing import Any
 
 from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
 import numpy as np
 
 #: A base that leans more than this has fallen, rad.
 FALLEN = math.radians(60.0)
-
-
-def yaw(quaternion: np.ndarray) -> float:
-    """Heading of an orientation (w x y z), rad, from -pi to pi."""
-    w, x, y, z = quaternion
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
 def add_payload(model: Any, base: int, mass: float) -> None:
@@ -238,7 +233,7 @@ class Body:
     @property
     def yaw(self) -> float:
         """Heading, rad, from -pi to pi."""
-        return yaw(self.quaternion)
+        return float(rpy_of(self.quaternion)[2])
 
     @property
     def fallen(self) -> bool:

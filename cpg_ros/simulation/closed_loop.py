@@ -31,12 +31,11 @@ from cpg_ros.feedback.gait_tables import POINTS, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.laws.virtual_stiffness import targets
 from cpg_ros.feedback.tick import PlannedMotion
-from cpg_ros.motion.pattern import smoothstep
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.strides import approach
+from cpg_ros.motion.strides import approach, smoothstep
 from cpg_ros.simulation.bodies import BatchPhysics
 from cpg_ros.simulation.body import Body, FALLEN
-from cpg_ros.simulation.run_metrics import BEGINNING, torques
+from cpg_ros.simulation.run_metrics import BEGINNING, cost_of_transport, motor_power, torques
 from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground
@@ -282,7 +281,7 @@ class ClosedLoopBatch(BatchPhysics):
             speeds = senses.joint_velocities[:, places]
             _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
                                  memory.kp_scale)
-            work[k] = np.maximum(applied * speeds, 0.0).sum(axis=1)
+            work[k] = motor_power(applied, speeds)
             if efforts is not None:
                 efforts[k] = applied[:, order]
             earlier, before = state[:, base].copy(), state[some, moving]
@@ -307,12 +306,12 @@ class ClosedLoopBatch(BatchPhysics):
         for rows in (*record.values(), work):
             rows[k + 1:] = rows[k]
         late = slice(min(round(BEGINNING / dt), steps // 2), None)
-        way = np.abs(record['velocity'][late, :, 0].sum(axis=0) * dt)
-        done = work[late].sum(axis=0) * dt
+        cost = cost_of_transport(work[late].sum(axis=0) * dt, self.geometry.weight,
+                                 record['velocity'][late, :, 0].sum(axis=0) * dt)
         found = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
         for key in ('phase', 'kp_scale', 'stiff'):
             found[key] = found[key][:, :, 0]
         return Outcome(fell=fell, arrived=arrived, senses=None if kept is None else SensorData(
             *(rows.swapaxes(0, 1) for rows in kept)),
                        efforts=None if efforts is None else efforts.swapaxes(0, 1),
-                       cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)
+                       cost=cost, **found)

@@ -26,8 +26,9 @@ import subprocess
 from typing import Any, BinaryIO, Protocol
 
 from cpg_ros.common.command_line import progress_bar
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.networks.leg_numbers import footfall_order
-from cpg_ros.simulation.body import Body, yaw
+from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
 from cpg_ros.simulation.terrain import add_ground, lay, Terrain
 import numpy as np
@@ -206,7 +207,7 @@ class Camera:
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
         x, y, z, *turned = pose[self._base]
-        gap = AZIMUTH + math.degrees(yaw(np.array(turned))) - view.azimuth
+        gap = AZIMUTH + math.degrees(rpy_of(np.array(turned))[2]) - view.azimuth
         gap -= 360.0 * round(gap / 360.0)
         if not view.distance:
             view.distance = DISTANCE * z

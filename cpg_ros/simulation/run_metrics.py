@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import math
 from typing import Any
 
-from cpg_ros.feedback.estimate import rpy_of
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.fitting.gaits.steady_stretch import true_runs
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.body import Anatomy, Body, FALLEN
 from cpg_ros.simulation.robot_model import engine
 import numpy as np
@@ -116,8 +116,7 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
     time = dt * len(path)
     speeds = moving[:, rates]
     torque, applied = torques(model, wanted, place[:, angles], speeds)
-    work = float(np.maximum(applied * speeds, 0.0)[later].sum()) * dt
-    weight = GRAVITY * mass * float(model.body_mass.sum())
+    work = float(motor_power(applied, speeds)[later].sum()) * dt
     return RunMetrics(
         distance=float(pose[-1, 0]), drift=float(pose[-1, 1]),
         heading=math.degrees(yaw[-1]), speed=way / time,
@@ -127,10 +126,21 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
         pitch=math.degrees(np.abs(pitch[later]).max()),
         sway=math.degrees(math.sqrt(float((roll[later]**2 + pitch[later]**2).mean()))),
         fell=fell, hops=_hops(np.any(touching, axis=1), dt), duty=float(touching[later].mean()),
-        cost=work / (weight * max(abs(way), 1e-3)),
+        cost=float(cost_of_transport(work, GRAVITY * mass * body.mass, way)),
         saturation=float((torque != applied).mean()),
         slip=_slide(feet, touching[later][::every]) / max(abs(way), 1e-3),
         lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
+
+
+def motor_power(torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Return the mechanical power of all motors, none regained, W: the sum over the last axis."""
+    return np.maximum(torque * speed, 0.0).sum(axis=-1)
+
+
+def cost_of_transport(work: float | np.ndarray, weight: float, distance: float | np.ndarray
+                      ) -> np.ndarray:
+    """Return work in J per weight in N and distance in m."""
+    return work / (weight * np.maximum(np.abs(distance), 1e-3))
 
 
 def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarray,

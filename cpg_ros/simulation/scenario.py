@@ -73,8 +73,8 @@ class SensorNoise:
 
     Attributes:
         delay: of everything that is measured, s.
-        force_bias, force_noise: of each foot's force, as shares of it; the bias is drawn once.
-        orientation_bias: of roll and pitch, rad; of many runs each draws the signs once.
+        force_bias, force_noise: of each foot's force, as fractions of it; the bias is drawn once.
+        orientation_bias: of roll and pitch, rad; each run draws the signs once.
         gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
         accelerometer_noise, accelerometer_bias: the same, m/s^2.
         seed: of what is drawn.

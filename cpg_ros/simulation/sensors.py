@@ -15,64 +15,59 @@
 """Sensor data of simulated bodies, from the true state of the physics and with sensor noise."""
 
 from collections import deque
+from dataclasses import replace
 import math
 
 from cpg_ros.dynamics.integration.compilation import jit_entry
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.rotations import fill_quaternion, rpy_of
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np
 
-# What an inertial measurement unit on a simulated base shows, with the noise of a real one.
 
-class InertialUnit:
-    """Measures a body period by period.
+class SimulatedSensors:
+    """The IMU and the feet of one body, measured period by period.
 
     Attributes:
-        seed: of its noise.
+        foot_forces: of the floor on each leg, as last measured, N, shape (legs,).
 
     """
 
     def __init__(self, body: Body, period: float, noise: SensorNoise) -> None:
-        """Be ready to measure a body at a period in s."""
-        self._body, self._period, self._noise = body, period, noise
-        self.seed = noise.seed
-        self._rng = np.random.default_rng(noise.seed)
-        half = 0.5 * noise.orientation_bias
-        turned = np.array([1.0, half, half, 0.0])
-        self._turned = turned / np.linalg.norm(turned)
+        """Prepare to measure a body at a period in s; the delay is that of the IMU's messages."""
+        self._body, self._period, self._delay = body, period, round(1e9 * noise.delay)
+        self.foot_forces = body.feet.copy()
+        self._true = SensorData.zeros(1, len(body.feet), 0)
+        self._noise = NoisySenses(replace(noise, delay=0.0), 1, len(body.feet), period)
         self._before = body.rates[:3].copy()
-        self._orientation = np.empty(4)
         self._late: deque[tuple[int, np.ndarray]] = deque()
 
     def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
         """Measure at a stamp in ns.
 
         Returns:
-            What arrives now, None if nothing does: its stamp, and orientation (x y z w), angular
-            velocity in rad/s and acceleration in m/s^2, shape (10,).
+            The IMU's message that arrives now, None if none does: its stamp, and orientation
+            (x y z w), angular velocity in rad/s and acceleration in m/s^2, shape (10,).
 
         """
-        noise, body, found = self._noise, self._body, np.empty(10)
-        engine().mju_mulQuat(self._orientation, body.quaternion, self._turned)
-        found[:4] = np.roll(self._orientation, -1)
+        body, true, imu = self._body, self._true, np.empty(10)
         rates = body.rates
-        faster = (rates[:3] - self._before) / self._period
-        faster[2] += GRAVITY
+        true.foot_forces[0], true.rpy[0] = body.feet, rpy_of(body.quaternion)
+        true.angular_velocity[0] = rates[3:]
+        true.acceleration[0] = ((rates[:3] - self._before) / self._period
+                                + (0.0, 0.0, GRAVITY)) @ body.axes
         self._before[:] = rates[:3]
-        found[4:7] = rates[3:] + noise.gyroscope_bias
-        found[7:] = faster @ body.axes + noise.accelerometer_bias
-        if noise.gyroscope_noise or noise.accelerometer_noise:
-            drawn = self._rng.standard_normal(6)
-            found[4:7] += noise.gyroscope_noise * drawn[:3]
-            found[7:] += noise.accelerometer_noise * drawn[3:]
-        if not noise.delay:
-            return stamp, found
-        self._late.append((stamp, found))
+        sensed = self._noise(true)
+        self.foot_forces = sensed.foot_forces[0]
+        roll, pitch, yaw = sensed.rpy[0].tolist()
+        fill_quaternion(roll, pitch, yaw, imu)
+        imu[:4] = np.roll(np.copysign(1.0, imu[0]) * imu[:4], -1)
+        imu[4:7], imu[7:] = sensed.angular_velocity[0], sensed.acceleration[0]
+        self._late.append((stamp, imu))
         arrived = None
-        while self._late and self._late[0][0] <= stamp - 1e9 * noise.delay:
+        while self._late and self._late[0][0] <= stamp - self._delay:
             arrived = self._late.popleft()
         return arrived
 

@@ -14,7 +14,7 @@
 
 """The way to angles that joints are not at yet, or that are in motion already."""
 
-from cpg_ros.motion.pattern import smoothstep
+from cpg_ros.motion.strides import smoothstep
 import numpy as np
 
 #: Angles this close are followed at once, rad.

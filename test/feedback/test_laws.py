@@ -31,6 +31,7 @@ from cpg_ros.feedback.laws import (
     touchdown,
     virtual_stiffness,
 )
+from cpg_ros.feedback.laws.law import low_passed
 from go2 import DT
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_a_body_that_goes_too_fast_steps_further():
 def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
     swung = stood = 0.0
     for _ in range(100):
-        swung = placement.in_swing(swung, 0.05, GAINS, DT)
+        swung = low_passed(swung, 0.05, GAINS.step_filter, DT)
         stood = placement.in_stance(stood, 0.1, GAINS, DT)
     assert swung == pytest.approx(0.05, abs=1e-3)
     assert -0.1 * 0.2 < stood < 0.0
@@ -98,7 +99,7 @@ def test_pace_tires_of_what_lasts():
         added = pace.frequency_change(5.0, fatigue, GAINS)
         if k * DT < 0.1:
             assert added > 0.9 * GAINS.pace_most
-        fatigue = pace.update_fatigue(fatigue, added, GAINS, DT)
+        fatigue = low_passed(fatigue, added, GAINS.pace_memory, DT)
     assert added == pytest.approx(GAINS.pace_most / (1.0 + GAINS.pace_fatigue), rel=0.01)
 
 
@@ -163,7 +164,7 @@ def test_feet_that_stumble_are_lifted_higher_and_lower_again_later():
 def test_feet_stand_under_the_body_on_a_slope():
     ground = 0.0
     for _ in range(2000):
-        ground = slope.update_ground(ground, -0.2, GAINS, DT)
+        ground = low_passed(ground, -0.2, GAINS.slope_filter, DT)
     assert ground == pytest.approx(-0.2, abs=1e-3)
     assert slope.shift(ground, 0.7, GAINS) == pytest.approx(
         -0.7 * GAINS.slope_height * math.tan(0.2), abs=1e-3)

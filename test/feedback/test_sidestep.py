@@ -18,6 +18,7 @@ import importlib.util
 
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.laws import sidestep
+from cpg_ros.feedback.laws.law import low_passed
 from go2 import DT, program
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def test_a_turn_that_ends_is_forgotten_within_a_second():
     turn = 0.0
     for wanted in (1.0, 0.0):
         for _ in range(round(2.0 / DT)):
-            turn = sidestep.smooth_turn(turn, wanted, GAINS, DT)
+            turn = low_passed(turn, wanted, GAINS.sidestep_filter, DT)
         assert turn == pytest.approx(wanted, abs=0.02)
 
 

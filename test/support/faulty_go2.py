@@ -27,7 +27,7 @@ from cpg_ros.ros.feedback.loop import FeedbackLoop
 from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import SensorNoise
-from cpg_ros.simulation.sensors import InertialUnit
+from cpg_ros.simulation.sensors import SimulatedSensors
 from go2 import DT, GO2, program
 import numpy as np
 from sensor_faults import BEGINS, FaultySensors, Measured, Wire
@@ -65,7 +65,7 @@ class FaultyGo2:
         settings.setdefault('latest', LATE)
         self.gait = program(gait)
         self.body = Body('go2', GO2)
-        self._unit = InertialUnit(self.body, DT, SensorNoise(
+        self._unit = SimulatedSensors(self.body, DT, SensorNoise(
             gyroscope_noise=0.02, accelerometer_noise=0.2, orientation_bias=0.008, seed=seed))
         self.pattern = Pattern(self.gait, 1.0, False, StrideCommand(4))
         geometry = geometry_of(GO2)

@@ -25,7 +25,7 @@ from cpg_ros.ros.feedback.loop import BalanceLoop
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import legs
 from cpg_ros.simulation.scenario import SensorNoise
-from cpg_ros.simulation.sensors import InertialUnit
+from cpg_ros.simulation.sensors import SimulatedSensors
 from cpg_ros.simulation.terrain import set_friction
 import numpy as np
 from sensor_faults import FaultySensors, Measured, Wire
@@ -72,7 +72,7 @@ class HumanoidUnderFault:
         self._names = (*robot.order, *robot.held)
         assert legs(robot) == tuple(robot.legs)
         self.faults = FaultySensors(fault, seed, begins)
-        self._unit = InertialUnit(body, DT, SensorNoise(**{**vars(NOISE), 'seed': seed}))
+        self._unit = SimulatedSensors(body, DT, SensorNoise(**{**vars(NOISE), 'seed': seed}))
         self._rng = np.random.default_rng(seed + 1)
         self._late: deque[Measured] = deque()
         self._limits = [robot.column(key) for key in ('lower', 'upper', 'velocity')]

@@ -28,11 +28,11 @@ from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.biped.tick import tick
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.pattern import GaitRunner, Pattern, smoothstep
-from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.pattern import GaitRunner, Pattern
+from cpg_ros.motion.plan import GaitPlan, plan_gait
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.robot import Robot
-from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.motion.strides import smoothstep, StrideCommand
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
@@ -63,9 +63,7 @@ def gait_plan(robot: Robot, gait: str) -> GaitPlan:
     if gait not in KINDS or gait not in presets or robot.biped is None:
         raise InputError(f"'{robot.name}' cannot be balanced in the gait '{gait}', only in "
                          + ', '.join(KINDS))
-    preset = presets[gait]
-    return plan(robot, gait, preset, preset.network,
-                BipedGains.of_body(robot.biped, gait).frequency)
+    return plan_gait(robot, gait, BipedGains.of_body(robot.biped, gait).frequency)
 
 
 class BipedFeedback:

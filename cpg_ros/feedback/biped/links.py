@@ -26,6 +26,7 @@ from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.kinematics import cross, GRAVITY
 from cpg_ros.motion.body_file import BASE
 from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.rotations import fill_rotation
 import numpy as np
 
 
@@ -116,14 +117,8 @@ def blank_pose(links: Links) -> Pose:
                 np.zeros(count), np.zeros((count, 3)), np.zeros(links.soles.shape))
 
 
-@jit
-def rotation(roll, pitch, yaw, out):
-    """Fill the rotation from the base's axes to the world's, shape (3, 3)."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    cy, sy = np.cos(yaw), np.sin(yaw)
-    out[0, 0], out[0, 1], out[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    out[1, 0], out[1, 1], out[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    out[2, 0], out[2, 1], out[2, 2] = -sp, cp * sr, cp * cr
+#: From the base's axes to the world's.
+rotation = jit(fill_rotation)
 
 
 @jit

@@ -17,7 +17,7 @@
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.efference_copy import between_speeds
 from cpg_ros.feedback.kinematics import wrapped
-from cpg_ros.feedback.laws.law import Gain, Law
+from cpg_ros.feedback.laws.law import Gain, Law, limited
 
 LAW = Law(
     'heading', 'hold the heading, by strides that differ between left and right', True,
@@ -29,7 +29,7 @@ LAW = Law(
 @jit
 def yaw_rate(wanted, yaw, gains):
     """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
-    return min(max(gains.turn * wrapped(wanted - yaw), -gains.turn_most), gains.turn_most)
+    return limited(gains.turn * wrapped(wanted - yaw), gains.turn_most)
 
 
 @jit

@@ -17,7 +17,10 @@
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+import math
 from typing import Any
+
+from cpg_ros.dynamics.integration.compilation import jit
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,18 @@ class Law:
     on: bool
     gains: Mapping[str, Gain]
     memory: Mapping[str, StateVariable] = field(default_factory=dict)
+
+
+@jit
+def limited(value, most):
+    """Return a value within a limit of its size."""
+    return min(max(value, -most), most)
+
+
+@jit
+def low_passed(value, target, time, dt):
+    """Return a low-passed value, dt in s later; the filter's time constant in s."""
+    return value + (1.0 - math.exp(-dt / time)) * (target - value)
 
 
 def named_tuple(name: str, fields: Iterable[str], defaults: Iterable[Any] = ()) -> Any:

@@ -62,15 +62,9 @@ def frequency_change(error, fatigue, gains):
 
     Args:
         error: see velocity_error, m/s.
-        fatigue: mean of the recent increases, see update_fatigue.
+        fatigue: low-passed increase of late.
         gains: of the law.
 
     """
     fresh = min(max(gains.pace_gain * (error - gains.pace_from), 0.0), gains.pace_most)
     return max(fresh - gains.pace_fatigue * fatigue, 0.0)
-
-
-@jit
-def update_fatigue(fatigue, added, gains, dt):
-    """Return the low-passed increase of the stride frequency, dt in s later."""
-    return fatigue + (1.0 - math.exp(-dt / gains.pace_memory)) * (added - fatigue)

@@ -17,7 +17,7 @@
 import math
 
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.law import Gain, Law, limited, low_passed, StateVariable
 
 LAW = Law(
     'placement', 'put feet down further in the direction in which the body is too fast', True,
@@ -63,13 +63,7 @@ def step(velocity, rate, gain, rate_gain, gains):
         gains: of the law.
 
     """
-    return min(max(gain * velocity + rate_gain * rate, -gains.step_most), gains.step_most)
-
-
-@jit
-def in_swing(displacement, wanted, gains, dt):
-    """Return the displacement of a foot in the air, m, dt in s later, on its way to a wanted."""
-    return displacement + (1.0 - math.exp(-dt / gains.step_filter)) * (wanted - displacement)
+    return limited(gain * velocity + rate_gain * rate, gains.step_most)
 
 
 @jit
@@ -78,8 +72,8 @@ def in_stance(displacement, yielding, gains, dt):
 
     The speed in m/s, dt in s.
     """
-    found = displacement * math.exp(-gains.step_decay * dt) - dt * yielding
-    return min(max(found, -gains.step_most), gains.step_most)
+    return limited(displacement * math.exp(-gains.step_decay * dt) - dt * yielding,
+                   gains.step_most)
 
 
 @jit
@@ -111,5 +105,6 @@ def advance(displacement, swinging, wanted, yielded, gains, dt):
 
     """
     for k in range(2):
-        displacement[k] = (in_swing(displacement[k], wanted[k], gains, dt) if swinging else
-                           in_stance(displacement[k], yielded[k], gains, dt))
+        displacement[k] = (
+            low_passed(displacement[k], wanted[k], gains.step_filter, dt) if swinging else
+            in_stance(displacement[k], yielded[k], gains, dt))

@@ -15,7 +15,7 @@
 """Posture: legs of the low side push, and a foot in the air stays level to gravity."""
 
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws.law import Gain, Law
+from cpg_ros.feedback.laws.law import Gain, Law, limited
 
 LAW = Law(
     'posture', 'keep the body level, through the legs in stance and the height of feet '
@@ -49,12 +49,11 @@ def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
         gains: of the law.
 
     """
-    drawn = ((gains.roll * roll + gains.roll_rate * roll_rate) * y
-             - (gains.pitch * pitch + gains.pitch_rate * pitch_rate) * x)
-    return min(max(drawn, -gains.posture_most), gains.posture_most)
+    return limited((gains.roll * roll + gains.roll_rate * roll_rate) * y
+                   - (gains.pitch * pitch + gains.pitch_rate * pitch_rate) * x, gains.posture_most)
 
 
 @jit
 def in_swing(x, y, roll, pitch, gains):
     """Return how far to draw a foot in so that its height is that of a level body, m."""
-    return min(max(pitch * x - roll * y, -gains.posture_most), gains.posture_most)
+    return limited(pitch * x - roll * y, gains.posture_most)

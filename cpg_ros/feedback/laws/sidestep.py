@@ -19,11 +19,8 @@ A gait that turns drifts to the side, too, so that the same integral acts as far
 commanded.
 """
 
-import math
-
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws import placement
-from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.law import Gain, Law, limited, low_passed, StateVariable
 
 LAW = Law(
     'sidestep', 'follow the sideways speed of cmd_vel', True,
@@ -58,15 +55,13 @@ def landing(wanted, stance, gains):
         gains: of the law.
 
     """
-    far = 0.5 * stance * gains.sidestep_share * wanted
-    return min(max(far, -gains.sidestep_most), gains.sidestep_most)
+    return limited(0.5 * stance * gains.sidestep_share * wanted, gains.sidestep_most)
 
 
 @jit
 def carry(displacement, wanted, gains, dt):
     """Return the displacement to the left of a foot on the ground, m, dt in s later."""
-    displacement -= dt * gains.sidestep_share * wanted
-    return min(max(displacement, -gains.sidestep_most), gains.sidestep_most)
+    return limited(displacement - dt * gains.sidestep_share * wanted, gains.sidestep_most)
 
 
 @jit
@@ -83,14 +78,8 @@ def advance(displacement, swinging, wanted, stance, gains, dt):
 
     """
     if swinging:
-        return placement.in_swing(displacement, landing(wanted, stance, gains), gains, dt)
+        return low_passed(displacement, landing(wanted, stance, gains), gains.step_filter, dt)
     return carry(displacement, wanted, gains, dt)
-
-
-@jit
-def smooth_turn(turn, commanded, gains, dt):
-    """Return the low-passed turn, rad/s, dt in s later."""
-    return turn + (1.0 - math.exp(-dt / gains.sidestep_filter)) * (commanded - turn)
 
 
 @jit
@@ -109,4 +98,4 @@ def correct_speed(correction, missing, wanted, turn, gains, dt):
 
     """
     most = gains.sidestep_more * abs(wanted) + gains.sidestep_turning * abs(turn)
-    return min(max(correction + dt * gains.sidestep_rate * missing, -most), most)
+    return limited(correction + dt * gains.sidestep_rate * missing, most)

@@ -17,7 +17,7 @@
 import math
 
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.law import Gain, Law, limited, StateVariable
 
 LAW = Law(
     'slope', 'move the feet under the centre of mass on slopes', True,
@@ -37,12 +37,6 @@ LAW = Law(
 
 
 @jit
-def update_ground(ground, angle, gains, dt):
-    """Return the angle of the ground, rad, dt in s later: the body's low-passed roll or pitch."""
-    return ground + (1.0 - math.exp(-dt / gains.slope_filter)) * (angle - ground)
-
-
-@jit
 def shift_ahead(ground, singly, gains):
     """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill.
 
@@ -55,5 +49,4 @@ def shift_ahead(ground, singly, gains):
 @jit
 def shift(ground, fraction, gains):
     """Return how far to move all feet uphill, m, on ground at an angle in rad."""
-    far = fraction * gains.slope_height * math.tan(ground)
-    return min(max(far, -gains.slope_most), gains.slope_most)
+    return limited(fraction * gains.slope_height * math.tan(ground), gains.slope_most)

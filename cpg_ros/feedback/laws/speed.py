@@ -15,7 +15,7 @@
 """Speed: a robot that is too slow takes longer strides."""
 
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.law import Gain, Law, limited, StateVariable
 
 LAW = Law(
     'speed', 'hold the speed, through the length of the strides', True,
@@ -33,12 +33,10 @@ LAW = Law(
 @jit
 def stride_change(missing, integral, gains):
     """Return what to add to the strides; the missing speed in m/s, its integral in m."""
-    return min(max(gains.speed_share * missing + gains.speed_rate * integral, -gains.speed_most),
-               gains.speed_most)
+    return limited(gains.speed_share * missing + gains.speed_rate * integral, gains.speed_most)
 
 
 @jit
 def integrate(integral, missing, gains, dt):
     """Return the integral of the missing speed, m, no larger than the law can use."""
-    most = gains.speed_most / max(gains.speed_rate, 1e-9)
-    return min(max(integral + dt * missing, -most), most)
+    return limited(integral + dt * missing, gains.speed_most / max(gains.speed_rate, 1e-9))

@@ -20,7 +20,7 @@ share the change, and the stride frequency makes it gradually, so that joints do
 """
 
 from cpg_ros.dynamics.integration.compilation import jit
-from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
+from cpg_ros.feedback.laws.law import Gain, Law, limited, StateVariable
 
 LAW = Law(
     'touchdown', "begin a leg's stance when its foot lands", False,
@@ -61,4 +61,4 @@ def frequency_change(correction, frequency):
 
     The correction of the phase that is still to be made in cycles, the frequency in Hz.
     """
-    return min(max(correction / (SETTLING * frequency), -MOST), MOST)
+    return limited(correction / (SETTLING * frequency), MOST)

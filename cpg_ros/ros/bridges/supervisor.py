@@ -22,7 +22,7 @@ from collections.abc import Callable
 from enum import Enum
 import math
 
-from cpg_ros.motion.pattern import smoothstep
+from cpg_ros.motion.strides import smoothstep
 from cpg_ros.ros.bridges.robot_state import BridgeSettings, JointCommand, RobotState
 import numpy as np
 

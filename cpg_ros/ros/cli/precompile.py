@@ -32,7 +32,7 @@ from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.feedback import warm_up, warm_up_judges
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.motion.pattern import precompile
+from cpg_ros.motion.phase_readout import precompile
 from cpg_ros.motion.robot_file import load_robot
 
 #: What is compiled, those that the demonstration needs first, and the longest it may take, s.

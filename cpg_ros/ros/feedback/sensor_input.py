@@ -20,7 +20,7 @@ import math
 import struct
 
 from cpg_ros.dynamics.integration.compilation import specialised
-from cpg_ros.feedback.estimate import fill_quaternion, loads_of, SensorData
+from cpg_ros.feedback.estimate import loads_of, SensorData
 from cpg_ros.feedback.input_checks import (
     IMU,
     IMU_MEMORY,
@@ -32,6 +32,7 @@ from cpg_ros.feedback.input_checks import (
 )
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.motion.robot import Robot
+from cpg_ros.motion.rotations import fill_quaternion
 from cpg_ros.ros.node.polled import PolledSubscription
 from geometry_msgs.msg import WrenchStamped
 import numpy as np

@@ -32,11 +32,11 @@ from cpg_ros.motion.description import (
     numbers,
     parse_tree,
     read_tree,
-    rotation,
 )
 from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, RobotError
+from cpg_ros.motion.rotations import rotation
 from cpg_ros.ros.node.client import Graph, namespace, NodeClient, ServiceClients
 from cpg_ros.ros.node.polled import latched, PolledSubscription
 from cpg_ros.ros.panel import shape as solids

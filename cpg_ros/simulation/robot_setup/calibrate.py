@@ -29,7 +29,7 @@ from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.gait_tables import POINTS, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.fitting.gaits.stride import find_stride
-from cpg_ros.motion.plan import plan
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.networks.registry import NETWORKS
@@ -86,8 +86,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     if gait not in network.presets():
         raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
                          f'{stride.nearest}): name it with --gait')
-    preset, motion = network.presets()[gait], robot.motion(gait, gait)
-    gait_plan = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+    gait_plan = plan_gait(robot, gait)
     columns = [recording.joints.index(name) for name in stride.joints]
 
     times, felt, estimate = recording.times, recording.senses, BodyState(geometry)

@@ -40,7 +40,7 @@ from cpg_ros.motion.description import (
     SERVOS,
     sprawls,
 )
-from cpg_ros.motion.plan import plan
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import HARMONICS, Joint, Robot
 from cpg_ros.motion.robot_file import LARGEST, LIMITS, load_robot, write_robot
 from cpg_ros.networks.registry import NETWORKS, numbered
@@ -209,8 +209,7 @@ def _fitting(robot: Robot) -> Robot:
     offset = robot.column('offset')
     for network in robot.networks:
         for gait in NETWORKS[network].gaits():
-            preset = NETWORKS[network].presets()[gait]
-            gait_plan = plan(unlimited(robot), gait, preset, preset.network, 1.0)
+            gait_plan = plan_gait(unlimited(robot), gait, 1.0, network=network)
             room = np.stack([offset - low, high - offset, fast])
             needed = np.stack([-gait_plan.span[0], gait_plan.span[1], gait_plan.speed])
             fraction = np.minimum(fraction, (USED * room / np.maximum(needed, 1e-9)).min(axis=0))

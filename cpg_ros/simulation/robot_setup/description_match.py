@@ -26,7 +26,7 @@ from cpg_ros.common.command_line import table
 from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError, role_of
 from cpg_ros.motion.body_file import body_geometry, BodyGeometry, LegChain, LEGS
 from cpg_ros.motion.description import JointDescription, RobotDescription, SERVOS, SLOW
-from cpg_ros.motion.plan import plan, PlanError
+from cpg_ros.motion.plan import plan_gait, PlanError
 from cpg_ros.motion.robot import Joint, Motion, Robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.robot_setup.geometry_match import (
@@ -218,11 +218,10 @@ def _shape(robot: Robot, known: RobotDescription, gaits: Sequence[tuple[str, str
     if robot.geometry is not None and geometry is not None:
         yield from differing(robot.geometry, geometry, known.format)
     for network, name in gaits:
-        preset = NETWORKS[network].presets()[name]
-        if preset.gait in FORWARD_GAITS:
+        if NETWORKS[network].presets()[name].gait in FORWARD_GAITS:
             with suppress(PlanError):    # which the gait's own check reports
-                made = plan(unlimited(robot), name, preset, preset.network, USUAL_FREQUENCY)
-                yield from walks_backward(robot, known, made)
+                yield from walks_backward(robot, known, plan_gait(
+                    unlimited(robot), name, USUAL_FREQUENCY, network=network))
                 return
 
 
@@ -264,11 +263,10 @@ def _faults(joint: Joint, known: RobotDescription, near: str) -> Iterator[str]:
 
 def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
           frequency: float | None, amplitude: float) -> GaitCheck:
-    preset = NETWORKS[network].presets()[name]
     if frequency is None:
-        frequency = _fastest(robot.motion(name, preset.gait))
+        frequency = _fastest(robot.motion(name, NETWORKS[network].presets()[name].gait))
     try:
-        gait_plan = plan(unlimited(robot), name, preset, preset.network, frequency, amplitude)
+        gait_plan = plan_gait(unlimited(robot), name, frequency, amplitude, network)
     except PlanError as error:
         return GaitCheck(network, name, nan, nan, '', nan, '', (str(error),))
     faults, rooms, fractions = [], [], []

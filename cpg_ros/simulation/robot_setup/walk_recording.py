@@ -21,14 +21,14 @@ from typing import Any
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
-from cpg_ros.feedback.estimate import rpy_of, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.fitting.recordings.bag_storage import opened
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
 from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
-from cpg_ros.motion.plan import plan
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
-from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.tuning.foot_path import read_geometry
@@ -87,15 +87,14 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
         InputError: a robot did not go through all phases of a stride.
 
     """
-    presets, motions = NETWORKS[robot.networks[0]].presets(), dict(robot.motions)
+    motions = dict(robot.motions)
     for gait in gaits:
-        preset, motion = presets[gait], robot.motion(gait, gait)
-        gait_plan = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
-        loop = ClosedLoopBatch(model, gait_plan, kp=kp, kd=kd)
+        loop = ClosedLoopBatch(model, plan_gait(robot, gait), kp=kp, kd=kd)
         geometry = read_geometry(loop.body, loop.parts)
         if not geometry.legs:
             return robot
-        motions[gait] = replace(motion, efference=measure_efference(loop).as_table())
+        motions[gait] = replace(robot.motion(gait, gait),
+                                efference=measure_efference(loop).as_table())
         robot = replace(robot, geometry=geometry)
         update(gait)
     return replace(robot, motions=motions)

@@ -33,8 +33,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.biped_run import BipedOutcome, BipedRun
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
-from cpg_ros.simulation.tuning.feedback import more_than_chance
-from cpg_ros.simulation.tuning.gaits import cma_es
+from cpg_ros.simulation.tuning.gaits import cma_search, more_than_chance, scaled_gains
 import numpy as np
 
 #: What is searched for.
@@ -45,8 +44,8 @@ SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'sp
 #: A gain changes by this factor at most, either way; the search begins with this spread of logs,
 #: and gains in a file have so many digits.
 FACTOR, SPREAD, DIGITS = 3.0, 0.15, 4
-#: Designs of a generation, and of a job; walks of a job that judges.
-GENERATION, TOGETHER, BATCH = 12, 3, 8
+#: Designs of a job; walks of a job that judges.
+TOGETHER, BATCH = 3, 8
 #: Pushes of each impulse, as shares of m sqrt(g h); speeds, m/s, and height of tiles, m, for a
 #: robot of the G1's size.
 PUSHES, IMPULSES, SPEEDS, TILES = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
@@ -173,27 +172,20 @@ def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
     usual = BipedGains.of_body(_body(robot))
     compute = map if executor is None else executor.map
 
-    def changed(logs: Sequence[float]) -> dict[str, float]:
-        found = {}
-        for name, log in zip(SEARCHED, logs, strict=True):
-            value = float(f'{getattr(usual, name) * math.exp(log):.{DIGITS}g}')
-            found[name] = min(max(value, GAINS[name].low), GAINS[name].high)
-        return found
+    def changed(logs: np.ndarray) -> dict[str, float]:
+        return {name: float(f'{gain:.{DIGITS}g}')
+                for name, gain in scaled_gains(usual, SEARCHED, logs, GAINS).items()}
 
-    most, tried = math.log(FACTOR), 0
-    search = cma_es().CMAEvolutionStrategy(np.zeros(len(SEARCHED)), SPREAD, {
-        'bounds': [-most, most], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
-    draws = np.random.default_rng([seed, 1])
-    while tried < evaluations:
-        logs = search.ask()
-        walks = _walks(robot, int(draws.integers(2**31)), PUSHES, 1)
+    def price(logs: Sequence[np.ndarray], draw: int) -> list[float]:
+        walks = _walks(robot, draw, PUSHES, 1)
         jobs = [WalkJob(robot, model, [*map(changed, logs[k:k + TOGETHER])], walks)
                 for k in range(0, len(logs), TOGETHER)]
-        search.tell(logs, [_price(walks, one) for some in compute(walked, jobs) for one in some])
-        tried += len(logs)
-        update(min(tried, evaluations))
-    # The middle of the last generation: its best one was lucky, too.
-    gains = changed(search.result.xfavorite)
+        return [_price(walks, outcomes) for part in compute(walked, jobs) for outcomes in part]
+
+    most = math.log(FACTOR)
+    logs, _ = cma_search(np.zeros(len(SEARCHED)), SPREAD, (-most, most), seed, price, evaluations,
+                         update)
+    gains = changed(logs)
     fresh = _walks(robot, FRESH + seed, JUDGED, WALKED)
     jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + BATCH])
             for k in range(0, len(fresh), BATCH)]
@@ -229,10 +221,13 @@ def _walks(robot: Robot, seed: int, pushes: int, walks: int) -> list[Walk]:
     return found
 
 
-def _price(walks: Sequence[Walk], found: Sequence[BipedOutcome]) -> float:
-    """Return the mean price of runs: falls, the sooner the dearer, errors of speed, and tilt."""
+def _price(walks: Sequence[Walk], outcomes: Sequence[BipedOutcome]) -> float:
+    """Return the mean price of runs: of falls, errors of speed, and tilt.
+
+    A fall costs more the earlier it happens.
+    """
     price = 0.0
-    for walk, one in zip(walks, found, strict=True):
+    for walk, one in zip(walks, outcomes, strict=True):
         if math.isfinite(one.fell):
             price += 2.0 - one.fell / END + SPEED
             continue

@@ -27,13 +27,18 @@ from cpg_ros.feedback.gains import dimensionless, GAINS, Gains, leg_length, robo
 from cpg_ros.feedback.gait_tables import Timetable
 from cpg_ros.feedback.kinematics import geometry_of, GRAVITY
 from cpg_ros.motion.body_file import OwnFeedback
-from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
-from cpg_ros.simulation.tuning.gaits import cma_es
+from cpg_ros.simulation.tuning.gaits import (
+    cma_es,
+    cma_search,
+    more_than_chance,
+    scaled_gains,
+)
 import numpy as np
 from scipy.stats import binomtest
 
@@ -53,12 +58,6 @@ SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
                       accelerometer_bias=0.1)
 #: Laws that robots with slow joints or feet that drag are tried without, one set after the other.
 WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
-
-
-def more_than_chance(won: int, lost: int) -> bool:
-    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test)."""
-    changed = won + lost
-    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
 
 @dataclass(frozen=True)
@@ -102,12 +101,6 @@ class Benefit:
                 f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
 
-def program_of(robot: Robot, gait: str) -> GaitPlan:
-    """Plan a gait on the robot's first network; errors as of plan."""
-    preset = NETWORKS[robot.networks[0]].presets()[gait]
-    return plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
-
-
 def judged_gaits(robot: Robot) -> list[str]:
     """Return the gaits that feedback is judged in: those with an efference copy that do not hop.
 
@@ -118,7 +111,7 @@ def judged_gaits(robot: Robot) -> list[str]:
     geometry, known = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
     return [gait for gait, motion in robot.motions.items()
             if motion.efference is not None and gait in known
-            and not Timetable(program_of(robot, gait), geometry).hops]
+            and not Timetable(plan_gait(robot, gait), geometry).hops]
 
 
 class FeedbackTrial:
@@ -139,7 +132,7 @@ class FeedbackTrial:
             SimulationError: the model cannot be used.
 
         """
-        plan = program_of(robot, gait)
+        plan = plan_gait(robot, gait)
         self.loop = ClosedLoopBatch(model, plan, kp=kp, kd=kd)
         self.length = leg_length(self.loop.geometry)
         self.speed = FROUDE * math.sqrt(GRAVITY * self.length)
@@ -237,8 +230,8 @@ SEARCHED = {
     'slope': ('slope_share',), 'speed': ('speed_share', 'speed_rate')}
 #: A gain changes by this factor at most, either way; the search begins with this spread of logs.
 FACTOR, SPREAD = 8.0, 0.35
-#: Designs of a generation, and of a job; pushes of each impulse, and fields of rough ground.
-GENERATION, TOGETHER, PUSHES, FIELDS = 12, 3, 8, 3
+#: Designs of a job; pushes of each impulse, and fields of rough ground.
+TOGETHER, PUSHES, FIELDS = 3, 8, 3
 #: Impulses of pushes, as shares of m sqrt(g l): harder than most survive.
 IMPULSES = (0.6, 1.0, 1.4)
 #: Height of the fields, as a share of the legs' length.
@@ -380,7 +373,15 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     cheapest = int(np.argmin(price(usual, seed)))
     own, before = starts[cheapest], usual[cheapest]
     names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
-    after, tried = _search(before, names, price, evaluations, seed, len(starts), update)
+    most = math.log(FACTOR)
+
+    def changed(logs: np.ndarray) -> Gains:
+        return before._replace(**scaled_gains(before, names, logs, GAINS))
+
+    logs, tried = cma_search(np.zeros(len(names)), SPREAD, (-most, most), seed,
+                             lambda points, draw: price([*map(changed, points)], draw),
+                             evaluations, update, len(starts))
+    after = changed(logs)
     found = _compared(trials, before, after, seed)
     if found.better:
         listed = dimensionless(after, leg_length(geometry_of(robot)))
@@ -390,28 +391,6 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     return replace(robot, feedback=replace(
         judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
         f'{found}; {judged.made}')), found
-
-
-def _search(before: Gains, names: Sequence[str], price: Callable[[Sequence[Gains], int], list],
-            evaluations: int, seed: int, tried: int, update: Callable[[int], None]
-            ) -> tuple[Gains, int]:
-    """Return the gains that CMA-ES finds, those named changed, and how many sets were tried."""
-    def changed(logs: Sequence[float]) -> Gains:
-        return before._replace(**{
-            name: min(max(getattr(before, name) * math.exp(log), GAINS[name].low),
-                      GAINS[name].high) for name, log in zip(names, logs, strict=True)})
-
-    most = math.log(FACTOR)
-    search = cma_es().CMAEvolutionStrategy(np.zeros(len(names)), SPREAD, {
-        'bounds': [-most, most], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
-    draws = np.random.default_rng([seed, 1])
-    while tried < evaluations:
-        logs = search.ask()
-        search.tell(logs, price([changed(one) for one in logs], int(draws.integers(2**31))))
-        tried += len(logs)
-        update(min(tried, evaluations))
-    # The middle of the last generation: its best one was lucky, too.
-    return changed(search.result.xfavorite), tried
 
 
 def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int

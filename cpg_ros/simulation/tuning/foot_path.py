@@ -16,7 +16,7 @@
 
 A gait is described by a few lengths and times, the same for the left and right leg of a pair.
 Legs move in the plane of their last two joints, and the first ones hold still; or they reach to
-the side (see sprawled_leg). What joints do in a cycle is fitted as if legs stood half of it, which
+the side. What joints do in a cycle is fitted as if legs stood half of it, which
 a few harmonics can do; that they stand longer is the duty factor's.
 """
 
@@ -26,8 +26,8 @@ from typing import Any
 
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.feedback.efference_copy import periodic
-from cpg_ros.feedback.kinematics import bend_of
-from cpg_ros.motion.body_file import body_geometry, BodyGeometry, LegChain
+from cpg_ros.feedback.kinematics import foot_of, geometry_of, joints_of
+from cpg_ros.motion.body_file import body_geometry, BodyGeometry, LegChain, LegGeometry
 from cpg_ros.motion.description import outward, sprawls
 from cpg_ros.motion.phase_readout import joint_readout, standing
 from cpg_ros.motion.readout import Duty
@@ -36,9 +36,9 @@ from cpg_ros.simulation.body import Anatomy, Body
 from cpg_ros.simulation.robot_model import engine, legs, SimulationError
 import numpy as np
 
-# The geometry of a robot's legs, read off its model, and the angles of two links.
+# The geometry of a robot's legs, read off its model.
 
-#: Share up to which the centre of mass counts as above the middle of the feet.
+#: Fraction up to which the centre of mass counts as above the middle of the feet.
 CENTRED = 0.1
 
 
@@ -54,30 +54,6 @@ def chain_of(body: Body, leg: str) -> tuple[list[Joint], list[int]]:
     chain = sorted(body.robot.legs[leg],
                    key=lambda joint: body.model.joint(joint.name).bodyid[0])
     return chain, [body.model.joint(joint.name).id for joint in chain]
-
-
-def two_link_angles(upper: complex, lower: complex, bend: float, place: np.ndarray
-                    ) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much two links in a plane are turned, rad, to end at places of it.
-
-    A place out of reach is taken to the nearest one along its line to the first joint.
-
-    Args:
-        upper: from the first joint to the second where neither is turned, m.
-        lower: from there to the end, m.
-        bend: 1 or -1, the side to which the second joint is bent.
-        place: of the end, from the first joint, m, any shape.
-
-    """
-    a, b = abs(upper), abs(lower)
-    cosine = np.clip((np.abs(place)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
-    second = bend * np.arccos(cosine) - np.angle(lower / upper)
-    return np.angle(place / (upper + lower * np.exp(1j * second))), second
-
-
-def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Return angles from -pi to pi, rad."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def centre_ahead(body: Body, parts: Anatomy) -> float:
@@ -144,80 +120,9 @@ def _ends(model: Any, geom: int) -> np.ndarray:
     return np.array([middle - longest, middle + longest])
 
 
-# A leg that reaches to the side (see robots.sprawled_stand): its angles, read off a model.
-
-#: How far a joint or the foot may be beside the leg's plane, as a share of the leg's length.
-BESIDE = 0.1
-
-
-class SprawledLeg:
-    """Three links: an upright axis, then two links in a plane that goes through it.
-
-    Attributes:
-        joints: that move them, coxa, femur and tibia.
-        length: height of the femur's axis above the foot in the stand, m.
-
-    """
-
-    def __init__(self, body: Body, parts: Anatomy, leg: str) -> None:
-        """Look at a leg with all joints at 0.
-
-        Raises:
-            SimulationError: its foot is far beside the plane that the coxa turns.
-
-        """
-        data, (chain, ids) = at_zero(body), chain_of(body, leg)
-        self.joints: tuple[Joint, ...] = tuple(chain[-3:])
-        ids = ids[-3:]
-        foot = parts.places(data)[legs(body.robot).index(leg)]
-        corners = np.stack([*data.xanchor[ids], foot]) - data.xanchor[ids[0]]
-        out = outward(data.xaxis[ids[1]], corners[3])
-        beside = np.abs(corners[:, :2] @ np.array([-out[1], out[0]])).max()
-        if beside > BESIDE * np.linalg.norm(np.diff(corners, axis=0), axis=1).sum():
-            raise SimulationError(f'leg {leg}: its foot is {100.0 * beside:.1f} cm beside the '
-                                  f'plane in which {self.joints[1].name} and '
-                                  f'{self.joints[2].name} move it')
-        # As complex numbers out + i up; turns of femur and tibia by what they do to out.
-        points = corners[:, :2] @ out + 1j * corners[:, 2]
-        self._coxa, self._upper, self._lower = np.diff(points)
-        across = np.array([out[0], out[1], 0.0])
-        self._turns = np.array([data.xaxis[ids[0], 2],
-                                *(np.cross(data.xaxis[one], across)[2] for one in ids[1:])])
-        self._heading = math.atan2(out[1], out[0])
-        stand = np.array([joint.offset for joint in self.joints])
-        self._bend = bend_of(self._upper, self._lower, self._turns[2] * stand[2])
-        self._x, self._y, height = (float(one[0]) for one in self._foot(*stand[:, None]))
-        self.length = -height
-
-    def _foot(self, coxa: np.ndarray, femur: np.ndarray, tibia: np.ndarray
-              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the foot's places forward, to the left and upward of the femur's height, m."""
-        plane = np.exp(1j * self._turns[1] * femur) * (
-            self._upper + self._lower * np.exp(1j * self._turns[2] * tibia))
-        reach = self._coxa.real + plane.real
-        way = self._heading + self._turns[0] * coxa
-        return reach * np.cos(way), reach * np.sin(way), plane.imag
-
-    def angles(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the joints' angles, rad, that put the foot there, the tibia bent as it is.
-
-        Args:
-            x: forward of where the foot is in the stand, m.
-            z: upward of the femur's axis, m.
-
-        A place out of reach is taken to the nearest one along its line to the femur's axis.
-        """
-        x = self._x + x
-        way = np.arctan2(self._y, x)
-        place = np.hypot(x, self._y) - self._coxa.real + 1j * z
-        femur, tibia = two_link_angles(self._upper, self._lower, self._bend, place)
-        return tuple(wrapped(turn * angle) for turn, angle in zip(
-            self._turns, (way - self._heading, femur, tibia), strict=True))
-
-
 #: Points of a cycle at which curves are fitted.
 POINTS = 128
-#: Share of the cycle that weights make a leg stand by themselves.
+#: Fraction of the cycle that weights make a leg stand by themselves.
 OWN = 0.5
 #: Digits of weights and offsets, rad, in the file.
 DIGITS = 4
@@ -229,7 +134,7 @@ class FootTrajectory:
 
     Attributes:
         stride: way on the floor, 0 for steps in place.
-        duty: share of the cycle on the floor, from phase 0 on.
+        duty: fraction of the cycle on the floor, from phase 0 on.
         lift: largest height above the floor.
         height: of the joint above the foot on the floor.
         ahead: of the joint, middle of the way on the floor.
@@ -263,54 +168,77 @@ class FootTrajectory:
         return x, z - self.height
 
 
-class FootTrajectoryFit:
-    """Two links in a vertical plane, read off a model.
+#: How far a joint or the foot may be beside a sprawled leg's plane, as a fraction of its length.
+BESIDE = 0.1
+
+
+class Leg:
+    """The joints of a leg that move its foot in a stride, read off a model.
+
+    They are the last two of a leg that moves in a vertical plane, or coxa, femur and tibia of one
+    that reaches to the side (see description.sprawls).
 
     Attributes:
-        thigh, calf: the joints that move them.
-        length: from thigh joint to foot in the stand, m.
+        joints: from the base outwards.
+        length: from the thigh joint to the foot in the stand, or the height of the femur's axis
+            above the foot, m.
 
     """
 
     def __init__(self, body: Body, parts: Anatomy, leg: str) -> None:
-        """Look at a leg with all joints at 0.
+        """Read a leg with all joints at 0.
 
         Raises:
-            SimulationError: its last two joints do not turn about parallel axes across the body.
+            SimulationError: its last two joints do not turn about parallel axes across the body,
+                or its foot is far beside the plane that the coxa turns.
 
         """
         data, (chain, ids) = at_zero(body), chain_of(body, leg)
         if len(chain) < 2:
             raise SimulationError(f'leg {leg} has fewer than two joints')
-        self.thigh, self.calf = chain[-2:]
-        ids = ids[-2:]
-        self._turns = data.xaxis[ids, 1]
-        if np.abs(self._turns).min() < 0.99:
-            raise SimulationError(f'leg {leg}: {self.thigh.name} and {self.calf.name} do not both '
-                                  'turn about an axis across the body')
+        sprawled, yaw = sprawls(data.xaxis[ids]), None
+        count = 3 if sprawled else 2
+        self.joints: tuple[Joint, ...] = tuple(chain[-count:])
+        axes, anchors = data.xaxis[ids[-count:]], data.xanchor[ids[-count:]]
         foot = parts.places(data)[legs(body.robot).index(leg)]
-        corners = np.stack([*data.xanchor[ids], foot])[:, [0, 2]]
-        upper, lower = np.diff(corners, axis=0)
-        # As complex numbers z + i x a positive turn about y multiplies by exp(i angle).
-        self._upper, self._lower = complex(upper[1], upper[0]), complex(lower[1], lower[0])
-        self._bend = bend_of(self._upper, self._lower, self._turns[1] * self.calf.offset)
-        self.joints: tuple[Joint, ...] = (self.thigh, self.calf)
-        self.length = float(np.hypot(*self.foot(np.array(self.thigh.offset),
-                                                np.array(self.calf.offset))))
+        across, names = np.array([0.0, 1.0, 0.0]), [joint.name for joint in self.joints]
+        if sprawled:
+            out = outward(axes[1], foot - anchors[0])
+            yaw, across = math.atan2(out[1], out[0]), np.array([-out[1], out[0], 0.0])
+            corners = np.stack([*anchors, foot]) - anchors[0]
+            beside = np.abs(corners @ across).max()
+            if beside > BESIDE * np.linalg.norm(np.diff(corners, axis=0), axis=1).sum():
+                raise SimulationError(f'leg {leg}: its foot is {100.0 * beside:.1f} cm beside the '
+                                      f'plane in which {names[1]} and {names[2]} move it')
+        turns = np.array([*axes[:-2, 2], *axes[-2:] @ across])
+        if np.abs(turns).min() < 0.99:
+            raise SimulationError(f'leg {leg}: {names[0]} and {names[1]} do not both turn about '
+                                  'an axis across the body')
+        # From the first of these joints.
+        thigh = anchors[-2] - anchors[0]
+        shape = LegGeometry(tuple(names), tuple(np.sign(turns)), (0.0, 0.0, 0.0), tuple(thigh),
+                            tuple(anchors[-1] - anchors[-2]), tuple(foot - anchors[-1]), yaw)
+        geometry = geometry_of(body.robot, BodyGeometry(body.mass, 0.0, {leg: shape}))
+        self._row = geometry.rows[list(body.robot.legs).index(leg)]
+        angles = [0.0] * (3 - count) + [joint.offset for joint in self.joints]
+        x, y, z = foot_of(self._row, *angles)
+        self._origin = (x, y, thigh[2]) if sprawled else (0.0, 0.0, 0.0)
+        self.length = thigh[2] - z if sprawled else math.hypot(x, z)
 
-    def foot(self, thigh: np.ndarray, calf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the foot's places forward and upward of the thigh joint, m."""
-        turn = np.exp(1j * self._turns[0] * thigh)
-        place = turn * (self._upper + self._lower * np.exp(1j * self._turns[1] * calf))
-        return place.imag, place.real
+    def angles(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the joints' angles that put the foot there, rad, shape (joints, n).
 
-    def angles(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return thigh and calf angles, rad, that put the foot there, the knee bent as it is.
+        A point out of reach is moved to the nearest one along its line to the thigh joint.
 
-        A place out of reach is taken to the nearest one along its line to the joint.
+        Args:
+            x: forward of the thigh joint, or of the foot in the stand if the leg reaches to the
+                side, m, shape (n,).
+            z: upward of the axis of the thigh or femur, m, shape (n,).
+
         """
-        thigh, calf = two_link_angles(self._upper, self._lower, self._bend, z + 1j * x)
-        return self._turns[0] * thigh, wrapped(self._turns[1] * calf)
+        forward, left, up = self._origin
+        return np.array([joints_of(self._row, forward + dx, left, up + dz)
+                         for dx, dz in zip(x, z, strict=True)]).T[-len(self.joints):]
 
 
 def basis(orbit: Orbit, cell: int, harmonics: int, path: FootTrajectory) -> np.ndarray:
@@ -352,19 +280,17 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
     return float(found[0]), found[1:].reshape(2, 6), rest
 
 
-class Feet:
-    """The feet of a robot: the joint motions for given paths."""
+class FootTrajectoryFit:
+    """The motions of a robot's joints that move its feet along given trajectories."""
 
     def __init__(self, body: Body, parts: Anatomy) -> None:
-        """Look at all legs; errors as of Leg."""
+        """Read all legs; errors as of Leg."""
         self.robot = body.robot
-        self.legs: dict[str, FootTrajectoryFit | SprawledLeg] = {
-            leg: (SprawledLeg if sprawls(at_zero(body).xaxis[chain_of(body, leg)[1]])
-                  else FootTrajectoryFit)(body, parts, leg) for leg in legs(body.robot)}
+        self.legs = {leg: Leg(body, parts, leg) for leg in legs(body.robot)}
 
     @property
     def length(self) -> float:
-        """Of the legs in the stand, their mean, m."""
+        """Mean length of the legs in the stand, m."""
         return float(np.mean([leg.length for leg in self.legs.values()]))
 
     def joints(self, orbit: Orbit, paths: dict[str, FootTrajectory]) -> dict[str, JointMotion]:

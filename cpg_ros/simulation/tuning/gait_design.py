@@ -165,10 +165,10 @@ class GaitTarget:
     start: Design
     high: Design
 
-    def design(self, place: np.ndarray) -> Design:
-        """Return the design at a place in the unit cube between low and high."""
+    def design(self, point: np.ndarray) -> Design:
+        """Return the design at a point of the unit cube between low and high."""
         low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
-        return Design(*(float(value) for value in low + place * (high - low)))
+        return Design(*(float(value) for value in low + point * (high - low)))
 
     def gentler(self, fraction: float) -> 'GaitTarget':
         """Return the same with a start that demands less of the joints, least at a share of 1."""
@@ -188,8 +188,8 @@ class GaitTarget:
         return GaitTarget(fraction * self.speed, self.hops, low, start, high)
 
     @property
-    def place(self) -> np.ndarray:
-        """Where the start is in the unit cube."""
+    def start_point(self) -> np.ndarray:
+        """The start in the unit cube, shape (11,)."""
         low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
         return (np.array(astuple(self.start)) - low) / (high - low)
 

@@ -18,17 +18,18 @@ CMA-ES (Hansen) looks for the design of a gait with the lowest price over severa
 different friction, with different loads and with pushes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from itertools import cycle
 import math
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.motion.description import SERVOS
-from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan, PlanError
+from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan_gait, PlanError
 from cpg_ros.motion.robot import Motion, Robot, SteeringTable
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.bodies import OpenLoopBatch, targets
@@ -36,7 +37,7 @@ from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.robot_setup.walk_recording import calibrated
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
-from cpg_ros.simulation.tuning.foot_path import centre_ahead, Feet, OWN
+from cpg_ros.simulation.tuning.foot_path import centre_ahead, FootTrajectoryFit, OWN
 from cpg_ros.simulation.tuning.gait_design import (
     AIMS,
     Design,
@@ -47,26 +48,28 @@ from cpg_ros.simulation.tuning.gait_design import (
     ROWS,
 )
 import numpy as np
+from scipy.stats import binomtest
 
-# What tuning finds for a gait.
+#: Points of a generation of CMA-ES.
+GENERATION = 12
 
-#: Share of the speed aimed at from which a gait is good.
+#: Fraction of the target speed from which a gait is good.
 GOOD = 0.3
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What was found for a gait.
+    """The best design of a gait.
 
     Attributes:
         gait: its name.
         design: of the lowest price.
         price: its price.
         first: price of the usual start.
-        motion: what it makes of the robot.
-        trial: LONG seconds of it on a good floor, nothing disturbing it.
-        aim: speed that it was to reach on this robot, m/s.
-        pace: share of the usual frequencies and speed, for joints that can do no more.
+        motion: of the robot by this design.
+        trial: LONG seconds of it on a good floor, undisturbed.
+        aim: target speed on this robot, m/s.
+        pace: fraction of the usual frequencies and speed that the joints can follow.
 
     """
 
@@ -93,7 +96,7 @@ class Tuned:
             f', at {100.0 * self.pace:.0f} % of the usual pace' if self.pace < 1.0 else '')
 
 
-# What a search is told that finds no design within a robot's limits: which came nearest.
+# The design closest to a robot's limits, for the error message of a failed search.
 
 class NoDesign(SimulationError):
     """None of a gait's designs can be run; the message gives the reason."""
@@ -120,7 +123,7 @@ class ClosestDesign:
 
     @property
     def fraction(self) -> float:
-        """The share of its frequency at which it would keep to its limits of speed."""
+        """Fraction of its frequency at which it would keep to its limits of speed."""
         return 1.0 / (1.0 + self.error.excess) if self.error.key == 'velocity' else 1.0
 
     def __str__(self) -> str:
@@ -151,12 +154,12 @@ MASS = 15.2
 #: Price of a design that the joints cannot follow, what each unit beyond a limit adds, which leads
 #: the search back to what they can, and the price of one that has no gait.
 REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
-#: Least share of a gait's usual frequencies that is tried where the joints are slow, and how far
-#: below their limit of speed its gentlest start then begins.
+#: Least fraction of a gait's usual frequencies that is tried where the joints are slow, and how
+#: far below their limit of speed its gentlest start then begins.
 SLOWEST, ROOM = 0.3, 0.9
-#: Designs in a generation, and how far about the start the first ones are (1: all there is).
-GENERATION, SPREAD = 12, 0.15
-#: Starts that are tried first: how much gentler than the usual one.
+#: How far about the start the first designs are (1: the whole range).
+SPREAD = 0.15
+#: Starts that are tried first: how much gentler they are than the usual one.
 GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -172,7 +175,7 @@ class Tuner:
                 has fewer than four legs.
 
         """
-        self._cma = cma_es()
+        cma_es()
         if len(robot.legs) < 4:
             raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
                                   'are not tuned, as they need balance, and foot paths alone do '
@@ -183,7 +186,7 @@ class Tuner:
         body = self.batch.body
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
             + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
-        self.feet = Feet(self.batch.body, self.batch.parts)
+        self.feet = FootTrajectoryFit(self.batch.body, self.batch.parts)
         self.scale = self.feet.length / LENGTH
         # Designs are of robots whose feet bear alike.
         self.ahead = centre_ahead(body, self.batch.parts)
@@ -210,13 +213,11 @@ class Tuner:
 
     def plan(self, gait: str, motion: Motion, network: str = '') -> GaitPlan:
         """Plan a gait on one of the robot's networks or the first; errors as of plan."""
-        preset = NETWORKS[network or self.robot.networks[0]].presets()[gait]
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
             one = (1.0,)
             motion = replace(motion, steering=SteeringTable(one, one, one, one))
-        robot = replace(self.robot, motions={gait: motion})
-        return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        return plan_gait(replace(self.robot, motions={gait: motion}), gait, network=network)
 
     def prices(self, gait: str, designs: Sequence[Design],
                aim: GaitTarget | None = None) -> np.ndarray:
@@ -228,20 +229,20 @@ class Tuner:
         Args:
             gait: one of AIMS.
             designs: of it.
-            aim: what it is to reach, instead of the usual.
+            aim: its target, instead of the usual one.
 
         """
         aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
                       hops=aim.hops / math.sqrt(self.scale))
-        found, runs, runnable = np.full(len(designs), NO_GAIT), [], []
+        result, runs, runnable = np.full(len(designs), NO_GAIT), [], []
         for k, design in enumerate(designs):
             motion = self.motion(gait, design)
             try:
                 angles = [targets(self.plan(gait, motion, network), SHORT, self.batch.timestep)
                           for network in self.robot.networks_with(gait)]
             except OutOfLimits as error:
-                found[k] = REFUSED + BEYOND * error.excess
+                result[k] = REFUSED + BEYOND * error.excess
                 if self._nearest is None or error.excess < self._nearest.error.excess:
                     self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
                                                   error)
@@ -252,18 +253,18 @@ class Tuner:
             runnable.append(k)
         prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
                   for trial in self.batch.run(runs)]
-        for k, own in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
-            found[k] = 0.6 * own.mean() + 0.4 * own.max()
-        return found
+        for k, runs_of_k in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
+            result[k] = 0.6 * runs_of_k.mean() + 0.4 * runs_of_k.max()
+        return result
 
     def tune(self, gait: str, evaluations: int, seed: int = 0,
              update: Callable[[int], None] = lambda done: None) -> Tuned:
-        """Look for a gait's best design.
+        """Search for a gait's best design.
 
         Args:
             gait: one of AIMS.
             evaluations: how many designs to try, about.
-            seed: the same one finds the same.
+            seed: the same one gives the same result.
             update: takes the number tried so far.
 
         Raises:
@@ -273,19 +274,17 @@ class Tuner:
         aims, prices = self._starts(gait)
         aim, first, cheapest = aims[int(prices.argmin())], float(prices[0]), float(prices.min())
         best = aim.start
-        search = self._cma.CMAEvolutionStrategy(
-            aim.place, SPREAD, {'bounds': [0.0, 1.0], 'seed': seed + 1, 'popsize': GENERATION,
-                                'verbose': -9})
-        tried = len(aims)
-        while tried < evaluations:
-            places = search.ask()
-            designs = [aim.design(place) for place in places]
+
+        def generation(points: Sequence[np.ndarray], _: int) -> list[float]:
+            nonlocal best, cheapest
+            designs = [aim.design(point) for point in points]
             prices = self.prices(gait, designs, aim)
-            search.tell(places, prices.tolist())
-            tried += len(places)
-            update(min(tried, evaluations))
             if prices.min() < cheapest:
                 best, cheapest = designs[int(prices.argmin())], float(prices.min())
+            return prices.tolist()
+
+        _, tried = cma_search(aim.start_point, SPREAD, (0.0, 1.0), seed, generation, evaluations,
+                              update, len(aims))
         near = self._nearest
         if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
             # The nearest one, by so much slower that its joints follow.
@@ -304,7 +303,7 @@ class Tuner:
                      aim.speed / AIMS[gait].speed)
 
     def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
-        """Return where to begin, gentler and gentler, and slower if the joints cannot follow."""
+        """Return starts, ever gentler, and slower ones if the joints cannot follow any."""
         self._nearest = None
         aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
         prices = self.prices(gait, [one.start for one in aims])
@@ -417,6 +416,53 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     measured = [one.gait for one in found]
     robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
     return robot, found, missing
+
+
+def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], seed: int,
+               price: Callable[[Sequence[np.ndarray], int], list[float]], evaluations: int,
+               update: Callable[[int], None] = lambda done: None, done: int = 0
+               ) -> tuple[np.ndarray, int]:
+    """Minimise a price by CMA-ES, GENERATION points at a time.
+
+    Args:
+        start: mean of the first generation, shape (n,).
+        spread: its standard deviation.
+        bounds: of each coordinate.
+        seed: the same one gives the same result.
+        price: returns the price of each of some points; takes a seed of its generation's own.
+        evaluations: number of points to try, about.
+        update: takes the number tried so far.
+        done: number tried before.
+
+    Returns:
+        The mean of the last generation, whose best point was partly lucky, and the number tried.
+
+    """
+    search = cma_es().CMAEvolutionStrategy(start, spread, {
+        'bounds': [*bounds], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
+    draws = np.random.default_rng([seed, 1])
+    while done < evaluations:
+        points = search.ask()
+        search.tell(points, price(points, int(draws.integers(2**31))))
+        done += len(points)
+        update(min(done, evaluations))
+    return search.result.xfavorite, done
+
+
+def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,
+                 limits: Mapping[str, Any]) -> dict[str, float]:
+    """Return the named gains times the exponentials of logs, within their limits."""
+    return {name: min(max(getattr(gains, name) * math.exp(log), limits[name].low),
+                      limits[name].high) for name, log in zip(names, logs, strict=True)}
+
+
+def more_than_chance(won: int, lost: int) -> bool:
+    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test).
+
+    The test is one-sided; it is the exact form of McNemar's test.
+    """
+    changed = won + lost
+    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
 
 def cma_es() -> ModuleType:

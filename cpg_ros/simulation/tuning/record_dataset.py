@@ -26,12 +26,13 @@ from typing import Any
 
 from cpg_ros.common.command_line import Parser, progress_bar, run, say, table
 from cpg_ros.common.errors import InputError, needed, ShortRepr
-from cpg_ros.feedback.estimate import fill_quaternion, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.gains import robot_gains
 from cpg_ros.fitting.recordings.bag_writer import BagWriter
-from cpg_ros.motion.plan import GaitPlan, plan
+from cpg_ros.motion.plan import GaitPlan, plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.motion.rotations import fill_quaternion
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, PUSH, Scenario, SensorNoise
@@ -87,8 +88,7 @@ def gaits_to_record(robot: Robot, gaits: Sequence[str] = ()) -> Iterator[GaitPla
         if gait not in robot.motions or gait not in presets:
             raise InputError(f'gait {gait!r} of {robot.name}: unknown; it has '
                              f'{", ".join(one for one in robot.motions if one in presets)}')
-        preset = presets[gait]
-        yield plan(robot, gait, preset, preset.network, robot.motions[gait].frequency or 1.0)
+        yield plan_gait(robot, gait, robot.motions[gait].frequency or 1.0)
 
 
 def walks(plan: GaitPlan, model: str, seconds: float, seed: Sequence[int]
@@ -120,14 +120,8 @@ def walks(plan: GaitPlan, model: str, seconds: float, seed: Sequence[int]
         found.append(LabelledWalk(ground, senses, ran.efforts[row, :steps], loop.timestep, _truth(
             plan, scenario, float(ran.fell[row]),
             senses.foot_forces[steps // 3:] > LOADED * loop.geometry.weight)
-            | {'servo': _gains(loop)}))
+            | {'servo': dict(zip(('kp', 'kd'), loop.body.gains, strict=True))}))
     return found
-
-
-def _gains(loop: ClosedLoopBatch) -> dict[str, float]:
-    """Return the gains of the servos, N m/rad and N m s/rad."""
-    model = loop.body.model
-    return {'kp': float(model.actuator_gainprm[0, 0]), 'kd': float(-model.actuator_biasprm[0, 2])}
 
 
 def _scenarios(rng: np.random.Generator, seconds: float, speed: float) -> dict[str, Scenario]:

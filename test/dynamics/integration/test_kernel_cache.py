@@ -30,7 +30,7 @@ from depth import in_depth
 from graph import EXECUTABLE, Process
 import pytest
 
-WARM = 'from cpg_ros.motion.pattern import precompile; precompile({network!r})'
+WARM = 'from cpg_ros.motion.phase_readout import precompile; precompile({network!r})'
 STEP = """
 import numpy as np
 from cpg_ros.dynamics.integration.stepper import Stepper

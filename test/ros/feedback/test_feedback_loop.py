@@ -39,7 +39,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 
 from cpg_ros.simulation.body import Body  # noqa: I100
 from cpg_ros.simulation.scenario import SensorNoise
-from cpg_ros.simulation.sensors import InertialUnit
+from cpg_ros.simulation.sensors import SimulatedSensors
 
 TOPICS = {'imu': Imu, 'measured': JointState, 'foot_contacts': Float64MultiArray}
 #: A fault lasts from and to these times, s; a run takes to the last one.
@@ -92,7 +92,7 @@ class Robot:
         Wire.wires = {}
         made = program('trot')
         self.body = Body('go2', GO2)
-        self.unit = InertialUnit(self.body, DT, SensorNoise(**dull))
+        self.unit = SimulatedSensors(self.body, DT, SensorNoise(**dull))
         self.pattern = Pattern(made, 0.4, drive=StrideCommand(4))
         geometry = geometry_of(GO2)
         inputs = SensorInput(None, GO2, geometry, 'imu', 'measured', contacts, 'foot_contacts')

@@ -42,8 +42,8 @@ from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 from cpg_ros.simulation.tuning.foot_path import (  # noqa: E402
     basis,
     centre_ahead,  # noqa: E402
-    Feet,
     fit,
+    FootTrajectoryFit,
     POINTS,
 )
 from cpg_ros.simulation.tuning.foot_path import FootTrajectory as FootPath  # noqa: E402
@@ -59,7 +59,7 @@ def batch():
 
 @pytest.fixture(scope='module')
 def feet(batch):
-    return Feet(batch.body, batch.parts)
+    return FootTrajectoryFit(batch.body, batch.parts)
 
 
 def in_order(pattern):
@@ -150,7 +150,7 @@ def test_inverse_kinematics_against_mujocos_forward_kinematics(leg, x, z):
 @cache
 def _feet():
     made = OpenLoopBatch('go2', GO2)
-    feet = Feet(made.body, made.parts)
+    feet = FootTrajectoryFit(made.body, made.parts)
     feet.body = made.body
     return feet
 
