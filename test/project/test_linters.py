@@ -25,7 +25,7 @@ LINTERS = {'ament_copyright': [], 'ament_flake8': [],
            # Sections are written as Google's; magic methods and tests have no docstrings.
            'ament_pep257': ['--convention', 'google', '--add-ignore',
                             *(f'D10{number}' for number in range(8)), '--']}
-FOLDERS = ('cpg_ros', 'test', 'launch', 'benchmarks', 'docs', 'interfaces')
+FOLDERS = ('cpg_ros', 'test', 'launch', 'benchmarks', 'docs', 'resource')
 
 
 @pytest.mark.parametrize('linter', LINTERS)
