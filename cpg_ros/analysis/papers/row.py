@@ -18,9 +18,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Figures of the papers: what the cells do over time.
 
@@ -29,7 +32,7 @@ WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')
 
 
 def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
-                 waves: Sequence[int] | None = None, variable: str = 'x') -> Figure:
+                 waves: Sequence[int] | None = None, variable: str = 'x') -> 'Figure':
     """Draw cells over time, one under the other.
 
     Args:
@@ -43,6 +46,8 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
 
     """
     waves = range(len(names)) if waves is None else waves
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(6.4, 0.9 + 0.75 * len(names)), layout='constrained')
     low, high = float(x.min()), float(x.max())
     margin = 0.08 * (high - low)
@@ -123,7 +128,7 @@ class Picture:
     paper: str
     place: str
     caption: str
-    figure: Figure
+    figure: 'Figure'
 
 
 #: What a formula gives.
