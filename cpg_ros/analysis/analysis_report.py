@@ -18,9 +18,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 import math
-from typing import Any
+from typing import Any, TYPE_CHECKING
 
-from cpg_ros.analysis.papers.commentary import COMMENTARIES, Commentary
 from cpg_ros.common.command_line import table
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
@@ -29,6 +28,9 @@ from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.dynamics.stability import GaitAssessment, nearest_threshold
 from cpg_ros.networks.network import Network, ParameterLine
 import numpy as np
+
+if TYPE_CHECKING:
+    from cpg_ros.analysis.papers.commentary import Commentary
 
 #: Error of the multiplier along the orbit from which the report mentions it.
 UNSURE = 1e-6
@@ -138,7 +140,10 @@ class Analysis(ShortRepr):
         return self._found[1]
 
     @property
-    def _commentary(self) -> Commentary:
+    def _commentary(self) -> 'Commentary':
+        # Loaded here: the papers load the fit, and analyze --help need not wait for it.
+        from cpg_ros.analysis.papers.commentary import COMMENTARIES, Commentary
+
         return COMMENTARIES.get(self.network.name, Commentary())
 
     @property

@@ -28,6 +28,7 @@ from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import known, Network, ParameterLine
 from cpg_ros.networks.symmetry import GAITS
 import numpy as np
+from scipy.optimize import brentq
 
 #: Section 6.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'
@@ -72,8 +73,6 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
 
     def largest(value: float) -> float:
         return stand_sample(along.at(network, value)).largest(f'L_{j}{k}')
-
-    from scipy.optimize import brentq  # here: analyze --help need not wait for it
 
     there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
     # Of the two senses of a wave the one whose critical eigenvalue turns forward.

@@ -384,7 +384,7 @@ def _tracked_period(t: np.ndarray, x: np.ndarray,
 
 def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
     """Return lags at which the recording repeats, each better than all shorter ones."""
-    # Loaded here: it takes longer than all else that analyze --help loads.
+    # Loaded here: it takes longer than all else that optimize --help loads.
     from scipy.interpolate import PchipInterpolator
 
     m = min(4 * t.size, GRID)
