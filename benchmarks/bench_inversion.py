@@ -35,16 +35,13 @@ import symengine
 sys.path.append(str(ROOT / 'test' / 'support'))
 
 from cpg_ros.dynamics.solve_orbit import solve_orbit  # noqa: E402, I100
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem  # noqa: E402
 from cpg_ros.fitting.inversion.fit_data import joints_of  # noqa: E402
 from cpg_ros.fitting.inversion.free_parameters import (
     free_numbers,  # noqa: E402
     minimise,  # noqa: E402
 )
-from cpg_ros.fitting.inversion.invert import (  # noqa: E402
-    CycleProblem,  # noqa: E402
-    invert,
-    TOLERANCE,
-)
+from cpg_ros.fitting.inversion.invert import invert, TOLERANCE  # noqa: E402
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout  # noqa: E402
 from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
 from cpg_ros.networks.library.delayed import Delayed, PRESETS  # noqa: E402

@@ -20,8 +20,6 @@ from functools import cached_property
 import math
 from typing import Any, cast
 
-from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
-from cpg_ros.analysis.papers.liu_zhang import published_normal_form
 from cpg_ros.common.command_line import table
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
@@ -36,12 +34,15 @@ import numpy as np
 
 def _published_numbers(point: HopfPoint) -> dict[str, float]:
     """Real parts of the normal form by the formulas of Liu & Zhang (2024)."""
+    # The papers load much that only a report of Hopf points needs.
+    from cpg_ros.analysis.papers.liu_zhang import published_normal_form
     form = published_normal_form(point)
     return {'k1_published': form.k1.real, 'k2_published': form.k2.real}
 
 
 def _theorem(point: HopfPoint) -> tuple[str, dict[str, Any]]:
     """Verdict of theorem 4.2 of Buono & Golubitsky (2001)."""
+    from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
     verdict = theorem_verdict(cast(Quadruped, point.network), point.gait)
     return str(verdict), {'theorem_4_2': {
         'applies': verdict.applies, 'stable': verdict.stable, 'says': str(verdict)}}

@@ -70,17 +70,22 @@ def stored_json(path: Path) -> Any:
 
 # Where the package's shipped files are, installed or in a source tree.
 
-def resource_folder() -> Path:
-    """Return the folder that holds ``config``: that of the sources, or share/cpg_ros above.
+def resource_folder(kind: str) -> Path:
+    """Return a folder of files that the package ships: in the sources, or in share/cpg_ros.
+
+    Args:
+        kind: ``config``, ``urdf`` or ``models``.
 
     Raises:
         FileNotFoundError: the installation is incomplete.
 
     """
     package = Path(__file__).resolve().parents[1]
-    for folder in (package.parent, *(above / 'share' / 'cpg_ros' for above in package.parents)):
-        if (folder / 'config' / 'presets').is_dir():
-            return folder
+    if (package.parent / 'config' / 'presets').is_dir():
+        return package.parent / ('config' if kind == 'config' else f'resource/{kind}')
+    for above in package.parents:
+        if (above / 'share' / 'cpg_ros' / 'config' / 'presets').is_dir():
+            return above / 'share' / 'cpg_ros' / kind
     raise FileNotFoundError(f'share/cpg_ros/config is missing from the installation at {package}')
 
 

@@ -277,7 +277,7 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
 
     try:
         found = asyncio.run(asyncio.wait_for(ask(), seconds))
-    except (OSError, TimeoutError, asyncio.TimeoutError) as error:
+    except (OSError, TimeoutError) as error:
         raise NoCluster(f'no dask scheduler answers at {address}' + (
             ' to these certificates' if address.startswith(TLS) else '')) from error
     except (ValueError, RuntimeError, ImportError) as error:

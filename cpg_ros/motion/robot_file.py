@@ -296,7 +296,7 @@ def load_robot(name: str | Path) -> Robot:
     """
     if isinstance(name, Path) or name.endswith(('.yaml', '.yml')) or '/' in name:
         return read_robot(Path(name).expanduser())
-    path = resource_folder() / 'config' / f'{name}.yaml'
+    path = resource_folder('config') / f'{name}.yaml'
     if not path.is_file():
         shipped = ', '.join(sorted(file.stem for file in path.parent.glob('*.yaml')))
         raise RobotError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")

@@ -118,7 +118,7 @@ def own_presets(network: type[AnyDefinition]) -> dict[str, Preset[AnyDefinition]
 
     """
     beside = Path(inspect.getfile(network)).with_suffix('.yaml')
-    shipped = resource_folder() / 'config' / 'presets' / f'{network.name}.yaml'
+    shipped = resource_folder('config') / 'presets' / f'{network.name}.yaml'
     return read_presets(beside if beside.is_file() else shipped, network)
 
 

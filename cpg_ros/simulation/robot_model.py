@@ -141,7 +141,7 @@ def find_model(name: str) -> Path:
         if not path.is_file():
             raise SimulationError(f'model {path}: no such file')
         return path
-    own = resource_folder() / 'models' / f'{name}.xml'
+    own = resource_folder('models') / f'{name}.xml'
     if own.is_file():
         return own
     # Only files of packages are used: importing them would need others that nothing else does.

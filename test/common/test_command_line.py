@@ -137,7 +137,8 @@ def test_a_bad_domain_is_one_line(domain, said):
 
 
 def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
-    urdf, made = Path(__file__).parents[2] / 'urdf' / 'quadruped.urdf', tmp_path / 'made.yaml'
+    urdf = Path(__file__).parents[2] / 'resource' / 'urdf' / 'quadruped.urdf'
+    made = tmp_path / 'made.yaml'
     # No file may grow: as on a full disk, the error of the system has no name in it.
     none = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (0, 0))
 

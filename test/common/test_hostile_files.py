@@ -55,7 +55,7 @@ def panel_description(path):
 def simulated(path):
     pytest.importorskip('mujoco')
     from cpg_ros.simulation.robot_model import load
-    return load(str(path), read_robot(resource_folder() / 'config' / 'quadruped.yaml'))
+    return load(str(path), read_robot(resource_folder('config') / 'quadruped.yaml'))
 
 
 READERS = {'robot.yaml': read_robot, 'presets.yaml': lambda path: read_presets(

@@ -28,7 +28,7 @@ import pytest
 import yaml
 
 SOURCE = Path(__file__).resolve().parents[2]
-URDF = SOURCE / 'urdf' / 'quadruped.urdf'
+URDF = SOURCE / 'resource' / 'urdf' / 'quadruped.urdf'
 STAND = {'hip': 0.0, 'thigh': 0.8, 'calf': -1.5}
 LEGS = {'lh': (-1, 1), 'rh': (-1, -1), 'lf': (1, 1), 'rf': (1, -1)}
 
@@ -155,7 +155,7 @@ def fields(robot):
 
 
 def test_rviz_shows_the_robot_on_the_ground(tree):
-    config = yaml.safe_load((SOURCE / 'rviz' / 'cpg.rviz').read_text())
+    config = yaml.safe_load((SOURCE / 'resource' / 'rviz' / 'cpg.rviz').read_text())
     manager = config['Visualization Manager']
     shown = {display['Class'].rpartition('/')[2]: display for display in manager['Displays']}
     assert set(shown) >= {'RobotModel', 'TF', 'Grid'}
@@ -172,7 +172,7 @@ def test_rviz_shows_the_robot_on_the_ground(tree):
 
 
 def test_plotjuggler_draws_what_is_published():
-    root = ElementTree.parse(SOURCE / 'plotjuggler' / 'cpg.xml').getroot()
+    root = ElementTree.parse(SOURCE / 'resource' / 'plotjuggler' / 'cpg.xml').getroot()
     robot = load_robot('quadruped')
     known = fields(robot)
     names = {f'/{leg}/joint_states': {joint.name for joint in joints}
@@ -205,7 +205,7 @@ def panels(layout):
 
 
 def test_foxglove_draws_what_is_published():
-    layout = json.loads((SOURCE / 'foxglove' / 'cpg.json').read_text())
+    layout = json.loads((SOURCE / 'resource' / 'foxglove' / 'cpg.json').read_text())
     known = fields(load_robot('quadruped'))
     assert sorted(panels(layout['layout'])) == sorted(layout['configById'])
     paths = [path['value'] for panel in layout['configById'].values()
@@ -225,7 +225,7 @@ def test_all_of_it_is_installed():
     fraction = Path(get_package_share_directory('cpg_ros'))
     for name in ('urdf/quadruped.urdf', 'rviz/cpg.rviz', 'plotjuggler/cpg.xml',
                  'foxglove/cpg.json'):
-        assert (fraction / name).read_text() == (SOURCE / name).read_text()
+        assert (fraction / name).read_text() == (SOURCE / 'resource' / name).read_text()
 
 
 def test_the_page_on_your_own_robot_names_what_there_is():
@@ -237,7 +237,7 @@ def test_the_page_on_your_own_robot_names_what_there_is():
     for name in re.findall(r'(\w+\.launch\.py)', page):
         assert (SOURCE / 'launch' / name).is_file()
     for name in re.findall(r'(?:plotjuggler|foxglove|config)/\w+\.\w+', page):
-        assert (SOURCE / name).is_file()
+        assert any((SOURCE / folder / name).is_file() for folder in ('.', 'resource'))
     (snippet,) = re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
     controllers = yaml.safe_load(snippet)
     managed = controllers['controller_manager']['ros__parameters']

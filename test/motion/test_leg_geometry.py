@@ -31,7 +31,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 HEXAPOD = load_robot('hexapod')
-URDF = Path(__file__).parents[2] / 'urdf' / 'quadruped.urdf'
+URDF = Path(__file__).parents[2] / 'resource' / 'urdf' / 'quadruped.urdf'
 
 
 def made(tmp_path, urdf=URDF):

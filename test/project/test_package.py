@@ -61,14 +61,15 @@ def test_every_key_resolves_to_apt_on_ubuntu_24_04():
 
 @pytest.mark.parametrize('distro', ['', 'jazzy'])
 def test_the_build_takes_a_sourced_ros_as_it_is(distro, tmp_path):
-    for name in ('Makefile', 'package.xml', 'setup.py', 'setup.cfg', *(
-            path.name for path in SOURCE.glob('requirements*.txt'))):
-        shutil.copy2(SOURCE / name, tmp_path)
+    (tmp_path / '.ci').mkdir()
+    for name in ('Makefile', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
+                 '.ci/constraints.txt'):
+        shutil.copy2(SOURCE / name, tmp_path / name)
     variables = dict(os.environ, ROS_DISTRO=distro, AMENT_PREFIX_PATH='/opt/ros/jazzy')
     told = subprocess.run(['make', '-n', 'build', 'shell'], cwd=tmp_path, env=variables,
                           text=True, capture_output=True, check=False).stdout
     assert ('--system-site-packages' in told) == bool(distro)
-    assert ('requirements-ros.txt' in told) != bool(distro)
+    assert (' docs ros)' in told) != bool(distro)
     assert ('/install/cpg_ros:/opt/ros/jazzy' in told) == bool(distro)
 
 

@@ -23,7 +23,7 @@ import rclpy
 from servo_chain import calibrated, ServoChain
 
 ROOT = Path(__file__).resolve().parents[2]
-POLICY = etree.parse(ROOT / 'security' / 'policy.xml')
+POLICY = etree.parse(ROOT / 'resource' / 'security' / 'policy.xml')
 
 
 def test_the_policies_are_of_the_schema():

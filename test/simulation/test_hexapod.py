@@ -40,7 +40,7 @@ from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 HEXAPOD, DT = load_robot('hexapod'), 0.002
-#: Of the trunk with its round ends, m (models/hexapod.xml).
+#: Of the trunk with its round ends, m (resource/models/hexapod.xml).
 LENGTH = 2 * (0.165 + 0.035)
 
 
@@ -102,7 +102,7 @@ def test_it_goes_from_gait_to_gait(tour):
 
 
 def test_its_files_agree():
-    urdf = load_urdf(ROOT / 'urdf' / 'hexapod.urdf')
+    urdf = load_urdf(ROOT / 'resource' / 'urdf' / 'hexapod.urdf')
     assert checked(HEXAPOD, urdf, ('hexapod', 'hexapod.urdf')).faults == []
     model = mujoco.MjModel.from_xml_path(str(find_model('hexapod')))
     assert sum(model.body_mass) == pytest.approx(2.87)
@@ -112,7 +112,7 @@ def test_its_files_agree():
 
 
 def test_a_robot_file_is_made_from_a_urdf_of_six_legs(tmp_path):
-    text = (ROOT / 'urdf' / 'hexapod.urdf').read_text()
+    text = (ROOT / 'resource' / 'urdf' / 'hexapod.urdf').read_text()
     path = tmp_path / 'six.urdf'
     # Legs that swing about y, as those of quadrupeds do.
     path.write_text(text.replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"').replace(
@@ -127,7 +127,7 @@ def test_a_robot_file_is_made_from_a_urdf_of_six_legs(tmp_path):
 @pytest.mark.parametrize('source', ['urdf', 'turned', 'mjcf'])
 def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, capsys):
     path, out = tmp_path / 'six.urdf', tmp_path / 'six.yaml'
-    text = (ROOT / 'urdf' / 'hexapod.urdf').read_text()
+    text = (ROOT / 'resource' / 'urdf' / 'hexapod.urdf').read_text()
     if source == 'turned':
         # The same robot with joints that count the other way round.
         text = re.sub(r'axis xyz="([^"]+)"', lambda axis: 'axis xyz="{}"'.format(

@@ -17,7 +17,7 @@
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2]
-URDF = (SOURCE / 'urdf' / 'quadruped.urdf').read_text()
+URDF = (SOURCE / 'resource' / 'urdf' / 'quadruped.urdf').read_text()
 LEGS = ('lh', 'rh', 'lf', 'rf')
 
 

@@ -14,5 +14,5 @@
 
 """Published quantities of the papers, each beside the value computed here."""
 
-__all__ = ['buono_gaits', 'buono_hopf', 'buono_linear', 'buono_symmetry', 'commentary',
-           'liu_zhang', 'oscillators', 'rashidi', 'reproduce', 'reproduction', 'rhythm', 'row']
+__all__ = ['buono_gaits', 'buono_hopf', 'buono_linear', 'liu_zhang', 'oscillators', 'rashidi',
+           'reproduce', 'reproduction', 'row']

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from cpg_ros.dynamics.floquet import ATTRACTS
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
@@ -26,8 +27,10 @@ from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry, Z4_Z2
-from matplotlib.figure import Figure
 import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 # Figures of the papers: what the cells do over time.
 
@@ -36,7 +39,7 @@ WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')
 
 
 def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
-                 waves: Sequence[int] | None = None, variable: str = 'x') -> Figure:
+                 waves: Sequence[int] | None = None, variable: str = 'x') -> 'Figure':
     """Draw cells over time, one under the other.
 
     Args:
@@ -50,6 +53,8 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
 
     """
     waves = range(len(names)) if waves is None else waves
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(6.4, 0.9 + 0.75 * len(names)), layout='constrained')
     low, high = float(x.min()), float(x.max())
     margin = 0.08 * (high - low)
@@ -130,7 +135,7 @@ class Picture:
     paper: str
     place: str
     caption: str
-    figure: Figure
+    figure: 'Figure'
 
 
 #: What a formula gives.

@@ -26,7 +26,6 @@ from itertools import pairwise
 
 from cpg_ros.common.errors import InputError, ShortRepr
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 from scipy.linalg import solve_toeplitz, toeplitz
 
 # The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
@@ -385,6 +384,9 @@ def _tracked_period(t: np.ndarray, x: np.ndarray,
 
 def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
     """Return lags at which the recording repeats, each better than all shorter ones."""
+    # Loaded here: it takes longer than all else that optimize --help loads.
+    from scipy.interpolate import PchipInterpolator
+
     m = min(4 * t.size, GRID)
     even = PchipInterpolator(t, x)(np.linspace(t[0], t[-1], m))
     energy = np.concatenate([[0.0], np.cumsum(np.sum(even * even, axis=1))])

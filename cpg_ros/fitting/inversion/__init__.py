@@ -14,6 +14,6 @@
 
 """Fit of a network to a recorded gait: parameters, readouts and their uncertainty."""
 
-__all__ = ['fit', 'fit_data', 'fit_report', 'fit_starts', 'free_parameters', 'gait_schedule',
-           'inversion', 'invert', 'leg_duty', 'many_recordings', 'model_choice', 'paper_fit',
-           'parameter_files', 'recording_fit', 'results', 'stride_report']
+__all__ = ['cycle_problem', 'fit', 'fit_data', 'fit_report', 'fit_starts', 'free_parameters',
+           'gait_schedule', 'inversion', 'invert', 'leg_duty', 'many_recordings', 'model_choice',
+           'paper_fit', 'parameter_files', 'recording_fit', 'results', 'stride_report']

@@ -21,15 +21,12 @@ network's own values.
 """
 
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
 from cpg_ros.fitting.inversion.free_parameters import Free
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
-
-if TYPE_CHECKING:
-    from cpg_ros.fitting.inversion.invert import CycleProblem
 
 #: Free numbers that are the stance's share of a stride.
 SHARES = (GAIT_DUTY, 'duty')
@@ -50,7 +47,7 @@ def distinct(one: np.ndarray, other: np.ndarray) -> bool:
     return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
 
 
-def _tried(problem: 'CycleProblem', k: int, one: Free, here: float) -> tuple[float, ...]:
+def _tried(problem: CycleProblem, k: int, one: Free, here: float) -> tuple[float, ...]:
     """Return the coordinates of a free number that are tried besides its own."""
     if one.name == GAIT_DUTY:
         return DUTIES
@@ -62,7 +59,7 @@ def _tried(problem: 'CycleProblem', k: int, one: Free, here: float) -> tuple[flo
     return tuple(factor * here for factor in FACTORS)
 
 
-def best_starts(problem: 'CycleProblem', begin: np.ndarray) -> list[np.ndarray]:
+def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
     """Return the network's own values and the least costs on a grid over the ranges.
 
     Args:
@@ -105,7 +102,7 @@ def best_starts(problem: 'CycleProblem', begin: np.ndarray) -> list[np.ndarray]:
     return [starts[place] for place in ranked if place in (tuple(own), *best)]
 
 
-def upside_down(problem: 'CycleProblem', values: np.ndarray) -> np.ndarray | None:
+def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
     """Return values near which the waveform may be the same upside down; None if none is known.
 
     A free readout makes the same motion of it: stance takes the part of swing.

@@ -136,7 +136,7 @@ class _Reader(YamlReader):
 
 def shipped() -> list[str]:
     """Return the names of the shipped files."""
-    return sorted(file.stem for file in (resource_folder() / 'config' / 'segments').glob('*.yaml'))
+    return sorted(file.stem for file in (resource_folder('config') / 'segments').glob('*.yaml'))
 
 
 def load_segments(name: str | Path) -> Segments:
@@ -166,7 +166,7 @@ def load_segments(name: str | Path) -> Segments:
     """
     path = Path(name)
     if not path.exists() and str(name) in shipped():
-        path = resource_folder() / 'config' / 'segments' / f'{name}.yaml'
+        path = resource_folder('config') / 'segments' / f'{name}.yaml'
     reader = _Reader(path, 'segments', RecordingError, 1e6)
     if not path.exists():
         raise RecordingError(f'{path}: there is no such file of segments; shipped are '

@@ -14,7 +14,8 @@
 
 """The base class of bridges: drives a robot by what a generator publishes.
 
-A bridge adds its robot's messages, limits and numbers: CONTRIBUTING.md, section Add a bridge.
+A bridge adds its robot's messages, limits and numbers: .github/CONTRIBUTING.md, section
+Add a bridge.
 """
 
 from collections import deque

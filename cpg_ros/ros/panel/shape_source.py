@@ -233,7 +233,7 @@ def shipped_robot(name: str) -> Robot | None:
     Anyone on the graph can name a file, and a robot file can name a Python file with its network:
     no file that the graph names is opened here.
     """
-    shipped = {file.stem for file in (resource_folder() / 'config').glob('*.yaml')}
+    shipped = {file.stem for file in resource_folder('config').glob('*.yaml')}
     try:
         return load_robot(name) if name in shipped else None
     except RobotError:  # what else is in that folder
@@ -348,7 +348,7 @@ def _from_model(known: RobotInfo, robot: Robot | None,
     if not model:
         return None
     if shipped and model.endswith('.urdf'):
-        return from_file(resource_folder() / 'urdf' / model, report)
+        return from_file(resource_folder('urdf') / model, report)
     from cpg_ros.ros.panel.shape import from_model
     return from_model(model, robot)
 

@@ -22,10 +22,7 @@ from typing import Any
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.fitting.recordings.bag_storage import opened
-from cpg_ros.fitting.recordings.cdr import JOINT_STATE
 from cpg_ros.fitting.recordings.recording import RecordingError
-from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
 from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.rotations import rpy_of
@@ -101,7 +98,7 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
 
 
 #: What is read: key -> type of its topic.
-TYPES = {'joint_states': JOINT_STATE, 'imu': 'sensor_msgs/msg/Imu',
+TYPES = {'joint_states': 'sensor_msgs/msg/JointState', 'imu': 'sensor_msgs/msg/Imu',
          'foot_contacts': 'std_msgs/msg/Float64MultiArray',
          'phase': 'std_msgs/msg/Float64MultiArray'}
 #: What a bag may be without.
@@ -146,6 +143,10 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
             type, or a joint or a leg is not in it.
 
     """
+    # Loaded here: what tunes gaits needs no bags.
+    from cpg_ros.fitting.recordings.bag_storage import opened
+    from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
+
     path = Path(path)
     names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
     with opened(path) as bag:

@@ -28,7 +28,6 @@ from cpg_ros.common.command_line import Parser, progress_bar, run, say, table
 from cpg_ros.common.errors import InputError, needed, ShortRepr
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.gains import robot_gains
-from cpg_ros.fitting.recordings.bag_writer import BagWriter
 from cpg_ros.motion.plan import GaitPlan, plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
@@ -38,7 +37,6 @@ from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, PUSH, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
-from rosbags.typesys import get_typestore, Stores
 import yaml
 
 # Walks for a labelled data set: what a gait meets in simulation, and what is true of each run.
@@ -161,7 +159,6 @@ def _truth(plan: GaitPlan, scenario: Scenario, fell: float, stands: np.ndarray
 
 #: Stamps begin here, ns.
 START = 1_700_000_000_000_000_000
-STORE = get_typestore(Stores.ROS2_JAZZY)
 JOINTS, IMU, LOADS = ('sensor_msgs/msg/JointState', 'sensor_msgs/msg/Imu',
                       'std_msgs/msg/Float64MultiArray')
 
@@ -181,7 +178,12 @@ def write_bag(path: Path, robot: Robot, senses: SensorData, efforts: np.ndarray,
         BagError: the bag cannot be written.
 
     """
-    types = STORE.types
+    # Loaded here: --help need not wait for them.
+    from cpg_ros.fitting.recordings.bag_writer import BagWriter
+    from rosbags.typesys import get_typestore, Stores
+
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = store.types
     angles, speeds, loads, rpy, turning, acceleration = senses
     names, unknown = [joint.name for joint in robot.joints], np.zeros(9)
     facing = np.zeros(4)
@@ -203,7 +205,7 @@ def write_bag(path: Path, robot: Robot, senses: SensorData, efforts: np.ndarray,
                 (IMU, types[IMU](header, turn(*xyz, w), unknown, vector(*turning[k]), unknown,
                                  vector(*acceleration[k]), unknown)),
                 (LOADS, types[LOADS](layout, loads[k]))):
-            bag.write(to[kind], stamp, bytes(STORE.serialize_cdr(message, kind)))
+            bag.write(to[kind], stamp, bytes(store.serialize_cdr(message, kind)))
     bag.close()
 
 

@@ -80,7 +80,7 @@ def copied(tmp_path_factory):
     package = tmp_path_factory.mktemp('package')
     shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
                     ignore=shutil.ignore_patterns('__pycache__'))
-    shutil.copytree(resource_folder() / 'config', package / 'config')
+    shutil.copytree(resource_folder('config'), package / 'config')
     return package
 
 
@@ -230,7 +230,7 @@ def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_pat
     scratch.mkdir()
     shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
                     ignore=shutil.ignore_patterns('__pycache__'))
-    shutil.copytree(resource_folder() / 'config', package / 'config')
+    shutil.copytree(resource_folder('config'), package / 'config')
     for room in [folder for folder in package.rglob('*') if folder.is_dir()]:
         # Whoever runs this, root too, can make no folder where a file is.
         (room / '__pycache__').touch()

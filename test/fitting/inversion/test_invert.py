@@ -18,10 +18,11 @@ from dataclasses import replace
 
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.fitting.inversion import invert as inversion
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Period
 from cpg_ros.fitting.inversion.fit import correlation_length
 from cpg_ros.fitting.inversion.fit_data import cells_of, Joints
 from cpg_ros.fitting.inversion.free_parameters import free_numbers
-from cpg_ros.fitting.inversion.invert import CycleProblem, invert, Period
+from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout
 from cpg_ros.motion.plan import refusal
 from cpg_ros.motion.robot import HARMONICS

@@ -16,9 +16,9 @@
 
 from dataclasses import replace
 
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
 from cpg_ros.fitting.inversion.fit_data import Joints
 from cpg_ros.fitting.inversion.free_parameters import Free, free_numbers
-from cpg_ros.fitting.inversion.invert import CycleProblem
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY, GaitReadout
 from cpg_ros.fitting.inversion.parameter_files import (
     robot_file_of,

@@ -36,7 +36,7 @@ from urdf_texts import SOURCE
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'cma')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-URDF = SOURCE / 'urdf' / 'quadruped.urdf'
+URDF = SOURCE / 'resource' / 'urdf' / 'quadruped.urdf'
 
 
 class Made:

@@ -55,7 +55,7 @@ def test_links_are_where_mujoco_has_them(robot, model):
     shape = shape_source.find(shape_source.RobotInfo(robot=robot, model=model), said.append)
     assert not said
     from cpg_ros.simulation.robot_model import load
-    physics = load(model or str(resource_folder() / 'urdf' / 'quadruped.urdf'), robot_file)
+    physics = load(model or str(resource_folder('urdf') / 'quadruped.urdf'), robot_file)
     data = mujoco.MjData(physics)
     random = np.random.default_rng(1)
     angles = {joint.name: random.uniform(joint.lower, joint.upper) for joint in robot_file.joints}
@@ -261,7 +261,7 @@ def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
                                                      robot='goat'),
                               said.append)
     assert 'this is not a URDF' in said[0] and shape.source == "stick figure of 'goat'"
-    text = (resource_folder() / 'urdf' / 'quadruped.urdf').read_text()
+    text = (resource_folder('urdf') / 'quadruped.urdf').read_text()
     shape = shape_source.find(shape_source.RobotInfo(description=text, robot='goat'), said.append)
     assert shape.source == 'robot_description' and shape.feet == {}
 

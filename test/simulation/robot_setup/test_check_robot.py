@@ -286,7 +286,7 @@ def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, wor
 @pytest.mark.no_cover
 def test_as_a_process(tmp_path):
     command = [sys.executable, '-P', '-m', 'cpg_ros.simulation.robot_setup.check_robot']
-    urdf = SOURCE / 'urdf' / 'quadruped.urdf'
+    urdf = SOURCE / 'resource' / 'urdf' / 'quadruped.urdf'
     good = subprocess.run([*command, 'quadruped', '--urdf', urdf, '--gaits', 'trot', '--json'],
                           capture_output=True, text=True, timeout=120)
     assert good.returncode == 0 and json.loads(good.stdout)['matches'] and not good.stderr

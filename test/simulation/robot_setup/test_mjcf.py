@@ -46,7 +46,7 @@ def test_the_shipped_hexapod_matches_its_model(capsys):
 
 
 def test_the_hexapods_urdf_and_model_describe_one_robot():
-    urdf, mjcf = load_urdf(SOURCE / 'urdf' / 'hexapod.urdf'), load_mjcf('hexapod')
+    urdf, mjcf = load_urdf(SOURCE / 'resource' / 'urdf' / 'hexapod.urdf'), load_mjcf('hexapod')
     assert set(urdf.joints) - set(mjcf.joints) == {'trunk_joint'}
     for name in mjcf.joints:
         assert mjcf.frame(name)[0] == pytest.approx(urdf.frame(name)[0], abs=1e-9)
@@ -129,7 +129,8 @@ def test_models_that_cannot_be_used_end_in_one_line(tmp_path, capsys, text, word
 
 @pytest.mark.parametrize(('arguments', 'words'), [
     (('--mjcf', 'go2', '--urdf', 'a.urdf'), 'not allowed with'), ((), '--urdf'),
-    (('--mjcf', str(SOURCE / 'urdf' / 'quadruped.urdf')), 'is a URDF, not an MJCF file')])
+    (('--mjcf', str(SOURCE / 'resource' / 'urdf' / 'quadruped.urdf')),
+     'is a URDF, not an MJCF file')])
 def test_one_description_of_the_right_kind(capsys, arguments, words):
     try:
         code = main(['quadruped', *arguments])
@@ -140,7 +141,7 @@ def test_one_description_of_the_right_kind(capsys, arguments, words):
 
 
 def test_a_model_without_a_free_joint_is_made_without_geometry(tmp_path, capsys):
-    text = (SOURCE / 'models' / 'hexapod.xml').read_text().replace('<freejoint/>', '')
+    text = (SOURCE / 'resource' / 'models' / 'hexapod.xml').read_text().replace('<freejoint/>', '')
     # Legs that swing about y, as the template knows them.
     text = text.replace('axis="0 0 1"', 'axis="0 1 0"').replace('axis="0 0 -1"', 'axis="0 1 0"')
     (tmp_path / 'held.xml').write_text(text)

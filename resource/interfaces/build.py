@@ -14,7 +14,7 @@
 
 """Builds packages of .msg files for ROS 2 as pip installs it: one extension each, without ament.
 
-usage: python interfaces/build.py PACKAGE_FOLDER ...   (PACKAGE_FOLDER/msg/*.msg)
+usage: python resource/interfaces/build.py PACKAGE_FOLDER ...   (PACKAGE_FOLDER/msg/*.msg)
 
 The generators are those of the wheels; g++ and Python's headers must be there. What it makes goes
 into the Python that runs it, and only once all of it is made.
