@@ -490,8 +490,8 @@ class BalancedPattern(Pattern):
             # First, as another thread may ask whether it has come to rest.
             self._time, self.crouching = 0.0, True
             self.release()
-        if not self.balancing and not self.fallen and (
-                self._lowers or (self.failed and (self._known or self.refused))):
+        measured = self._known or self.refused or sensors is not None
+        if not (self.balancing or self.fallen) and (self._lowers or (self.failed and measured)):
             self.crouching = True
         wanted = None
         if self.balancing and sensors is not None:

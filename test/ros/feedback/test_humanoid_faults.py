@@ -29,3 +29,10 @@ def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
     assert not humanoid.crossed and not humanoid.pattern.falls
+
+
+@pytest.mark.parametrize('fault', ['delay 20 ms', *in_depth('delay 50 ms', 'delay 90 ms')])
+def test_late_sensors_make_it_crouch(fault):
+    humanoid = HumanoidUnderFault(fault)
+    assert humanoid.run(4.0) == 'crouch'
+    assert not humanoid.crossed and not humanoid.pattern.falls
