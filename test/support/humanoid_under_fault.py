@@ -17,7 +17,8 @@
 from collections import deque
 from functools import cache
 
-from cpg_ros.feedback.biped.feedback import BalancedPattern, gait_plan
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
+from cpg_ros.feedback.biped.feedback import gait_plan
 from cpg_ros.feedback.input_checks import LATE_BALANCE
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot_file import load_robot
