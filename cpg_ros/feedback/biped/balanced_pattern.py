@@ -291,7 +291,7 @@ class BalancedPattern(Pattern):
             self.doubts.setdefault(JOINTS, f'{balance.order[int(jumps.argmax())]} jumped')
         if self.balancing and balance.mode == WALK and balance.kind == WALKS:
             loads, swings = sensors.foot_forces[0], memory.swinging
-            contrary = (self._passes(balance)
+            contrary = (self.ages[FEET] < EXTRAPOLATED and self._passes(balance)
                         and loads[swings].sum() > CONTRARY * loads[~swings].sum())
             self._contrary = self._contrary + dt if contrary else 0.0
             if self._contrary > STEADY:
