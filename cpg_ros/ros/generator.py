@@ -21,7 +21,7 @@ import time
 from typing import Any
 
 from cpg_ros.dynamics.integration.c_kernel import KERNELS
-from cpg_ros.feedback.biped.feedback import BalancedPattern
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.robot import Robot

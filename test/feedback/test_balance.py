@@ -17,7 +17,8 @@
 import math
 
 from cpg_ros.common.errors import InputError
-from cpg_ros.feedback.biped.feedback import BalancedPattern, BipedFeedback, gait_plan
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.library.biped import Biped

@@ -17,7 +17,9 @@
 from collections import deque
 from functools import cache
 
-from cpg_ros.feedback.biped.feedback import BalancedPattern, gait_plan
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
+from cpg_ros.feedback.biped.feedback import gait_plan
+from cpg_ros.feedback.input_checks import LATE_BALANCE
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.feedback import sensor_input
@@ -63,7 +65,8 @@ class HumanoidUnderFault:
         subscription, sensor_input.PolledSubscription = sensor_input.PolledSubscription, Wire
         try:
             inputs = sensor_input.SensorInput(None, robot, GRAVITY * robot.biped.total, 'imu',
-                                              'measured', 'foot_contacts', 'foot_contacts')
+                                              'measured', 'foot_contacts', 'foot_contacts',
+                                              latest=LATE_BALANCE)
         finally:
             sensor_input.PolledSubscription = subscription
         self.loop = BalanceLoop(self.pattern, inputs, lambda: (speed, 0.0, 0.0))

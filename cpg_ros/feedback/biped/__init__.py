@@ -14,4 +14,5 @@
 
 """Balance for legs with soles: stepping, support and arms on the clock of a network."""
 
-__all__ = ['crouch', 'feedback', 'gains', 'links', 'stepping', 'substitutes', 'support', 'tick']
+__all__ = ['balanced_pattern', 'crouch', 'feedback', 'gains', 'links', 'stepping', 'substitutes',
+           'support', 'tick']

@@ -17,7 +17,8 @@
 from collections.abc import Callable
 import math
 
-from cpg_ros.feedback.biped.feedback import BalancedPattern, BipedFeedback
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
+from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
 from cpg_ros.feedback.estimate import Odometry, TOUCH
 from cpg_ros.feedback.feedback import Feedback
@@ -308,11 +309,12 @@ class BalanceLoop:
             return
         inputs.take(now, pattern.enabled)
         found, self.waiting = inputs.faults(now)
+        pattern.failed = bool(found)
+        found += [f'{inputs.monitors[one].name}: {why}' for one, why in pattern.doubts.items()]
         self.faults = '; '.join(found)
         measured, sensors = inputs.sensor_data, self._sensors
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
         sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]
-        pattern.failed = bool(found)
         pattern.refused = any(monitor.refused for monitor in inputs.monitors)
         ages = [now - monitor.believed for monitor in inputs.monitors]
         # Of several feet the oldest counts; where efforts are the contacts, there are none.

@@ -19,7 +19,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 from cpg_ros.dynamics.integration.compilation import COMPILED
-from cpg_ros.feedback.biped.feedback import BalancedPattern
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
 from cpg_ros.feedback.estimate import Odometry, SCALE

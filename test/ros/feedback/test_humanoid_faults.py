@@ -29,3 +29,18 @@ def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
     assert not humanoid.crossed and not humanoid.pattern.falls
+
+
+@pytest.mark.parametrize('fault', ['delay 20 ms', *in_depth('delay 50 ms', 'delay 90 ms')])
+def test_late_sensors_make_it_crouch(fault):
+    humanoid = HumanoidUnderFault(fault)
+    assert humanoid.run(4.0) == 'crouch'
+    assert not humanoid.crossed and not humanoid.pattern.falls
+
+
+@pytest.mark.parametrize('fault', ['feet swapped', *in_depth('encoder off .25')])
+def test_an_input_that_contradicts_the_others_makes_it_crouch(fault):
+    humanoid = HumanoidUnderFault(fault, begins=3.0)
+    assert humanoid.run(6.5) == 'crouch'
+    assert not humanoid.crossed and not humanoid.pattern.falls
+    assert humanoid.loop.faults

@@ -1,0 +1,333 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pattern of a biped whose feedback bears it: joints go where balance wants them."""
+
+import math
+
+from cpg_ros.feedback.biped.crouch import crouch_pose
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.gains import STAND, WALK
+from cpg_ros.feedback.biped.stepping import swing_share, WALKS
+from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, FEET, IMU, JOINTS, Substitutes
+from cpg_ros.feedback.biped.support import Arms
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.pattern import GaitRunner, Pattern
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.readout import confine
+from cpg_ros.motion.strides import smoothstep, StrideCommand
+import numpy as np
+
+#: A base that leans more than this, rad, or a centre of mass lower than this share of its height
+#: has fallen.
+LEANS, LOW = 1.0, 0.6
+#: It stands or crouches on its feet if the base leans less than this and no joint is further from
+#: the pose, rad, and if the feet bear this share of the weight, all for this time, s.
+UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
+#: From where joints are into the stand, and into the crouch, s.
+RETURN, LOWER = 0.3, 0.45
+#: How long it stands before it crouches, and the longest time in which it comes to a stand once
+#: an input has failed, s.
+SETTLED, PATIENCE = 0.3, 4.0
+#: Shares of a swing between which the body passes over the foot that stands: the best time to
+#: crouch without any sensor.
+PASSING = 0.38, 0.6
+#: A foot in the middle of its swing that bears so many times the other's load contradicts.
+CONTRARY = 4.0
+#: Inputs that failed count as valid again after this time, s.
+GOOD = 0.3
+#: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
+JUMP, FASTEST = 0.15, 40.0
+#: From the angles that are held to those of the feedback, s.
+TAKEOVER = 0.1
+#: Fastest sideways, m/s, and fastest turn, rad/s.
+ASIDE, TURN = 0.2, 0.5
+
+
+class BalancedPattern(Pattern):
+    """A pattern whose joints a biped's feedback moves.
+
+    Without feedback it is the open-loop pattern. With it, it holds the stand's angles until the
+    robot stands on its feet, then balances: it stands while disabled, and walks as wished while
+    enabled. After a fall it holds the stand until somebody has put the robot on its feet. Limits
+    of positions and speeds hold throughout; where the feedback begins or ends, the joints move on
+    from where they are.
+
+    A stand needs balance, a crouch does not. Where an input fails it stops with what substitutes
+    it, and crouches; without inertial unit and joints it crouches in the middle of a step. Once
+    all inputs are valid it stands up and goes on. Before the end it crouches, too, see ``lower``.
+
+    Attributes:
+        balance: the feedback, None for the open-loop pattern.
+        sensors: what is measured now, joints in the feedback's order; None if that is not known.
+        wish: speeds forward and to the left, m/s, and rate of turning, rad/s.
+        balancing: whether the feedback bears the robot now.
+        fallen: whether it fell, and has not been put on its feet yet.
+        falls: how often it fell.
+        ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
+        failed: whether an input is out.
+        doubts: input -> how it contradicts the others, until the pattern is enabled anew.
+        refused: whether messages arrive, but none of an input has been valid yet.
+        crouching: whether it holds the crouch or is on its way into it.
+
+    """
+
+    def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,
+                 drive: StrideCommand | None = None) -> None:
+        """Stand; arguments as of Pattern, but a drive has nothing to do here."""
+        super().__init__(plan, ramp, enabled)
+        self.balance: BipedFeedback | None = None
+        self.sensors: SensorData | None = None
+        self.wish = 0.0, 0.0, 0.0
+        self.balancing, self.fallen, self.falls = False, False, 0
+        self._stood, self._share = 0.0, 0.0
+        self.ages, self.failed, self.refused, self.crouching = np.zeros(3), False, False, False
+        self.doubts: dict[int, str] = {}
+        self._contrary, self._gap, self._measured = 0.0, math.inf, np.zeros(1)
+        self._good, self._blind = GOOD, False
+        self._held, self._still = False, np.zeros_like(self._offset)
+        self._start, self._pose = self._offset.copy(), self._offset
+        self._time = self._waited = self._failing = 0.0
+        self._lowers, self._known = False, False
+        self._substitutes: Substitutes | None = None
+        self._crouch, self._depth = self._offset, 0.0
+        self._before: np.ndarray | None = None
+        self._places = self.robot.places
+        self._rest = np.array(list(self.robot.held.values()))
+        self._arms: Arms | None = None
+
+    def steer(self, stride: np.ndarray, pace: float) -> None:
+        """Do nothing: feet are placed for the wished speed."""
+
+    def apply(self, plan: GaitPlan, transition: float) -> None:
+        """Change to a program; with feedback at once, whatever the transition."""
+        if self.balance is None:
+            super().apply(plan, transition)
+        else:
+            self._requests.append((plan, GaitRunner(plan, 0.0)))
+
+    def attach(self, drive: StrideCommand) -> None:
+        """Do nothing, likewise."""
+
+    @property
+    def level(self) -> float:
+        """0 in the stand, 1 in the gait."""
+        if self.balance is None:
+            return self._ramp.level
+        return 1.0 if self.balancing and self.balance.mode == WALK else 0.0
+
+    @property
+    def standing(self) -> bool:
+        """Tell whether it is disabled and has come to a stand."""
+        if self.balance is None:
+            return super().standing
+        if self._lowers and not self.fallen and (self.balancing or self._time < LOWER + SETTLED):
+            return False
+        return not (self.enabled or self.level or self._requests)
+
+    @property
+    def held_angles(self) -> np.ndarray:
+        """Where joints of no leg are to be driven, rad, in the order of ``robot.held``."""
+        return self._rest if self._arms is None else self._arms.positions
+
+    @property
+    def in_transition(self) -> bool:
+        """Tell whether another gait is wanted than that in force."""
+        return self.balance.changing if self.balance is not None else super().in_transition
+
+    def restart(self, ramp: float, enabled: bool = True) -> None:
+        """Begin anew, from where the joints are."""
+        super().restart(ramp, enabled)
+        self.balancing, self._stood = False, 0.0
+        self.crouching = self._lowers = False
+
+    def lower(self) -> bool:
+        """Go into the crouch once it stands, and stay there: before the end of all commands.
+
+        Returns:
+            Whether it will: it balances, or did.
+
+        """
+        self._lowers = self.balance is not None and self._known and not self.fallen
+        return self._lowers
+
+    def release(self) -> None:
+        """Forget the balance, as where the sensors are out: the stand's angles are held."""
+        self.balancing, self._stood = False, 0.0
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s and fill position, velocity and phases."""
+        balance, sensors = self.balance, self.sensors
+        if balance is None:
+            if self._arms is not None:
+                self._arms.advance(dt, False)
+            if self._held or self.balancing:
+                self._held = self.balancing = self.crouching = False
+                self._wanted[:], self._rate[:] = self.position, 0.0
+                self._absorption.begin()
+            super().advance(dt)
+            return
+        if self._arms is not balance.arms:
+            self._attach(balance)
+        self._take(balance)
+        if sensors is not None:
+            assert self._substitutes is not None
+            self._doubt(balance, sensors, dt)
+            sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
+            self._watch(balance, sensors, dt)
+        self._good = 0.0 if self.failed or self.doubts else self._good + dt
+        if self.balancing and self._gives_up(balance, sensors, dt):
+            # First, as another thread may ask whether it has come to rest.
+            self._time, self.crouching = 0.0, True
+            self.release()
+        measured = self._known or self.refused or sensors is not None
+        if not (self.balancing or self.fallen) and (self._lowers or (self.failed and measured)):
+            self.crouching = True
+        wanted = None
+        if self.balancing and sensors is not None:
+            wanted = self._balanced(balance, sensors, dt)
+        if wanted is None:
+            wanted = self._hold(balance, dt)
+        rate = (wanted - self.position) / dt if dt > 0.0 else self._still
+        self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
+                             self._behind) > 0
+
+    def _attach(self, balance: BipedFeedback) -> None:
+        self._arms = balance.arms
+        self._substitutes = Substitutes(balance.links)
+        self._crouch, self._depth = crouch_pose(self.robot, balance.links) or (self._offset, 0.0)
+
+    def _gives_up(self, balance: BipedFeedback, sensors: SensorData | None, dt: float) -> bool:
+        """Return whether to crouch now instead of balancing any longer."""
+        if not (self._stops or self._lowers):
+            self._waited = self._failing = 0.0
+            self._blind = False
+            return sensors is None
+        self._failing += dt
+        self._waited = self._waited + dt if balance.mode == STAND else 0.0
+        self._blind = self._blind or min(self.ages[IMU], self.ages[JOINTS]) > EXTRAPOLATED
+        return (sensors is None or self._waited > SETTLED
+                or (self._stops and self._failing > PATIENCE)
+                or (self._blind and (balance.mode != WALK or self._passes(balance))))
+
+    @property
+    def _stops(self) -> bool:
+        """Whether an input is out, or was lately."""
+        return self._good < GOOD
+
+    @staticmethod
+    def _passes(balance: BipedFeedback) -> bool:
+        """Return whether the body is over the foot that stands."""
+        memory, swing = balance.memory, swing_share(balance.gains)
+        fractions = memory.phases[memory.swinging] / swing
+        return bool(((fractions > PASSING[0]) & (fractions < PASSING[1])).any())
+
+    def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
+                  ) -> np.ndarray | None:
+        """Return where balance wants the joints, rad; None if the robot has fallen."""
+        if self.enabled and not (self._stops or self._lowers):
+            forward, left, turn = self.wish
+            balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
+        else:
+            balance.stand()
+        if self._held:
+            self._held = False
+            self._start[:] = self.position
+        wanted = balance.advance(sensors, dt)
+        if not np.isfinite(wanted).all():
+            self._fall()
+            return None
+        self.faults = balance.faults
+        self._share = min(1.0, self._share + dt / TAKEOVER)
+        start = self._start[self._places]
+        self._wanted[self._places] = start + self._share * (wanted - start)
+        height = balance.memory.center[0, 2] - balance.memory.pose.soles[:, 2].min()
+        if height < LOW * (balance.gains.height - balance.memory.crouch[0]):
+            self._fall()
+        return self._wanted
+
+    def _hold(self, balance: BipedFeedback, dt: float) -> np.ndarray:
+        """Return the angles of the stand or the crouch, rad, or those on the way to them."""
+        pose, duration = (self._crouch, LOWER) if self.crouching else (self._offset, RETURN)
+        if not self._held or pose is not self._pose:
+            self._held, self._pose, self._time = True, pose, 0.0
+            self._start[:] = self.position
+        self._time += dt
+        balance.arms.advance(dt, False)
+        return self._start + smoothstep(min(self._time / duration, 1.0))[0] * (pose - self._start)
+
+    def _take(self, balance: BipedFeedback) -> None:
+        """Take requests of other threads."""
+        while self._requests:
+            what, how = self._requests.popleft()
+            if isinstance(what, bool):
+                self.enabled = what
+                self.doubts.clear()
+                self._ramp.go(float(what), how)
+            else:
+                balance.follow(how)
+        self._tracks[:] = [balance.track]
+
+    def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+        """Count inputs as out that contradict the others while it balances."""
+        memory = balance.memory
+        joints = sensors.joint_positions[0]
+        jumps = np.abs(joints - self._measured) > JUMP + FASTEST * (self._gap + dt)
+        self._measured, self._gap = joints.copy(), self.ages[JOINTS]
+        # Somebody who moves the robot moves more than one joint.
+        if self.balancing and jumps.sum() == 1:
+            self.doubts.setdefault(JOINTS, f'{balance.order[int(jumps.argmax())]} jumped')
+        if self.balancing and balance.mode == WALK and balance.kind == WALKS:
+            loads, swings = sensors.foot_forces[0], memory.swinging
+            contrary = (self.ages[FEET] < EXTRAPOLATED and self._passes(balance)
+                        and loads[swings].sum() > CONTRARY * loads[~swings].sum())
+            self._contrary = self._contrary + dt if contrary else 0.0
+            if self._contrary > STEADY:
+                self.doubts.setdefault(FEET, 'the contacts do not go with the gait')
+        for one in self.doubts:
+            self.ages[one] = max(self.ages[one], EXTRAPOLATED + dt)
+
+    def _watch(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+        """Find out whether the robot has fallen, was moved, or stands on its feet again."""
+        joints = sensors.joint_positions[0]
+        lean = math.acos(min(max(math.cos(sensors.rpy[0, 0]) * math.cos(sensors.rpy[0, 1]),
+                                 -1.0), 1.0))
+        moved = (self._before is not None
+                 and float(np.abs(joints - self._before).max()) > JUMP + FASTEST * dt)
+        self._before = joints.copy()
+        if self.balancing:
+            if lean > LEANS:
+                self._fall()
+            elif moved:
+                self.release()
+            return
+        if self._stops or self._lowers:
+            self._stood = 0.0
+            return
+        off = np.abs(joints[balance.rows] - self._pose[self._places]).max()
+        weight = GRAVITY * balance.links.masses.sum()
+        stands = (lean < (CROUCHED if self.crouching else UPRIGHT) and off < NEAR
+                  and sensors.foot_forces.sum() > BORNE * weight)
+        self._stood = self._stood + dt if stands and not moved else 0.0
+        if self._stood >= STEADY:
+            balance.restart(self._depth if self.crouching else 0.0)
+            self.balancing, self.fallen, self._share, self._known = True, False, 0.0, True
+            self.crouching = False
+
+    def _fall(self) -> None:
+        self.release()
+        self.crouching = False
+        self.falls += 1
+        self.fallen = True
