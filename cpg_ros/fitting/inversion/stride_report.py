@@ -231,7 +231,7 @@ FEWEST = 3
 QUANTITIES = (('stride [s]', 'stride [s]', 'periods', '.4f'),
               ('retraction [s]', 'stance [s]', 'retractions', '.4f'),
               ('protraction [s]', 'swing [s]', 'protractions', '.4f'),
-              ('retracted', 'duty', 'shares', '.3f'))
+              ('retracted', 'duty', 'fractions', '.3f'))
 Rows = list[tuple[str, ...]]
 
 
