@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The style sheet of the pages that are written: one that needs no other file."""
+"""Pages that need no other file."""
+
+import base64
+from collections.abc import Sequence
+from html import escape
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 78em; padding: 0 1em;
@@ -32,3 +36,23 @@ figure { display: inline-block; margin: 0.5em 1em 1em 0; max-width: 100%; }
 figure img { max-width: 100%; border: 1px solid #e2e8f0; }
 figcaption { font-size: 0.9em; color: #4a5568; max-width: 40em; }
 """
+
+
+def page(title: str, parts: Sequence[str]) -> str:
+    """Return a page with a title and a body, which is HTML."""
+    return '\n'.join(['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
+                      f'<title>{escape(title)}</title><style>{STYLE}</style></head><body>',
+                      f'<h1>{escape(title)}</h1>', *parts, '</body></html>', ''])
+
+
+def html_table(head: Sequence[str], rows: Sequence[str]) -> str:
+    """Return a table; its rows are HTML."""
+    heads = ''.join(f'<th>{escape(text)}</th>' for text in head)
+    return '\n'.join([f'<table><thead><tr>{heads}</tr></thead><tbody>', *rows,
+                      '</tbody></table>'])
+
+
+def image(png: bytes, name: str, caption: str = '') -> str:
+    """Return a figure with the picture in it; the caption is HTML."""
+    return (f'<figure><img alt="{escape(name)}" src="data:image/png;base64,'
+            f'{base64.b64encode(png).decode("ascii")}">{caption}</figure>')

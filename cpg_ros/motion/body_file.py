@@ -18,13 +18,13 @@ Part ``geometry`` has the lengths and axes of legs that feedback can displace, `
 gait what the base does by itself in it.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence, Set
-from dataclasses import asdict, dataclass, field
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 import math
-from typing import Any, NamedTuple, TypeVar
+from typing import Annotated, Any, NamedTuple
 
 from cpg_ros.common.errors import ShortRepr
-from cpg_ros.common.yaml_reader import quoted, YamlReader
+from cpg_ros.common.yaml_reader import plain, positive, quoted, required, YamlReader
 from cpg_ros.motion.description import outward, sprawls
 from cpg_ros.networks.library.biped import CELLS
 import numpy as np
@@ -32,7 +32,11 @@ import numpy as np
 # A biped in a robot file, part ``biped``: links and their masses, soles, servos, gains.
 
 BASE = 'base'
-NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
+#: Types of fields, with what a file must have there.
+Vector = Annotated[tuple[float, ...], 3]
+Positive = Annotated[float, positive]
+NotNegative = Annotated[float, lambda value: '' if value >= 0.0 else (
+    f'{value:g} must be at least 0')]
 #: Gaits in which feedback keeps a biped up, and the speeds forward that were tried on the G1, m/s.
 GAIT_SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
           'two_legged_jump': (-0.05, 0.05)}
@@ -59,14 +63,14 @@ class BipedLink:
     """
 
     parent: str
-    axis: tuple[float, ...]
-    anchor: tuple[float, ...]
-    mass: float
-    center: tuple[float, ...]
-    kp: float
-    kd: float
-    effort: float
-    armature: float = 0.0
+    axis: Vector
+    anchor: Vector
+    mass: NotNegative
+    center: Vector
+    kp: Positive
+    kd: NotNegative
+    effort: Positive
+    armature: NotNegative = 0.0
     angle: float | None = None
     cell: int = 0
     swing: float = 0.0
@@ -116,96 +120,66 @@ class BipedBody(ShortRepr):
 
 
 def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]]) -> BipedBody:
-    """Take the part ``biped``; legs are those of the file with the names of their joints."""
+    """Read the part ``biped``; legs are those of the file with the names of their joints."""
     tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'},
                        {'gains', 'scale'})
     base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
     driven = {name for names in legs.values() for name in names}
     links: dict[str, BipedLink] = {}
-    listed = _any_keys(reader, tree['links'], 'biped.links', driven)
-    for name in listed:
-        links[name] = _link(reader, listed[name], f'biped.links.{name}', links, name in driven)
+    for name, link in reader.mapping(tree['links'], 'biped.links', lambda value, where: value,
+                                     driven).items():
+        links[name] = _link(reader, link, f'biped.links.{name}', links, name in driven)
     soles = reader.keys(tree['soles'], 'biped.soles', set(legs))
-    size = reader.numbers(tree['sole_size'], 'biped.sole_size', 2)
-    for k, value in enumerate(size):
-        _positive(reader, value, f'biped.sole_size[{k}]')
-    gains = _any_keys(reader, tree.get('gains', {}), 'biped.gains')
-    length, mass = (_positive(reader, value, f'biped.scale[{k}]') for k, value in enumerate(
-        reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2)))
+
+    def gain(value: Any, where: str) -> Any:
+        if where.removeprefix('biped.gains.') in GAIT_SPEEDS:
+            return reader.mapping(value, where, reader.number)
+        return reader.number(value, where)
+
+    gains = reader.mapping(tree.get('gains', {}), 'biped.gains', gain)
+    length, mass = reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2, positive)
     return BipedBody(
-        _positive(reader, base['mass'], 'biped.base.mass'),
+        reader.number(base['mass'], 'biped.base.mass', positive),
         reader.numbers(base['center'], 'biped.base.center', 3), links,
-        {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs}, size,
-        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()
-         if name not in GAIT_SPEEDS},
-        (length, mass), {gait: _gait_gains(reader, gains[gait], f'biped.gains.{gait}')
-                         for gait in gains if gait in GAIT_SPEEDS})
-
-
-def _gait_gains(reader: YamlReader, tree: Any, where: str) -> dict[str, float]:
-    return {name: reader.number(value, f'{where}.{name}')
-            for name, value in _any_keys(reader, tree, where).items()}
-
-
-def _any_keys(reader: YamlReader, tree: Any, where: str, required: Set[str] = frozenset()
-              ) -> Mapping[str, Any]:
-    return reader.keys(tree, where, required, set(tree) if isinstance(tree, Mapping) else set())
-
-
-def _positive(reader: YamlReader, value: Any, where: str) -> float:
-    number = reader.number(value, where)
-    if number <= 0.0:
-        raise reader.fail(where, f'{number:g} must be positive')
-    return number
+        {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs},
+        reader.numbers(tree['sole_size'], 'biped.sole_size', 2, positive),
+        {name: value for name, value in gains.items() if name not in GAIT_SPEEDS}, (length, mass),
+        {name: value for name, value in gains.items() if name in GAIT_SPEEDS})
 
 
 def _link(reader: YamlReader, tree: Any, where: str, before: Collection[str], driven: bool
           ) -> BipedLink:
-    places = ('axis', 'anchor', 'center')
-    tree = reader.keys(tree, where, {'parent', *places, *NUMBERS[:4]}
-                       | (set() if driven else {'angle'}),
-                       {'armature'} | (set() if driven else {'cell', 'swing'}))
-    parent = reader.text(tree['parent'], f'{where}.parent')
-    if parent != BASE and parent not in before:
-        raise reader.fail(f'{where}.parent', f"'{parent}' is neither {BASE} nor a link before")
-    axis, anchor, center = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
-    length = float(np.linalg.norm(axis))
+    held = set() if driven else {'angle'}
+    tree = reader.keys(tree, where, required(BipedLink) | held,
+                       {'armature'} | (held and {'cell', 'swing'}))
+    link = BipedLink(**reader.values(BipedLink, tree, where, cell=lambda value, _: value))
+    if link.parent != BASE and link.parent not in before:
+        raise reader.fail(f'{where}.parent',
+                          f"'{link.parent}' is neither {BASE} nor a link before")
+    length = float(np.linalg.norm(link.axis))
     if abs(length - 1.0) > 1e-3:
         raise reader.fail(f'{where}.axis', f'has the length {length:g}, not 1')
-    mass, kp, kd, effort, armature = (reader.number(tree.get(key, 0.0), f'{where}.{key}')
-                                      for key in NUMBERS)
-    for key, value in zip(NUMBERS, (mass, kp, kd, effort, armature), strict=True):
-        if value < 0.0 or (value == 0.0 and key in ('kp', 'effort')):
-            raise reader.fail(f'{where}.{key}', f'{value:g} must be '
-                              + ('positive' if key in ('kp', 'effort') else 'at least 0'))
-    angle = None if driven else reader.number(tree['angle'], f'{where}.angle')
-    cell, swing = tree.get('cell', 0), reader.number(tree.get('swing', 0.0), f'{where}.swing')
-    if not (isinstance(cell, int) and 0 <= cell <= CELLS):
-        raise reader.fail(f'{where}.cell', f'{cell!r} is not the number of a cell, 1 to {CELLS}')
-    if swing and not cell:
+    if not (isinstance(link.cell, int) and 0 <= link.cell <= CELLS):
+        raise reader.fail(f'{where}.cell', f'{link.cell!r} is not the number of a cell, 1 to '
+                          f'{CELLS}')
+    if link.swing and not link.cell:
         raise reader.fail(where, 'a swing needs a cell')
-    return BipedLink(parent, tuple(value / length for value in axis), anchor, mass, center, kp, kd,
-                     effort, armature, angle, cell, swing)
+    return replace(link, axis=tuple(value / length for value in link.axis))
 
 
 def biped_tree(biped: BipedBody) -> dict[str, Any]:
     """Return a biped as the tree that read_biped takes."""
-    links = {name: {key: list(value) if isinstance(value, tuple) else value
-                    for key, value in asdict(link).items()
-                    if value is not None and not (key in ('cell', 'swing') and not link.cell)}
+    links = {name: {key: value for key, value in plain(link).items()
+                    if link.cell or key not in ('cell', 'swing')}
              for name, link in biped.links.items()}
-    tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
-            'soles': {leg: list(place) for leg, place in biped.soles.items()},
-            'sole_size': list(biped.sole_size)}
     gains = biped.gains | biped.gait_gains
-    return (tree | ({'scale': list(biped.scale)} if biped.scale != (1.0, 1.0) else {})
-            | ({'gains': gains} if gains else {}))
+    return plain({'base': {'mass': biped.mass, 'center': biped.center}, 'links': links,
+                  'soles': biped.soles, 'sole_size': biped.sole_size}
+                 | ({'scale': biped.scale} if biped.scale != (1.0, 1.0) else {})
+                 | ({'gains': gains} if gains else {}))
 
 
 # The feedback of a robot in its file, part ``feedback``: its own laws and gains, if it helps.
-
-Value = TypeVar('Value')
-
 
 @dataclass(frozen=True, repr=False)
 class OwnFeedback(ShortRepr):
@@ -229,34 +203,13 @@ class OwnFeedback(ShortRepr):
 
 
 def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
-    """Take the part ``feedback``; who uses laws and gains knows their names."""
-    tree = reader.keys(tree, 'feedback', set(), {'enabled', 'made', 'laws', 'gains',
-                                                     'imu_mount'})
+    """Read the part ``feedback``; names of laws and gains are checked where they are used."""
+    def mount(value: Any, where: str) -> tuple[float, ...]:
+        if not isinstance(value, list) or len(value) not in (0, 3):
+            raise reader.fail(where, 'must be a list of roll, pitch and yaw in rad')
+        return tuple(reader.number(angle, where) for angle in value)
 
-    def switch(value: Any, where: str) -> bool:
-        if not isinstance(value, bool):
-            raise reader.fail(where, f'must be true or false, not {quoted(value)}')
-        return value
-
-    def listed(key: str, read: Callable[[Any, str], Value]) -> dict[str, Value]:
-        own = tree.get(key, {})
-        own = reader.keys(own, f'feedback.{key}', set(), set(own) if isinstance(own, dict) else
-                          set())
-        return {name: read(value, f'feedback.{key}.{name}') for name, value in own.items()}
-
-    made = reader.text(tree['made'], 'feedback.made') if 'made' in tree else ''
-    mount = tree.get('imu_mount', [])
-    if not isinstance(mount, list) or len(mount) not in (0, 3):
-        raise reader.fail('feedback.imu_mount', 'must be a list of roll, pitch and yaw in rad')
-    return OwnFeedback(switch(tree.get('enabled', True), 'feedback.enabled'), made,
-                       listed('laws', switch), listed('gains', reader.number),
-                       tuple(reader.number(angle, 'feedback.imu_mount') for angle in mount))
-
-
-def feedback_tree(own: OwnFeedback) -> dict[str, Any]:
-    """Return what ``read_feedback`` reads back."""
-    tree = {key: value for key, value in vars(own).items() if value not in ('', {}, ())}
-    return {**tree, 'imu_mount': list(own.imu_mount)} if own.imu_mount else tree
+    return reader.record(OwnFeedback, tree, 'feedback', imu_mount=mount)
 
 
 #: Bins of the stride in an efference table, and most speeds that it has.
@@ -288,10 +241,10 @@ class LegGeometry:
 
     joints: tuple[str, ...]
     turns: tuple[float, ...]
-    hip: tuple[float, ...]
-    thigh: tuple[float, ...]
-    calf: tuple[float, ...]
-    foot: tuple[float, ...]
+    hip: Vector
+    thigh: Vector
+    calf: Vector
+    foot: Vector
     yaw: float | None = None
 
 
@@ -306,9 +259,10 @@ class BodyGeometry(ShortRepr):
 
     """
 
-    mass: float
-    foot_radius: float
-    legs: dict[str, LegGeometry] = field(default_factory=dict)
+    mass: Positive
+    foot_radius: Annotated[float, lambda value: '' if value >= 0.0 else (
+        f'{value:g} must not be negative')]
+    legs: dict[str, LegGeometry]
 
 
 @dataclass(frozen=True, repr=False)
@@ -383,43 +337,32 @@ def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, 
 
 def read_geometry(reader: YamlReader, tree: Any,
                   legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
-    """Take the part ``geometry``; legs are those of the file with the names of their joints."""
-    tree = reader.keys(tree, 'geometry', {'mass', 'foot_radius', 'legs'})
-    mass, radius = (reader.number(tree[key], f'geometry.{key}') for key in ('mass', 'foot_radius'))
-    if mass <= 0.0:
-        raise reader.fail('geometry.mass', f'{mass:g} must be positive')
-    if radius < 0.0:
-        raise reader.fail('geometry.foot_radius', f'{radius:g} must not be negative')
-    listed = reader.keys(tree['legs'], 'geometry.legs', set(), set(legs))
-    return BodyGeometry(mass, radius, {leg: _leg(reader, listed[leg], f'geometry.legs.{leg}',
-                                                 set(legs[leg])) for leg in listed})
+    """Read the part ``geometry``; legs are those of the file with the names of their joints."""
+    def read_legs(value: Any, where: str) -> dict[str, LegGeometry]:
+        return {leg: _leg(reader, entry, f'{where}.{leg}', set(legs[leg]))
+                for leg, entry in reader.keys(value, where, set(), set(legs)).items()}
+
+    return reader.record(BodyGeometry, tree, 'geometry', legs=read_legs)
 
 
-def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeometry:
-    places = ('hip', 'thigh', 'calf', 'foot')
-    tree = reader.keys(tree, where, {'joints', 'turns', *places}, {'yaw'})
-    joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
-                   in enumerate(reader.items(tree['joints'], f'{where}.joints')))
-    if len(joints) not in (2, 3) or len(set(joints)) < len(joints):
+def _leg(reader: YamlReader, tree: Any, where: str, names: set[str]) -> LegGeometry:
+    leg = reader.record(LegGeometry, tree, where)
+    if len(leg.joints) not in (2, 3) or len(set(leg.joints)) < len(leg.joints):
         raise reader.fail(f'{where}.joints', 'must name hip, thigh and calf, or of '
                           'thigh and calf')
-    for k, name in enumerate(joints):
-        if name not in known:
+    for k, name in enumerate(leg.joints):
+        if name not in names:
             raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is not a joint of this leg")
-    turns = reader.numbers(tree['turns'], f'{where}.turns', len(joints))
-    for k, turn in enumerate(turns):
-        if turn not in (1.0, -1.0):
-            raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} must be 1 or -1')
-    hip, thigh, calf, foot = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
-    yaw = reader.number(tree['yaw'], f'{where}.yaw') if 'yaw' in tree else None
-    if yaw is not None and len(joints) == 2:
+    reader.numbers(list(leg.turns), f'{where}.turns', len(leg.joints),
+                   lambda turn: '' if turn in (1.0, -1.0) else f'{turn:g} must be 1 or -1')
+    if leg.yaw is not None and len(leg.joints) == 2:
         raise reader.fail(f'{where}.yaw', 'is of a leg of three joints, the first about z')
     # Level and upward, of what is in the plane of the leg.
-    level = np.array([1.0, 0.0]) if yaw is None else np.array([np.cos(yaw), np.sin(yaw)])
-    for key, link in (('calf', calf), ('foot', foot)):
+    level = np.array([1.0, 0.0] if leg.yaw is None else [np.cos(leg.yaw), np.sin(leg.yaw)])
+    for key, link in (('calf', leg.calf), ('foot', leg.foot)):
         if np.hypot(level @ link[:2], link[2]) < 1e-9:
             raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
-    return LegGeometry(joints, turns, hip, thigh, calf, foot, yaw)
+    return leg
 
 
 def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
@@ -451,14 +394,6 @@ def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
         return tuple(reader.number(float(word), where) for word in words)
     except ValueError as error:
         raise reader.fail(where, f'contains something that is not a number: {error}') from error
-
-
-def geometry_tree(geometry: BodyGeometry) -> dict[str, Any]:
-    """Return what ``read_geometry`` reads back."""
-    return {'mass': geometry.mass, 'foot_radius': geometry.foot_radius,
-            'legs': {leg: {key: list(value) if isinstance(value, tuple) else value
-                           for key, value in asdict(one).items() if value is not None}
-                     for leg, one in geometry.legs.items()}}
 
 
 def efference_tree(table: EfferenceTable) -> dict[str, Any]:

@@ -25,8 +25,10 @@ from -1 to 1.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
+from typing import Annotated
 
 from cpg_ros.common.errors import InputError, short, ShortRepr
+from cpg_ros.common.yaml_reader import positive, within
 from cpg_ros.motion.body_file import BipedBody, BodyGeometry, EfferenceTable, OwnFeedback
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
@@ -52,7 +54,7 @@ class Joint:
     weights: tuple[float, ...]
     lower: float
     upper: float
-    velocity: float
+    velocity: Annotated[float, positive]
     invented: tuple[str, ...] = ()
 
 
@@ -71,9 +73,9 @@ class SteeringTable:
     """
 
     speed: tuple[float, ...]
-    stride: tuple[float, ...]
+    stride: Annotated[tuple[float, ...], None, within(-1.0, 1.0, '-1 to 1')]
     frequency: tuple[float, ...]
-    turn: tuple[float, ...]
+    turn: Annotated[tuple[float, ...], None, within(1e-3, 1e3, '0.001 to 1000 rad/s')]
 
     def ask(self, speed: float, turn: float) -> tuple[float, float, float]:
         """Return the strides of the left and right legs, and the frequency in Hz.
@@ -115,11 +117,11 @@ class Motion(ShortRepr):
 
     """
 
-    frequency: float | None = None
+    frequency: Annotated[float | None, within(0.01, 10.0, '0.01 to 10 Hz')] = None
     joints: dict[str, JointMotion] = field(default_factory=dict)
     steering: SteeringTable | None = None
     efference: EfferenceTable | None = None
-    duty: float | None = None
+    duty: Annotated[float | None, within(0.3, 0.9, '0.3 to 0.9')] = None
     stance: tuple[float, float] | None = None
 
 

@@ -18,19 +18,17 @@ The first part gives the cell that drives each joint, its weights and its limits
 part ``gaits`` gives what differs in a gait, and how to steer it.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.common.errors import CpgError
-from cpg_ros.common.files import resource_folder, write_atomically
-from cpg_ros.common.yaml_reader import quoted, YamlReader
+from cpg_ros.common.files import resource_folder
+from cpg_ros.common.yaml_reader import plain, quoted, required, within, write_yaml, YamlReader
 from cpg_ros.motion.body_file import (
     biped_tree,
     efference_tree,
-    feedback_tree,
-    geometry_tree,
     read_biped,
     read_efference,
     read_feedback,
@@ -47,7 +45,6 @@ from cpg_ros.motion.robot import (
 )
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
-import yaml
 
 #: How many times its own frequency a gait that is steered may step, at most.
 HASTE = 2.0
@@ -74,60 +71,38 @@ class _Reader(YamlReader):
                 raise self.fail(where, str(error)) from error
         return tuple(found)
 
-    def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, ...],
-              stated: str | None) -> dict[str, str]:
+    def side(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, ...],
+             stated: str | None) -> dict[str, str]:
         """Return leg -> word if the file has it; it must agree with the network."""
         if key not in tree:
             return {}
-        word = self.text(tree[key], f'{where}.{key}')
-        if word not in words:
-            raise self.fail(f'{where}.{key}', f"'{word}' is not one of {', '.join(words)}")
+        word = self.name_of(tree[key], f'{where}.{key}', words)
         if stated not in (None, word):
             raise self.fail(f'{where}.{key}', f"'{word}' does not agree with the network, which "
                                               f'has {stated}')
         return {where.removeprefix('legs.'): word}
 
     def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:
-        numbers = {'offset', 'lower', 'upper', 'velocity'}
-        tree = self.keys(tree, where, numbers | {'name', 'cell'},
+        tree = self.keys(tree, where, required(Joint) - {'leg', 'weights'},
                          {'amplitude', 'weights', 'invented'})
-        name = self.text(tree['name'], f'{where}.name')
-        where = f'{where} ({name})'
-        values = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(numbers)}
-        if type(tree['cell']) is not int or tree['cell'] not in cells:
+        where = f'{where} ({self.text(tree["name"], f"{where}.name")})'
+        joint = Joint(leg=leg, **self.values(
+            Joint, {'weights': None, **tree}, where, cell=lambda value, _: value,
+            weights=lambda *_: self.readout(tree, where),
+            invented=lambda value, place: tuple(
+                self.name_of(key, place, LIMITS) for key in self.items(value, place))))
+        if type(joint.cell) is not int or joint.cell not in cells:
             raise self.fail(f'{where}.cell', f"leg '{leg}' has the cells "
-                            f'{" and ".join(map(str, cells))}, not {quoted(tree["cell"])}')
-        weights = self.readout(tree, where)
-        if not values['lower'] < values['upper']:
-            raise self.fail(f'{where}.lower', f'{values["lower"]:g} is not below upper '
-                            f'{values["upper"]:g}')
-        self.check_limits(values['offset'], f'{where}.offset', values['lower'], values['upper'])
-        if values['velocity'] <= 0.0:
-            raise self.fail(f'{where}.velocity', f'{values["velocity"]:g} must be positive')
-        invented: tuple[str, ...] = ()
-        if 'invented' in tree:
-            invented = self.guessed(tree['invented'], f'{where}.invented')
-        return Joint(name=name, leg=leg, cell=tree['cell'], weights=weights, **values,
-                     invented=invented)
+                            f'{" and ".join(map(str, cells))}, not {quoted(joint.cell)}')
+        if not joint.lower < joint.upper:
+            raise self.fail(f'{where}.lower', f'{joint.lower:g} is not below upper '
+                            f'{joint.upper:g}')
+        self.check_limits(joint.offset, f'{where}.offset', joint.lower, joint.upper)
+        return joint
 
     def check_limits(self, offset: float, where: str, lower: float, upper: float) -> None:
         if not lower <= offset <= upper:
             raise self.fail(where, f'{offset:g} is outside the limits {lower:g} to {upper:g}')
-
-    def within(self, value: Any, where: str, low: float, high: float, span: str) -> float:
-        """Return a number from low to high, which the message calls ``span``."""
-        number = self.number(value, where)
-        if not low <= number <= high:
-            raise self.fail(where, f'{number:g} is not from {span}')
-        return number
-
-    def guessed(self, value: Any, where: str) -> tuple[str, ...]:
-        """Return which limits are guesses."""
-        found = tuple(self.text(key, where) for key in self.items(value, where))
-        for key in found:
-            if key not in LIMITS:
-                raise self.fail(where, f"'{key}' is not one of {', '.join(LIMITS)}")
-        return found
 
     def readout(self, tree: Mapping[str, Any], where: str) -> tuple[float, ...]:
         """Return the weights that 'amplitude' or 'weights' gives."""
@@ -145,58 +120,45 @@ class _Reader(YamlReader):
 
     def motion(self, tree: Any, where: str, joints: Mapping[str, Joint]) -> Motion:
         """Return the motion of these joints in a gait."""
-        tree = self.keys(tree, where, set(),
-                         {'frequency', 'duty', 'stance', 'joints', 'steering', 'efference'})
+        def moved(value: Any, where: str) -> dict[str, JointMotion]:
+            return {name: self.joint_motion(entry, f'{where}.{name}', joints[name])
+                    for name, entry in self.keys(value, where, set(), set(joints)).items()}
 
-        def given(key: str, read: Callable[..., Any], *arguments: Any) -> Any:
-            return read(tree[key], f'{where}.{key}', *arguments) if key in tree else None
+        def steering(value: Any, where: str) -> SteeringTable:
+            return self.steering(value, where, tree.get('frequency'))
 
-        frequency = given('frequency', self.within, 0.01, 10.0, '0.01 to 10 Hz')
-        moved = {}
-        listed = self.keys(tree.get('joints', {}), f'{where}.joints', set(), set(joints))
-        for name in listed:
-            place, joint = f'{where}.joints.{name}', joints[name]
-            entry = self.keys(listed[name], place, set(),
-                              {'offset', 'amplitude', 'weights', 'in_place'})
-            offset = self.number(entry.get('offset', joint.offset), f'{place}.offset')
-            self.check_limits(offset, f'{place}.offset', joint.lower, joint.upper)
-            weights = joint.weights
-            if 'amplitude' in entry or 'weights' in entry:
-                weights = self.readout(entry, place)
-            in_place: tuple[float, ...] = ()
-            if 'in_place' in entry:
-                in_place = self.weights(entry['in_place'], f'{place}.in_place')
-            moved[name] = JointMotion(offset, weights, in_place)
-        return Motion(frequency, moved, given('steering', self.steering, frequency),
-                      given('efference', partial(read_efference, self)),
-                      given('duty', self.within, 0.3, 0.9, '0.3 to 0.9'),
-                      given('stance', self.stance))
+        return self.record(Motion, tree, where, joints=moved, steering=steering,
+                           efference=partial(read_efference, self), stance=self.stance)
+
+    def joint_motion(self, tree: Any, where: str, joint: Joint) -> JointMotion:
+        tree = self.keys(tree, where, set(), {'offset', 'amplitude', 'weights', 'in_place'})
+        offset = self.number(tree.get('offset', joint.offset), f'{where}.offset')
+        self.check_limits(offset, f'{where}.offset', joint.lower, joint.upper)
+        weights = joint.weights
+        if 'amplitude' in tree or 'weights' in tree:
+            weights = self.readout(tree, where)
+        return JointMotion(offset, weights, self.weights(tree['in_place'], f'{where}.in_place')
+                           if 'in_place' in tree else ())
 
     def stance(self, value: Any, where: str) -> tuple[float, ...]:
-        found = self.numbers(value, where)
-        if len(found) != 2 or not (-1.0 <= found[0] <= 1.0 and 0.05 <= found[1] <= 0.95):
+        stance = self.numbers(value, where)
+        if len(stance) != 2 or not (-1.0 <= stance[0] <= 1.0 and 0.05 <= stance[1] <= 0.95):
             raise self.fail(where, 'takes a phase from -1 to 1 and a share of the stride from '
                             '0.05 to 0.95')
-        return found
+        return stance
 
     def steering(self, tree: Any, where: str, fastest: float | None) -> SteeringTable:
         if fastest is None:
             raise self.fail(where, "needs the gait's 'frequency', too")
-        columns = ('speed', 'stride', 'frequency', 'turn')
-        tree = self.keys(tree, where, set(columns))
-        rows = {key: self.numbers(tree[key], f'{where}.{key}') for key in columns}
-        for key in columns:
-            if len(rows[key]) != len(rows['speed']):
-                raise self.fail(f'{where}.{key}', f'has {len(rows[key])} numbers, and speed has '
-                                f'{len(rows["speed"])}')
-        allowed = {'stride': (-1.0, 1.0, '-1 to 1'), 'turn': (1e-3, 1e3, '0.001 to 1000 rad/s'),
-                   'frequency': (0.01, HASTE * fastest,
-                                 f"0.01 to twice the gait's {fastest:g} Hz")}
-        for key, (low, high, text) in allowed.items():
-            for k, value in enumerate(rows[key]):
-                self.within(value, f'{where}.{key}[{k}]', low, high, text)
-        self.check_rising(rows['speed'], f'{where}.speed')
-        return SteeringTable(**rows)
+        table = self.record(SteeringTable, tree, where)
+        for key, column in vars(table).items():
+            if len(column) != len(table.speed):
+                raise self.fail(f'{where}.{key}', f'has {len(column)} numbers, and speed has '
+                                f'{len(table.speed)}')
+        self.numbers(list(table.frequency), f'{where}.frequency', check=within(
+            0.01, HASTE * fastest, f"0.01 to twice the gait's {fastest:g} Hz"))
+        self.check_rising(table.speed, f'{where}.speed')
+        return table
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -237,32 +199,27 @@ def read_robot(path: str | Path) -> Robot:
     for leg in tree['legs']:
         where = f'legs.{leg}'
         entry = reader.keys(tree['legs'][leg], where, {'joints'}, {'side', 'girdle'})
-        sides |= reader.place(entry, where, 'side', ('left', 'right'), first.sides.get(leg))
-        girdles |= reader.place(entry, where, 'girdle', GIRDLES, first.girdles.get(leg))
-        listed = reader.items(entry['joints'], f'{where}.joints')
+        sides |= reader.side(entry, where, 'side', ('left', 'right'), first.sides.get(leg))
+        girdles |= reader.side(entry, where, 'girdle', GIRDLES, first.girdles.get(leg))
         joints = []
-        for k, entry in enumerate(listed):
+        for k, item in enumerate(reader.items(entry['joints'], f'{where}.joints')):
             place = f'{where}.joints[{k}]'
-            joint = reader.joint(entry, place, leg, cells[leg])
+            joints.append(joint := reader.joint(item, place, leg, cells[leg]))
             if joint.name in seen:
                 raise reader.fail(f'{place}.name', f"'{joint.name}' is also the name of "
                                   f'{seen[joint.name]}')
             seen[joint.name] = place
-            joints.append(joint)
         legs[leg] = tuple(joints)
 
-    order = list(seen)
-    if 'joint_order' in tree:
-        order = [reader.text(name, f'joint_order[{k}]')
-                 for k, name in enumerate(reader.items(tree['joint_order'], 'joint_order'))]
-        for k, name in enumerate(order):
-            if name not in seen:
-                raise reader.fail(f'joint_order[{k}]', f"joint '{name}' is missing from the legs")
-            if name in order[:k]:
-                raise reader.fail(f'joint_order[{k}]', f"'{name}' appears twice")
-        for name, place in seen.items():
-            if name not in order:
-                raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
+    order = reader.texts(tree.get('joint_order', list(seen)), 'joint_order')
+    for k, name in enumerate(order):
+        if name not in seen:
+            raise reader.fail(f'joint_order[{k}]', f"joint '{name}' is missing from the legs")
+        if name in order[:k]:
+            raise reader.fail(f'joint_order[{k}]', f"'{name}' appears twice")
+    for name, place in seen.items():
+        if name not in order:
+            raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
     names = {leg: [joint.name for joint in joints] for leg, joints in legs.items()}
     geometry = (read_geometry(reader, tree['geometry'], names) if 'geometry' in tree else None)
     biped = read_biped(reader, tree['biped'], names) if 'biped' in tree else None
@@ -273,7 +230,7 @@ def read_robot(path: str | Path) -> Robot:
         joints_by_name = {joint.name: joint for leg in legs.values() for joint in leg}
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
                    in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
-    robot = Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions, sides,
+    robot = Robot(path.stem, networks, assignment, harmonics, legs, order, motions, sides,
                   girdles, geometry, biped, feedback)
     if any(motion.steering for motion in motions.values()):
         for leg in legs:
@@ -311,40 +268,20 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
                             'legs': {}}
     for leg, joints in robot.legs.items():
         tree['legs'][leg] = {'joints': [
-            {'name': joint.name, 'cell': joint.cell, 'offset': joint.offset,
-             'weights': list(joint.weights), 'lower': joint.lower, 'upper': joint.upper,
-             'velocity': joint.velocity}
-            | ({'invented': list(joint.invented)} if joint.invented else {})
+            {key: value for key, value in plain(joint).items() if key != 'leg'}
             for joint in joints]}
         for key, places in (('side', robot.sides), ('girdle', robot.girdles)):
             if leg in places and not any(leg in getattr(NETWORKS[name], f'{key}s')
                                          for name in robot.networks):
                 tree['legs'][leg][key] = places[leg]
-    if robot.geometry is not None:
-        tree['geometry'] = geometry_tree(robot.geometry)
-    if robot.biped is not None:
-        tree['biped'] = biped_tree(robot.biped)
-    if robot.feedback is not None:
-        tree['feedback'] = feedback_tree(robot.feedback)
-    if robot.motions:
-        tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
-    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
-    write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                                  width=96))
+    tree |= {'geometry': robot.geometry, 'biped': robot.biped and biped_tree(robot.biped),
+             'feedback': robot.feedback,
+             'gaits': {name: _motion_tree(motion) for name, motion in robot.motions.items()}}
+    tree = {key: plain(value) for key, value in tree.items() if value}
+    write_yaml(path, tree, comment)
 
 
 def _motion_tree(motion: Motion) -> dict[str, Any]:
-    tree: dict[str, Any] = {key: value for key in ('frequency', 'duty')
-                            if (value := getattr(motion, key)) is not None}
-    if motion.stance is not None:
-        tree['stance'] = list(motion.stance)
-    if motion.joints:
-        tree['joints'] = {
-            name: {'offset': joint.offset, 'weights': list(joint.weights)}
-            | ({'in_place': list(joint.in_place)} if joint.in_place else {})
-            for name, joint in motion.joints.items()}
-    if motion.steering is not None:
-        tree['steering'] = {key: list(values) for key, values in vars(motion.steering).items()}
-    if motion.efference is not None:
-        tree['efference'] = efference_tree(motion.efference)
-    return tree
+    tree = {**plain(motion), 'efference': motion.efference and efference_tree(motion.efference)}
+    return {key: tree[key] for key in ('frequency', 'duty', 'stance', 'joints', 'steering',
+                                       'efference') if tree.get(key) is not None}

@@ -76,9 +76,7 @@ def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Pre
     where = '/**.ros__parameters'
     inner = reader.keys(inner, where, {'gait', kind.name},
                         {'network', 'robot', 'frequency', 'amplitude'})
-    gait = reader.text(inner['gait'], f'{where}.gait')
-    if gait not in kind.gaits():
-        raise reader.fail(f'{where}.gait', f"'{gait}' is not one of {', '.join(kind.gaits())}")
+    gait = reader.name_of(inner['gait'], f'{where}.gait', kind.gaits())
     where = f'{where}.{kind.name}'
     values = reader.keys(inner[kind.name], where, set(kind.parameters()))
     return {gait: Preset(gait, kind(*(reader.number(values[name], f'{where}.{name}')

@@ -21,10 +21,9 @@ from pathlib import Path
 from typing import Any, Generic
 
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.common.files import resource_folder, write_atomically
-from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.common.files import resource_folder
+from cpg_ros.common.yaml_reader import positive, within, write_yaml, YamlReader
 from cpg_ros.networks.definition import AnyDefinition
-import yaml
 
 #: No number in a preset is larger.
 LARGEST = 1e3
@@ -75,19 +74,12 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
     for name, entry in tree['presets'].items():
         where = f'presets.{name}'
         entry = reader.keys(entry, where, {'gait', 'parameters'}, {'start', 'period'})
-        gait = reader.text(entry['gait'], f'{where}.gait')
-        if gait not in network.gaits():
-            raise reader.fail(f'{where}.gait', f"'{gait}' is not one of "
-                              f'{", ".join(network.gaits())}')
+        gait = reader.name_of(entry['gait'], f'{where}.gait', network.gaits())
         names = network.parameters()
         values = reader.keys(entry['parameters'], f'{where}.parameters', set(names))
-        numbers = [reader.number(values[key], f'{where}.parameters.{key}') for key in names]
-        for key, value in zip(names, numbers, strict=True):
-            allowed = network.ranges[key]
-            if not allowed.low <= value <= allowed.high:
-                raise reader.fail(f'{where}.parameters.{key}', f'{value:g} is not from '
-                                  f'{allowed.low:g} to {allowed.high:g}')
-        parameters = network(*numbers)
+        parameters = network(*(reader.number(
+            values[key], f'{where}.parameters.{key}',
+            within(network.ranges[key].low, network.ranges[key].high)) for key in names))
         if ('start' in entry) != ('period' in entry):
             raise reader.fail(where, "'start' and 'period' go together")
         if 'start' not in entry:
@@ -96,16 +88,13 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
         if parameters.delay:
             raise reader.fail(f'{where}.start', f'is not for the network {network.name}, which '
                               'has a delay')
-        start = [reader.number(value, f'{where}.start[{k}]')
-                 for k, value in enumerate(reader.items(entry['start'], f'{where}.start'))]
+        start = reader.numbers(entry['start'], f'{where}.start')
         if len(start) != parameters.components:
             raise reader.fail(f'{where}.start', f'has {len(start)} numbers, not '
                               f'{parameters.components}: the first variable of each cell, then '
                               'the second')
-        period = reader.number(entry['period'], f'{where}.period')
-        if period <= 0.0:
-            raise reader.fail(f'{where}.period', f'{period:g} must be positive')
-        found[name] = Preset(gait, parameters, tuple(start), period)
+        found[name] = Preset(gait, parameters, start, reader.number(
+            entry['period'], f'{where}.period', positive))
     return found
 
 
@@ -130,6 +119,4 @@ def write_presets(path: str | Path, network: type[AnyDefinition],
         tree['presets'][name] = {
             'gait': preset.gait, 'parameters': preset.network.as_dict(),
             **({'start': list(preset.start), 'period': preset.period} if preset.start else {})}
-    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
-    write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                                  width=96))
+    write_yaml(path, tree, comment)

@@ -19,7 +19,6 @@ agree or which erratum says why not.
 """
 
 import argparse
-import base64
 from collections.abc import Sequence
 from dataclasses import asdict
 from html import escape
@@ -33,7 +32,7 @@ from cpg_ros.analysis.papers.row import ReproducedRow
 from cpg_ros.common import command_line
 from cpg_ros.common.command_line import Parser, progress_bar, run, say
 from cpg_ros.common.files import write_atomically
-from cpg_ros.common.report_page import STYLE
+from cpg_ros.common.report_page import html_table, image, page
 
 # The reproduction report as a table, as JSON and as a page that needs no other file.
 
@@ -89,25 +88,20 @@ def _line(row: ReproducedRow) -> str:
 
 def as_html(found: Reproduction) -> str:
     """Write one page with the rows, the errata and the figures."""
-    head = ''.join(f'<th>{name}</th>' for name in (*HEAD, 'note; how compared'))
-    parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
-             '<title>The papers reproduced</title>', f'<style>{STYLE}</style></head><body>',
-             '<h1>The papers reproduced</h1>', f'<p>{escape(found.summary)}.</p>']
+    parts = [f'<p>{escape(found.summary)}.</p>']
     for paper in found.papers:
-        parts += [f'<h2>{escape(paper.reference)}</h2>', f'<table><thead><tr>{head}</tr></thead>'
-                  '<tbody>', *(_line(row) for row in found.rows if row.paper == paper.authors),
-                  '</tbody></table>']
+        parts += [f'<h2>{escape(paper.reference)}</h2>', html_table(
+            (*HEAD, 'note; how compared'),
+            [_line(row) for row in found.rows if row.paper == paper.authors])]
         for figure in found.figures:
             if figure.paper == paper.authors:
-                image = base64.b64encode(figure.png).decode('ascii')
-                name = escape(f'{figure.paper}, {figure.place}')
-                parts.append(
-                    f'<figure><img alt="{name}" src="data:image/png;base64,{image}">'
-                    f'<figcaption>{name}. {escape(figure.caption)}</figcaption></figure>')
+                name = f'{figure.paper}, {figure.place}'
+                parts.append(image(figure.png, name, '<figcaption>'
+                                   f'{escape(f"{name}. {figure.caption}")}</figcaption>'))
     parts += ['<h2>Errata</h2>', '<ol>']
     parts += [f'<li id="erratum-{number}" value="{number}">{escape(paper)}: {escape(text)}</li>'
               for number, (paper, text) in found.errata.items()]
-    return '\n'.join([*parts, '</ol>', '</body></html>', ''])
+    return page('The papers reproduced', [*parts, '</ol>'])
 
 
 DESCRIPTION = """\

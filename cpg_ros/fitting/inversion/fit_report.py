@@ -14,13 +14,12 @@
 
 """An inverted recording in words, and as a page that needs no other file."""
 
-import base64
 from html import escape
 import io
 from typing import Any
 
 from cpg_ros.common.command_line import table
-from cpg_ros.common.report_page import STYLE
+from cpg_ros.common.report_page import html_table, image, page
 from cpg_ros.fitting.inversion import stride_report
 from cpg_ros.fitting.inversion.paper_fit import PaperFit
 from cpg_ros.fitting.inversion.recording_fit import POOR, RecordingFit
@@ -297,28 +296,23 @@ def as_table(fits: list[PaperFit]) -> list[str]:
 
 
 def _html_table(rows: list[tuple[str, ...]]) -> str:
-    head, *body = rows
-    lines = ['<table><thead><tr>' + ''.join(f'<th>{escape(cell)}</th>' for cell in head)
-             + '</tr></thead><tbody>']
-    lines += ['<tr>' + ''.join(f'<td class="value">{escape(cell)}</td>' for cell in row) + '</tr>'
-              for row in body]
-    return '\n'.join([*lines, '</tbody></table>'])
+    return html_table(rows[0], ['<tr>' + ''.join(
+        f'<td class="value">{escape(cell)}</td>' for cell in row) + '</tr>' for row in rows[1:]])
 
 
 def _image(figure: Figure, name: str) -> str:
     out = io.BytesIO()
     figure.savefig(out, format='png', dpi=110)
-    return (f'<figure><img alt="{escape(name)}" src="data:image/png;base64,'
-            f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
+    return image(out.getvalue(), name)
 
 
 def _warned(found: RecordingFit) -> str:
     """Return the warnings, before anything else; red where the fit is poor."""
     if not found.warnings:
         return ''
-    rows = '\n'.join(f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}'
-                     '</td></tr>' for text in found.warnings)
-    return f'<table><thead><tr><th>Warnings</th></tr></thead><tbody>{rows}</tbody></table>'
+    return html_table(['Warnings'], [
+        f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}</td></tr>'
+        for text in found.warnings])
 
 
 def _strides(found: RecordingFit) -> list[str]:
@@ -338,10 +332,7 @@ def as_html(found: RecordingFit) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
 
     title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
-    parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
-             f'<title>{escape(title)}</title><style>{STYLE}</style></head><body>',
-             f'<h1>{escape(title)}</h1>', _warned(found), paragraphs(_stride(found)),
-             '<h2>Parameters</h2>',
+    parts = [_warned(found), paragraphs(_stride(found)), '<h2>Parameters</h2>',
              _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
              paragraphs([_shares(found)]), _html_table(joints(found))]
     parts += _strides(found)
@@ -351,4 +342,4 @@ def as_html(found: RecordingFit) -> str:
     notes = [*found.recording.notes, *found.stride.notes]
     if notes:
         parts += ['<h2>Notes</h2>', paragraphs(notes)]
-    return '\n'.join([*parts, '</body></html>', ''])
+    return page(title, parts)

@@ -374,22 +374,24 @@ def read_schedule(path: Path) -> GaitSchedule:
 
     """
     reader = YamlReader(path, 'schedule', ScheduleError, LATEST)
+
+    def parameters(values: Any, where: str) -> dict[str, Any]:
+        if not isinstance(values, dict) or not values:
+            raise reader.fail(where, 'must be a mapping with at least one parameter, not '
+                              f'{quoted(values)}')
+        for name, value in values.items():
+            if not isinstance(value, str | int | float):
+                raise reader.fail(f'{where}.{name}', 'must be a number or a text, not '
+                                  f'{quoted(value)}')
+        return dict(values)
+
     tree = reader.keys(reader.tree(), 'file', {'network', 'robot', 'schedule'})
     entries: list[Entry] = []
     for k, item in enumerate(reader.items(tree['schedule'], 'schedule')):
-        where = f'schedule[{k}]'
-        item = reader.keys(item, where, {'at', 'parameters'})
-        at, earliest = reader.number(item['at'], f'{where}.at'), entries[-1].at if entries else 0.0
-        if at < earliest or (entries and at == earliest):
-            raise reader.fail(f'{where}.at', f'{at:g} s is not after {earliest:g} s')
-        values = item['parameters']
-        if not isinstance(values, dict) or not values:
-            raise reader.fail(f'{where}.parameters', 'must be a mapping with at least one '
-                              f'parameter, not {quoted(values)}')
-        for name, value in values.items():
-            if not isinstance(value, str | int | float):
-                raise reader.fail(f'{where}.parameters.{name}', 'must be a number or a text, not '
-                                  f'{quoted(value)}')
-        entries.append(Entry(at, dict(values)))
+        entry = reader.record(Entry, item, f'schedule[{k}]', parameters=parameters)
+        earliest = entries[-1].at if entries else 0.0
+        if entry.at < earliest or (entries and entry.at == earliest):
+            raise reader.fail(f'schedule[{k}].at', f'{entry.at:g} s is not after {earliest:g} s')
+        entries.append(entry)
     return GaitSchedule(reader.text(tree['network'], 'network'),
                         reader.text(tree['robot'], 'robot'), tuple(entries))

@@ -99,16 +99,16 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
         if np.isfinite(one.stderr) and (not one.bounded or max(
                 one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
             found.append(
-                f'{name} is badly determined: any value from {one.low:.4g} to {one.high:.4g} fits '
-                'as well' + ('' if one.bounded else ', and the range ends there only because its '
-                             'bound is reached or the gait ceases to exist')
+                f'{name} is poorly identifiable: any value from {one.low:.4g} to {one.high:.4g} '
+                'fits as well' + ('' if one.bounded else ', and the range ends there only because '
+                             'its bound is reached or the gait ceases to exist')
                 + '; with a free readout, it affects only the shape of the waveform')
     errors = known.correlation
     for k in range(len(free)):
         for other in range(k):
             if abs(errors[k, other]) > TOGETHER:
-                found.append(f'{free[other].name} and {free[k].name} are hard to tell apart: '
-                             f'their correlation is {errors[k, other]:.3f}')
+                found.append(f'{free[other].name} and {free[k].name} are strongly correlated: '
+                             f'{errors[k, other]:.3f}')
     if not best.converged:
         found.append(f'the trust region was stopped after {best.evaluations} evaluations, '
                      'before it had converged')
@@ -210,7 +210,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         + ' fits as well, all joints reversed' for one in turned]
     if flaw:
         warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
-            '' if runs is None else '; this is the best one on the way there that it runs')]
+            '' if runs is None else '; using the best fit that the generator can run')]
     # The cost is not least there, so that there is no profile to follow.
     return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
                    profiles and not flaw, warnings, done)

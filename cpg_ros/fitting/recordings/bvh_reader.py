@@ -34,7 +34,7 @@ from cpg_ros.fitting.recordings.recording import (
     require,
 )
 from cpg_ros.fitting.recordings.tables import matching, number_rows, opened, remaining_lines
-from cpg_ros.fitting.recordings.thinned import counted, FARTHEST
+from cpg_ros.fitting.recordings.thinned import FARTHEST, pluralize
 import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
@@ -68,7 +68,7 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     if not len(rows):
         raise RecordingError(f'{path}: no frames')
     if len(rows) != count:
-        notes.append(f'{counted(len(rows), "frame")}, where the file states {count}')
+        notes.append(f'{pluralize(len(rows), "frame")}, where the file states {count}')
     turning = [k for k, (_, channel) in enumerate(channels) if channel.endswith('rotation')]
     names = [f'{channels[k][0]}_{channels[k][1][0].lower()}' for k in turning]
     require(names, names, str(path))
@@ -79,9 +79,9 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     args = ([names.index(name) for name in matching(joints, names, str(path))] if joints
               else moving)
     if not args:
-        raise RecordingError(f'{path}: no joint moves in {counted(len(rows), "frame")}')
+        raise RecordingError(f'{path}: no joint moves in {pluralize(len(rows), "frame")}')
     if not joints and len(moving) < len(names):
-        notes.append(f'{counted(len(names) - len(moving), "channel")} left out: no motion')
+        notes.append(f'{pluralize(len(names) - len(moving), "channel")} left out: no motion')
     for k in args:
         there = np.isfinite(angles[:, k])
         angles[there, k] = np.unwrap(angles[there, k])
@@ -130,7 +130,7 @@ def _tree(words: list[str], path: Path) -> list[tuple[str, str]]:
     if depth:
         raise RecordingError(f'{path}: not as many braces close as open in its tree of joints')
     if not any(channel.endswith('rotation') for _, channel in channels) or len(channels) > MOST:
-        raise RecordingError(f'{path}: {counted(len(channels), "channel")}, where joints that '
+        raise RecordingError(f'{path}: {pluralize(len(channels), "channel")}, where joints that '
                              f'turn have up to {MOST}')
     return channels
 

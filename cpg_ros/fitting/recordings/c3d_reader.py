@@ -35,7 +35,7 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingFormat,
 )
 from cpg_ros.fitting.recordings.tables import ANGLES, matching, stamps_of_frames
-from cpg_ros.fitting.recordings.thinned import counted
+from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 #: Largest file, and what its first block has, bytes.
@@ -94,12 +94,13 @@ def _contents(path: Path) -> tuple[Markers, list[str], str]:
     units = [str(one) for one in point.get('ANGLE_UNITS', [])]
     count, frames = points.shape[1:]
     if not count or not frames:
-        raise RecordingError(f'{path}: {counted(count, "point")} in {counted(frames, "frame")}')
+        raise RecordingError(f'{path}: {pluralize(count, "point")} in '
+                             f'{pluralize(frames, "frame")}')
     names = labels[:count]
     if len(names) != count:
-        raise RecordingError(f'{path}: {len(names)} labels for {counted(count, "point")}')
+        raise RecordingError(f'{path}: {len(names)} labels for {pluralize(count, "point")}')
     places = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
-    notes = ([f'{counted(frames, "frame")}, where the header states {stated}: it may be cut']
+    notes = ([f'{pluralize(frames, "frame")}, where the header states {stated}: it may be cut']
              if frames < stated else [])
     found = Markers(tuple(names), stamps_of_frames(np.arange(frames), rate, path), places, path,
                     notes=tuple(notes))

@@ -28,7 +28,7 @@ from typing import Any
 from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.common.files import resource_folder
-from cpg_ros.common.yaml_reader import YamlReader
+from cpg_ros.common.yaml_reader import within, YamlReader
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     merged,
@@ -37,7 +37,7 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingError,
 )
 from cpg_ros.fitting.recordings.tables import matching
-from cpg_ros.fitting.recordings.thinned import counted
+from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Files of segments: which markers span which part of a body, and which parts a joint connects.
@@ -110,7 +110,7 @@ class _Reader(YamlReader):
         listed = self.items(value, where)
         if len(listed) != 2:
             raise self.fail(where, f'has two ends, not {len(listed)}')
-        ends = [tuple(self.text(one, f'{where}[{k}]') for one in (
+        ends = [tuple(self.text(marker, f'{where}[{k}]') for marker in (
             self.items(end, f'{where}[{k}]') if isinstance(end, list) else [end]))
             for k, end in enumerate(listed)]
         if ends[0] == ends[1]:
@@ -128,10 +128,9 @@ class _Reader(YamlReader):
             if name not in segments:
                 raise self.fail(where, f'there is no segment {name!r}, only '
                                 f'{abbreviate(list(segments), 20)}')
-        neutral = self.number(tree.get('neutral', 0.0), f'{where}.neutral')
-        if abs(neutral) > math.pi:
-            raise self.fail(f'{where}.neutral', f'{neutral:g} rad is more than half a turn')
-        return JointAngle(first, second, axis, neutral)
+        return JointAngle(first, second, axis, self.number(
+            tree.get('neutral', 0.0), f'{where}.neutral', lambda angle: '' if abs(angle) <= math.pi
+            else f'{angle:g} rad is more than half a turn'))
 
 
 def shipped() -> list[str]:
@@ -179,10 +178,8 @@ def load_segments(name: str | Path) -> Segments:
                 for key, value in tree['segments'].items()}
     joints = {key: reader.joint(value, f'joints.{key}', segments)
               for key, value in tree['joints'].items()}
-    likely = reader.number(tree.get('least_likelihood', LIKELY), 'least_likelihood')
-    if not 0.0 <= likely <= 1.0:
-        raise reader.fail('least_likelihood', f'{likely:g} is not from 0 to 1')
-    return Segments(segments, joints, likely)
+    return Segments(segments, joints, reader.number(
+        tree.get('least_likelihood', LIKELY), 'least_likelihood', within(0.0, 1.0)))
 
 
 #: A segment that, as seen along the axis, has less than this share of its length has no direction.
@@ -224,7 +221,7 @@ class Markers(ShortRepr):
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.names)} markers in {self.points.shape[-1]} '
-                f'dimensions, {counted(len(self.stamps), "sample")}')
+                f'dimensions, {pluralize(len(self.stamps), "sample")}')
 
 
 def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None) -> np.ndarray:

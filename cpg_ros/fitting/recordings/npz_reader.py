@@ -35,7 +35,7 @@ from cpg_ros.fitting.recordings.recording import (
     UNIT,
 )
 from cpg_ros.fitting.recordings.tables import FPS, matching, stamps_of_frames, UnpackedSize
-from cpg_ros.fitting.recordings.thinned import counted
+from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 #: What arrays may be called.
@@ -90,7 +90,7 @@ def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
                 for name in names:
                     unpacked.add(_needed(packed, name))
             if others := [name for name in members if name not in names]:
-                notes.append(f'{counted(len(others), "member")} that are no arrays left out: '
+                notes.append(f'{pluralize(len(others), "member")} that are no arrays left out: '
                              f'{abbreviate(others)}')
             file.seek(0)
             with np.load(file, allow_pickle=False) as archive:
@@ -153,7 +153,7 @@ def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
     known = {one for one in arrays if one.lower() in (*TIMES, *RATES, *UNITS)}
     left = [name for name in arrays if name not in used and name not in known]
     if left:
-        notes.append(f'{counted(len(left), "array")} left out: {abbreviate(left)}')
+        notes.append(f'{pluralize(len(left), "array")} left out: {abbreviate(left)}')
     return names, angles.astype(float)
 
 

@@ -42,7 +42,7 @@ from cpg_ros.fitting.recordings.tables import (
     preamble,
     remaining_lines,
 )
-from cpg_ros.fitting.recordings.thinned import counted
+from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Markers out of TRC files (track row column), as OpenSim and Motion Analysis write them.
@@ -88,18 +88,18 @@ def trc_markers(path: str | Path) -> Markers:
     names = tuple(cell.rpartition(':')[2] for cell in cells[2:] if cell)
     stated = facts.get('NumMarkers')
     if stated != str(len(names)):
-        raise RecordingError(f'{path}, line 4: {counted(len(names), "marker")}, where '
+        raise RecordingError(f'{path}, line 4: {pluralize(len(names), "marker")}, where '
                              f'NumMarkers is {stated or "missing"}')
     rows, notes = number_rows(rest, '\t', 2 + 3 * len(names), path, 6)
     if not len(rows):
         raise RecordingError(f'{path}: no rows')
     if facts.get('NumFrames') != str(len(rows)):
-        notes.append(f'{counted(len(rows), "row")}, where NumFrames is '
+        notes.append(f'{pluralize(len(rows), "row")}, where NumFrames is '
                      f'{facts.get("NumFrames", "missing")}')
     seconds = rows[:, 1]
     wrong = ~(np.abs(seconds) < LATEST)
     if wrong.any():
-        raise RecordingError(f"{path}: {counted(int(wrong.sum()), 'row')} without a time in s, "
+        raise RecordingError(f"{path}: {pluralize(int(wrong.sum()), 'row')} without a time in s, "
                              f'such as frame {rows[np.argmax(wrong), 0]:g}')
     points = rows[:, 2:].reshape(len(rows), -1, 3)
     unseen = (points == 0.0).all(axis=2)
@@ -156,7 +156,7 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
         notes.append("the header has no 'inDegrees': the angles are taken to be in rad")
     left = [column for column in columns if column not in angles]
     if left:
-        notes.append(f'{counted(len(left), "column")} left out, no angles: {abbreviate(left)}')
+        notes.append(f'{pluralize(len(left), "column")} left out, no angles: {abbreviate(left)}')
     if rows is not None and (there := len(found.times)) < rows:
         notes.append(f'{there} rows, where the header states {rows}')
     return replace(found, joints=tuple(names), notes=(*notes, *found.notes))

@@ -23,10 +23,10 @@ from pathlib import Path
 
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.fitting.recordings.thinned import (
-    counted,
     drop_outlier_positions,
     drop_outlier_stamps,
     Part,
+    pluralize,
     Thinned,
 )
 import numpy as np
@@ -103,7 +103,7 @@ class Recording(ShortRepr):
                 f'{self.source}: positions of shape {self.positions.shape} for '
                 f'{len(self.times)} times and {len(self.joints)} joints')
         if len(self.times) < 2:
-            raise RecordingError(f'{self.source}: {counted(len(self.times), "sample")}; '
+            raise RecordingError(f'{self.source}: {pluralize(len(self.times), "sample")}; '
                                  'a movement needs at least two')
         if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
             raise RecordingError(f'{self.source}: times do not rise strictly from 0')
@@ -222,26 +222,26 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     times, positions, odd, twice = _one_table(ordered, len(wanted))
     del ordered
     if late:
-        notes.append(f'{counted(late, "sample")} out of order, sorted by stamp')
+        notes.append(f'{pluralize(late, "sample")} out of order, sorted by stamp')
     if again + twice:
-        notes.append(f'{counted(again + twice, "duplicate")} of a stamp, the first is kept')
+        notes.append(f'{pluralize(again + twice, "duplicate")} of a stamp, the first is kept')
     odd -= far
-    notes += [f'joint {wanted[k]!r}: {counted(int(odd[k]), "position")} not a finite number'
+    notes += [f'joint {wanted[k]!r}: {pluralize(int(odd[k]), "position")} not a finite number'
               for k in np.flatnonzero(odd)]
-    notes += [f'joint {wanted[k]!r}: {counted(int(far[k]), "position")} far beyond the others, '
+    notes += [f'joint {wanted[k]!r}: {pluralize(int(far[k]), "position")} far beyond the others, '
               'left out' for k in np.flatnonzero(far)]
     there = ~np.isnan(positions)
     silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
               if not any_there]
     if silent:
         raise RecordingError(f'{source}: no finite position of {joint_list(silent)} in '
-                             f'{counted(received, "sample")}; name the joints to take to do '
+                             f'{pluralize(received, "sample")}; name the joints to take to do '
                              'without')
     heard = there.any(axis=1)
     if not heard.all():
         times, positions, there = times[heard], positions[heard], there[heard]
     if len(times) < 2:
-        raise RecordingError(f'{source}: {counted(received, "sample")}, all at stamp '
+        raise RecordingError(f'{source}: {pluralize(received, "sample")}, all at stamp '
                              f'{origin / 1e9:.9f} s: no time passes')
     notes += _missing(wanted, there)
     notes += _intervals(wanted, times, there)
@@ -299,7 +299,7 @@ def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
     counts = there.sum(axis=0)
     most = counts.max()
     return [f'{joint_list([joints[k] for k in np.flatnonzero(counts == count)])}: '
-            f'{counted(int(count), "sample")} where others have {most}'
+            f'{pluralize(int(count), "sample")} where others have {most}'
             for count in np.unique(counts[counts < most])]
 
 
@@ -323,8 +323,8 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
         if long.any():
             lost = int((np.rint(steps[long] / usual) - 1).sum())
             worst = int(np.argmax(steps))
-            notes.append(f'{who}{counted(int(long.sum()), "dropout")}, about '
-                         f'{counted(lost, "sample")} of {len(own) + lost}, the longest '
+            notes.append(f'{who}{pluralize(int(long.sum()), "dropout")}, about '
+                         f'{pluralize(lost, "sample")} of {len(own) + lost}, the longest '
                          f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
         off = int((np.abs(steps - usual)[~long] > JITTER * usual).sum())
         if off:

@@ -39,7 +39,7 @@ ASTRAY, GAP = 10.0, 60_000_000_000
 Part = tuple[np.ndarray, list[int], np.ndarray]
 
 
-def counted(count: int, what: str) -> str:
+def pluralize(count: int, what: str) -> str:
     """Return a number of things in words."""
     return f'{count} {what}{"" if count == 1 else "s"}'
 
@@ -62,7 +62,7 @@ def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
         if there.any():
             kept.append((own[there], columns, positions[there]))
     stray = stamps[0] if ends[most] else stamps[-1]
-    return kept, [f'{counted(lost, "sample")} stamped far from the others, left out, such as at '
+    return kept, [f'{pluralize(lost, "sample")} stamped far from the others, left out, such as at '
                   f'{stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
                   f'{last / 1e9:.10g} s']
 

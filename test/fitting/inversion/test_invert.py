@@ -194,7 +194,7 @@ def test_a_shape_that_says_little_is_no_sharp_number():
     recording, cells = trot(2, network=near, cells=(1, 2), noise=0.05)
     fit = invert(recording, cells, TROT, 'trot', ('c', 'tau'))
     for name, one in fit.parameters.items():
-        assert any(f'{name} is badly determined' in line for line in fit.warnings)
+        assert any(f'{name} is poorly identifiable' in line for line in fit.warnings)
         assert one.low <= truth_of(near, name) <= one.high
         assert one.high - one.low > 0.2 * one.value
 

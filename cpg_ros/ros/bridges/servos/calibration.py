@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.common.yaml_reader import quoted, YamlReader
+from cpg_ros.common.yaml_reader import quoted, within, YamlReader
 import numpy as np
 
 
@@ -132,11 +132,8 @@ def load_calibration(path: str | Path) -> Calibration:
     if kind is None:
         raise reader.fail('board', f'{quoted(board)} is not one of {", ".join(BOARDS)}')
     tree = reader.keys(tree, 'file', {'board', 'device', 'servos'}, set(kind.options))
-    options = {}
-    for key, (usual, low, high) in kind.options.items():
-        options[key] = reader.number(tree.get(key, usual), key)
-        if not low <= options[key] <= high:
-            raise reader.fail(key, f'{options[key]:g} is not from {low:g} to {high:g}')
+    options = {key: reader.number(tree.get(key, default), key, within(low, high))
+               for key, (default, low, high) in kind.options.items()}
     most = min(kind.most, 1e6 / options.get('frequency', 1.0))
     servos = tree['servos']
     if not isinstance(servos, Mapping) or not servos:
