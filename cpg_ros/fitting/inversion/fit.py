@@ -192,9 +192,16 @@ class Optimum(ShortRepr):
         return Estimate(value, error, max(low, ends[0]), min(high, ends[1]),
                         low <= ends[0] and ends[1] <= high)
 
-    def _rise(self, values: np.ndarray) -> float:
-        """Distance in standard errors that the cost at values stands for."""
-        left = self.evaluate(values)[0]
+    def _rise(self, values: np.ndarray, held: int | None = None) -> float:
+        """Distance in standard errors that the cost at values stands for.
+
+        With a number that is held, of the least cost that a linear step of the others makes of it:
+        where a valley of the cost is curved, a straight line leaves it.
+        """
+        left, slopes = self.evaluate(values)
+        if held is not None:
+            others = np.delete(slopes, held, axis=1) * np.delete(self.spread.scale, held)
+            left = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
         rise = 0.5 * float(left @ left) - self.cost
         return float(np.sqrt(max(0.0, 2.0 * rise / self.inflation)))
 
@@ -225,8 +232,10 @@ class Optimum(ShortRepr):
         for _ in range(STEPS_NEARBY):
             try:
                 there = self._along(k, self.values, side * step * error)
-                rise = self._rise(there)
+                rise, least = self._rise(there), self._rise(there, k)
             except NoOrbit:
+                return None
+            if least < (1.0 - CLOSE) * rise:
                 return None
             if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
                 return float(there[k])

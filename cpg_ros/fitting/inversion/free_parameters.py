@@ -329,6 +329,11 @@ class Coordinates:
         high = np.array([*(one.high for one in free), np.inf])
         if not self.straight:
             low[self.delay], high[self.delay] = 1.0 + ABOVE, np.inf
+        # Beyond 0, where there is no gait, the same waveform may have another sign and delay.
+        for k, one in enumerate(free):
+            if one.name in self._network.needed:
+                low[k], high[k] = ((max(low[k], 0.0), high[k]) if values[k] > 0.0
+                                   else (low[k], min(high[k], 0.0)))
         return low, high
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100

@@ -76,6 +76,14 @@ def test_a_walk_whose_robot_file_has_a_duty(tmp_path):
     assert running_parameters(found, QUADRUPED)['duty'] == found.fit.duty
 
 
+@pytest.mark.parametrize('seed', [0, 4])
+def test_intervals_follow_a_curved_valley(seed):
+    """Straight lines ended c at 6.35 and tau at 0.404; -c and a half cycle later is the same."""
+    found = fit_recording(generated('quadruped', 'delayed', 'walk', seed), QUADRUPED)
+    assert held(found, c=6.5, tau=0.4, gait_duty=0.68)
+    assert found.fit.parameters['c'].low > 0.0
+
+
 def test_a_walk_at_another_duty_than_that_of_the_file():
     found = fit_recording(generated('quadruped', 'delayed', 'walk', duty=0.55), QUADRUPED)
     assert held(found, c=6.5, tau=0.4, gait_duty=0.55)
