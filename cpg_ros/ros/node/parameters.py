@@ -14,10 +14,10 @@
 
 """Parameter services that process requests in a thread of their own and survive malformed ones."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import ctypes
 from dataclasses import dataclass, replace
-import inspect
+from functools import partial
 from queue import SimpleQueue
 import re
 import threading
@@ -35,11 +35,12 @@ from rcl_interfaces.msg import (
 )
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 from rclpy.qos import qos_profile_parameters
-from rclpy.task import Future
+from rclpy.service import Service
 from rclpy.type_support import check_for_type_support
 
 # Descriptions of a node's parameters, and conversions of their values.
@@ -175,15 +176,13 @@ def _refused(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
 
 
-class _Change(Future):
-    """Parameters that are set together or not at all; its result is a SetParametersResult."""
+class _Change:
+    """Parameters that are set together or not at all, and what takes the result."""
 
-    def __init__(self, executor: Any) -> None:
-        super().__init__(executor=executor)
-        # Without a callback, the executor would not wake up to send the response.
-        self.add_done_callback(lambda _: None)
-        self.parameters: list[Parameter] = []
-        self.names: frozenset[str] = frozenset()
+    def __init__(self, parameters: list[Parameter],
+                 answer: Callable[[SetParametersResult], None]) -> None:
+        self.parameters, self.answer = parameters, answer
+        self.names = frozenset(parameter.name for parameter in parameters)
         #: Earlier ones that this one replaces if it is accepted.
         self.replaced: list[_Change] = []
 
@@ -210,25 +209,29 @@ class StrictParameterService(ParameterService):
                      srv.ListParameters, srv.SetParameters, srv.SetParametersAtomically):
             self._serve(kind)
         self._ending = False
-        self._changes: SimpleQueue[list[_Change]] = SimpleQueue()
+        #: Service, request and header; None at the end.
+        self._requests: SimpleQueue[tuple[Any, Any, Any] | None] = SimpleQueue()
         self.thread = threading.Thread(target=self._work, name='parameters', daemon=True)
 
     def _serve(self, kind: Any) -> None:
         node = self._get_node()
         name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
-        answer = getattr(self, f'{name}_callback')
+        changes = kind in (srv.SetParameters, srv.SetParametersAtomically)
+        # A request is passed on in place of a response.
+        answer = ((lambda request, _: request) if changes else
+                  getattr(self, f'{name}_callback'))
 
-        async def limited(request: Any, response: Any) -> Any:
-            if isinstance(request, int):
-                return self._too_many(kind, request, response)
-            response = answer(request, response)
-            return await response if inspect.isawaitable(response) else response
+        def limited(request: Any, response: Any) -> Any:
+            return (self._too_many(kind, request, response) if isinstance(request, int) else
+                    answer(request, response))
 
         service: Any = node.create_service(
             kind, f'{node.get_name()}/{name[1:]}', limited, qos_profile=qos_profile_parameters,
             callback_group=self._group)
         # Used by the executor to take requests and to send responses.
         service.srv_type = SimpleNamespace(Request=bounded(kind, MOST), Response=kind.Response)
+        if changes:
+            service.send_response = partial(self._defer, service)
 
     def _too_many(self, kind: type, count: int, response: Any) -> Any:
         reason = f'{count} parameters in one request: at most {MOST} are allowed'
@@ -241,30 +244,46 @@ class StrictParameterService(ParameterService):
                                                   throttle_duration_sec=1.0)
         return response
 
-    async def _set_parameters_callback(self, request: Any, response: Any) -> Any:
-        response.results = await self._applied([[message] for message in request.parameters])
-        return response
+    def _defer(self, service: Any, response: Any, header: Any) -> None:
+        """Send a response; leave a request to the thread."""
+        if isinstance(response, service.srv_type.Response):
+            Service.send_response(service, response, header)
+        else:
+            self._requests.put((service, response, header))
 
-    async def _set_parameters_atomically_callback(self, request: Any, response: Any) -> Any:
-        response.result, = await self._applied([request.parameters])
-        return response
+    def _next(self) -> list[_Change]:
+        """Wait for a request; return its changes, each of which is answered on its own."""
+        if (received := self._requests.get()) is None:
+            return []
+        service, request, header = received
+        response = service.srv_type.Response()
+        together = hasattr(response, 'result')
+        parts = [request.parameters] if together else [[one] for one in request.parameters]
+        results: list[Any] = [None] * len(parts)
+        left = set(range(len(parts)))
 
-    async def _applied(self, parts: Sequence[Sequence[ParameterMessage]]
-                       ) -> list[SetParametersResult]:
-        """Apply the parts of a request in the thread; return the result of each."""
-        changes, readable = [], []
-        for messages in parts:
-            change = _Change(self._get_node().executor)
-            changes.append(change)
+        def answer(k: int, result: SetParametersResult) -> None:
+            results[k] = result
+            left.discard(k)
+            if not left:
+                respond()
+
+        def respond() -> None:
+            if together:
+                response.result, = results
+            else:
+                response.results = results
+            Service.send_response(service, response, header)
+
+        if not parts:
+            respond()
+        changes = []
+        for k, messages in enumerate(parts):
             try:
-                change.parameters = self._read(messages)
+                changes.append(_Change(self._read(messages), partial(answer, k)))
             except ValueError as error:
-                change.set_result(_refused(str(error)))
-                continue
-            change.names = frozenset(parameter.name for parameter in change.parameters)
-            readable.append(change)
-        self._changes.put(readable)
-        return [await change for change in changes]
+                answer(k, _refused(str(error)))
+        return changes
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
         """Read parameters that the node has and that may be set while it runs.
@@ -291,26 +310,34 @@ class StrictParameterService(ParameterService):
     def end(self) -> None:
         """Stop after the change that is being applied."""
         self._ending = True
-        self._changes.put([])
+        self._requests.put(None)
 
     def _work(self) -> None:
+        try:
+            self._apply_changes()
+        except rclpy_implementation.RCLError:
+            # The graph is gone when the node ends while this thread is at work.
+            if not self._ending:
+                raise
+
+    def _apply_changes(self) -> None:
         waiting: list[_Change] = []
         while not self._ending:
             if not waiting:
-                waiting = self._changes.get()
-            while not self._changes.empty():
-                waiting = waiting + self._changes.get()
+                waiting = self._next()
+            while not self._requests.empty():
+                waiting = waiting + self._next()
             waiting = _thinned(waiting)
             if waiting and not self._ending:
                 change = waiting.pop(0)
                 result = self._judged(change.parameters)
-                change.set_result(result)
+                change.answer(result)
                 if not result.successful:
                     waiting[:0] = change.replaced
                     continue
                 for earlier in change.replaced:
-                    earlier.set_result(_refused('superseded: a later request that came while this '
-                                                'one was waiting sets the same'))
+                    earlier.answer(_refused('superseded: a later request that came while this '
+                                            'one was waiting sets the same'))
 
     def _judged(self, parameters: list[Parameter]) -> SetParametersResult:
         node = self._get_node()
