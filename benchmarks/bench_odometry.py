@@ -70,7 +70,7 @@ def scenarios(rng: np.random.Generator, runs: int, size: float) -> list[Scenario
 
 
 def tape(loop: ClosedLoopBatch, expected: object, seed: int, size: float) -> float:
-    """Return true way over estimated way, as a user measures it: straight on beside a tape."""
+    """Return true divided by estimated distance, as measured straight along a tape."""
     speeds = math.sqrt(size) * np.linspace(*SPEEDS, 3)
     ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE,
                    scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))

@@ -109,7 +109,7 @@ class Checker:
 
     def take(self) -> None:
         """Check what has arrived."""
-        for message, _ in self._topic.take():
+        for message, _ in self._topic.receive():
             self._check(message)
 
     def _check(self, message: JointState) -> None:

@@ -22,6 +22,7 @@ and with real_time_factor:=0, as fast as they can; time begins when both are the
 from pathlib import Path
 
 from cpg_ros.ros.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
@@ -30,11 +31,8 @@ BOTH = {
     'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
 }
 GENERATOR = {
-    'network': ('delayed', str, 'delayed or quadruped'),
+    **COMMON,
     'gait': ('trot', str, 'gait to start with'),
-    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
-    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
-    'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
     'feedback.enabled': ('', bool, 'correct the gait by IMU, joints and feet; empty: if the robot '
                          'file is calibrated for it and command is joint_states'),
 }

@@ -20,6 +20,7 @@ Unitree's simulator on this computer.
 """
 
 from cpg_ros.ros.launch_arguments import declared, page, started, value
+from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
 from launch import LaunchDescription
 from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
 from launch.substitutions import LaunchConfiguration
@@ -30,11 +31,8 @@ BOTH = {
                 'forward_position'),
 }
 GENERATOR = {
-    'network': ('delayed', str, 'delayed or quadruped'),
+    **COMMON,
     'gait': ('trot', str, 'gait to start with'),
-    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
-    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
-    'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
     'feedback.enabled': ('false', bool, 'correct the gait by IMU, joints and feet; tried in '
                          'simulation only'),
 }

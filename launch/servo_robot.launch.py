@@ -18,7 +18,7 @@ Read docs/how_to/servos.md first. The generator, the bridge that leads the robot
 its servos are on. The robot lies still until the bridge's service ~/start is called.
 """
 
-from cpg_ros.ros.launch_arguments import declared, page, started
+from cpg_ros.ros.launch_arguments import declared, GENERATOR, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 
@@ -26,13 +26,6 @@ ROBOT = {'robot': ('', str, 'robot file, or a shipped name')}
 SERVOS = {
     'calibration': ('', str, 'calibration file of the servos'),
     'rate': ('50.0', float, 'commands per second [Hz]'),
-}
-GENERATOR = {
-    'network': ('delayed', str, 'network, which must be one of the robot file'),
-    'gait': ('', str, "gait to start with; empty for the network's usual one"),
-    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
-    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
-    'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
 }
 BRIDGE = {
     'dry_run': ('false', bool, 'compute and log everything, but send nothing'),

@@ -312,7 +312,7 @@ class Odometry:
 
         Args:
             geometry: of the legs.
-            scale: by which estimated velocities are multiplied: true way over estimated way.
+            scale: by which estimated velocities are multiplied: true by estimated distance.
             scale_error: its standard deviation.
 
         """

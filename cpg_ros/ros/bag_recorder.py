@@ -88,7 +88,7 @@ class BagRecorder:
 
         """
         arrived = [(when, connection, data) for source, connection in self._sources
-                   for data, when in source.take()]
+                   for data, when in source.receive()]
         for when, connection, data in sorted(arrived, key=lambda one: one[0]):
             self._writer.write(connection, when, data)
             self.counts[connection.topic] += 1

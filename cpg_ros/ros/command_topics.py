@@ -24,7 +24,7 @@ from cpg_ros.feedback.laws.stiffen import LAW
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import LARGEST
 from cpg_ros.ros.generator_io import COMMAND_TOPICS, joint_state
-from cpg_ros.ros.node.message_block import MessageBlock, places
+from cpg_ros.ros.node.message_block import indices, MessageBlock
 from cpg_ros.ros.node.polled import PolledSubscription
 import numpy as np
 from rclpy.node import Node
@@ -63,7 +63,7 @@ class KpScaleSubscription:
         self._subscription = PolledSubscription(node, Float64, KP_SCALE_TOPIC)
         self._scale, self._received = 1.0, 0.0
 
-    def take(self, now: float) -> float:
+    def receive(self, now: float) -> float:
         """Return the factor, from 1 to LARGEST; 1 if the last message is out of range or old.
 
         Args:
@@ -89,7 +89,7 @@ class HeldPublisher:
     def __init__(self, node: Node, robot: Robot) -> None:
         sizes = [len(robot.held)]
         self._block = MessageBlock(node, sizes, [
-            (HELD_TOPIC, joint_state(tuple(robot.held), *places(sizes)))])
+            (HELD_TOPIC, joint_state(tuple(robot.held), *indices(sizes)))])
 
     def publish(self, stamp: int, angles: np.ndarray) -> None:
         """Publish angles in rad, in the order of ``robot.held``; stamp in ns."""
@@ -103,7 +103,7 @@ class HeldSubscription:
         self._subscription = PolledSubscription(node, JointState, HELD_TOPIC)
         self._names = list(robot.held)
 
-    def take(self) -> np.ndarray | None:
+    def receive(self) -> np.ndarray | None:
         """Return the newest angles, rad, shape (joints,); None without a new message that fits."""
         message = self._subscription.newest()
         if (message is None or list(message.name) != self._names
@@ -125,13 +125,13 @@ class _Bad(CpgError):
 class Commands:
     """The angles of the last valid messages.
 
-    ``take`` reads the messages that have arrived, in the thread that uses them. A message is used
-    as a whole or, if anything in it is invalid, not at all.
+    ``receive`` reads the messages that have arrived, in the thread that uses them. A message is
+    used as a whole or, if anything in it is invalid, not at all.
 
     Attributes:
         angles: rad, in ``robot.order``; before the first command, those passed to __init__.
         topics: the names of the topics, resolved.
-        refused: why the last ``take`` rejected a message; '' if it did not.
+        refused: why the last ``receive`` rejected a message; '' if it did not.
 
     """
 
@@ -143,7 +143,7 @@ class Commands:
             node: that subscribes.
             robot: whose joints are commanded.
             kind: one of KINDS.
-            period: between two calls of ``take``, s.
+            period: between two calls of ``receive``, s.
             angles: before the first command, rad.
 
         """
@@ -181,12 +181,12 @@ class Commands:
         self._since = since
         self._fresh = [False] * len(self._fresh)
 
-    def take(self) -> bool:
+    def receive(self) -> bool:
         """Read what has arrived; return whether every topic has brought an expected command."""
         self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
             # All of them: an invalid one is reported even if a valid one has followed.
-            for message, _ in subscription.take():
+            for message, _ in subscription.receive():
                 try:
                     self._fresh[k] |= read(message)
                 except _Bad as error:

@@ -309,7 +309,7 @@ class Generator(StartedNode):
             self._feedback.learn(plan)
             self.pattern.apply(plan, self._value('transition'))
             if self._cmd_vel:
-                self._cmd_vel.follow(plan)
+                self._cmd_vel.set_plan(plan)
             self._announce()
         if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
@@ -324,7 +324,7 @@ class Generator(StartedNode):
         if plan.gain < enough:
             self.get_logger().warning(
                 f'symmetry_gain {plan.gain:g} may be too low for the gait to attract '
-                f'({enough:.3g} is enough): the watchdog may have to put it back again and again')
+                f'({enough:.3g} is enough): the phase watchdog may reset it repeatedly')
 
     # -- the robot ------------------------------------------------------------------------
 
@@ -355,7 +355,7 @@ class Generator(StartedNode):
         """Return why it cannot begin, or '', and the measured pose, None for the stand."""
         if self._measured is None:
             return '', None
-        angles = self._measured.take()
+        angles = self._measured.receive()
         lacking = self._measured.lacks(angles)
         if not lacking:
             return '', angles
@@ -367,7 +367,7 @@ class Generator(StartedNode):
 
     def _begin_at_the_stand(self) -> tuple[str, str]:
         """Start publishing; return why not, or '', and the name of the pose to start from."""
-        if self._value('exclusive') and self._others.look():
+        if self._value('exclusive') and self._others.check():
             return self._others.text, ''
         refusal, pose = self._find_pose()
         if refusal:

@@ -25,7 +25,7 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.network import Network
 from cpg_ros.ros.node.health import node_of, STEADY
-from cpg_ros.ros.node.message_block import MessageBlock, places, Template
+from cpg_ros.ros.node.message_block import indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import StartError
 from cpg_ros.ros.node.polled import best_effort, OVERRIDABLE, PolledSubscription
 from geometry_msgs.msg import Twist, TwistStamped
@@ -69,7 +69,7 @@ class Outputs:
                                      f'{topic}: it would be published twice on one topic')
         count, legs = len(robot.joints), len(robot.legs)
         sizes = count, count, legs
-        positions, velocities, phases = places(sizes)
+        positions, velocities, phases = indices(sizes)
         messages: list[tuple[str, Template]] = []
         start = 0
         for leg, joints in robot.legs.items():
@@ -178,9 +178,9 @@ class MeasuredPose:
         self._subscription = PolledSubscription(node, JointState, topic, best_effort(8))
         self.topic = self._subscription.topic
 
-    def take(self, fresh: float = FRESH) -> np.ndarray:
+    def receive(self, fresh: float = FRESH) -> np.ndarray:
         """Return the angle of each joint, rad, leg by leg; NaN where none is ``fresh``, in s."""
-        for message, arrived in self._subscription.take():
+        for message, arrived in self._subscription.receive():
             for name, angle in zip(message.name, message.position, strict=False):
                 if (k := self._index.get(name)) is not None and math.isfinite(angle):
                     self._angles[k], self._arrived[k] = angle, arrived
@@ -223,7 +223,7 @@ class CmdVel:
             closed: returns whether feedback is active.
 
         """
-        self._program, self._enabled = plan, enabled
+        self._plan, self._enabled = plan, enabled
         self._deciding = threading.Lock()
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
         self._closed = closed
@@ -252,7 +252,7 @@ class CmdVel:
         if not self.walking:
             return 0.0, 0.0, 0.0
         speed, aside, turn = self._target
-        slowest, fastest = self._program.speeds
+        slowest, fastest = self._plan.speeds
         return min(max(speed, slowest), fastest), aside, turn
 
     @property
@@ -329,10 +329,10 @@ class CmdVel:
             self._stale = stale
             self._act()
 
-    def follow(self, plan: GaitPlan) -> None:
+    def set_plan(self, plan: GaitPlan) -> None:
         """Steer a new gait."""
         with self._deciding:
-            self._program = plan
+            self._plan = plan
             self._act()
 
     def enable(self, enabled: bool) -> None:
@@ -345,12 +345,12 @@ class CmdVel:
         walking = self.walking
         if walking:
             speed, _, turn = self._target
-            slowest, fastest = self._program.speeds
+            slowest, fastest = self._plan.speeds
             if not slowest <= speed <= fastest:
-                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._program.name}'s "
+                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._plan.name}'s "
                                   f'range is {slowest:g} to {fastest:g} m/s',
                                   throttle_duration_sec=QUIET)
-            self._pattern.steer(*self._program.steer(speed, turn))
+            self._pattern.steer(*self._plan.steer(speed, turn))
         if walking != self._up:
             self._up = walking
             self._pattern.enable(walking, self._ramp())

@@ -154,11 +154,11 @@ class Inversion(StartedNode):
         """Fit in a thread; return whether it succeeded, and a summary or the reason."""
         self._busy = True
         try:
-            heard, work = self._live.copy(), Future(executor=self.executor)
+            live, work = self._live.copy(), Future(executor=self.executor)
             # The executor resumes coroutines only when something wakes it, and without further
             # joint states nothing else would: a callback does.
             work.add_done_callback(lambda _: None)
-            self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
+            self.thread = threading.Thread(target=self._work, args=(live, work), daemon=True)
             self.thread.start()
             well, message = await work
         finally:
@@ -166,14 +166,14 @@ class Inversion(StartedNode):
         self.get_logger().log(message, LoggingSeverity.INFO if well else LoggingSeverity.WARN)
         return well, message
 
-    def _work(self, heard: LiveRecording, work: Future) -> None:
+    def _work(self, live: LiveRecording, work: Future) -> None:
         """Fit, write, publish and apply; set success and message as the result of ``work``."""
         try:
             free = tuple(name for name in self._value('free') if name)
             robot = self._robot
             names = () if robot is None else [joint.name for joint in robot.joints]
             kp, kd = self._value('kp'), self._value('kd')
-            recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
+            recording = live.recording(names, True, Servo(kp, kd) if kp else None)
             found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
                                   free=free, order=self._value('order'),
                                   preset=self._value('preset'))
@@ -241,5 +241,5 @@ def _summary(found: RecordingFit) -> str:
 
 def run(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    return node_base.run(Inversion, NAME, 'Fits the joint states that it hears.', SPECS, args,
+    return node_base.run(Inversion, NAME, 'Fits the joint states that it receives.', SPECS, args,
                          'inversion')

@@ -73,7 +73,7 @@ class JointTracking:
             self._monitor.reset()
             reason = ''
         else:
-            angles = self._measured.take(FRESH)
+            angles = self._measured.receive(FRESH)
             # A joint that is not measured says nothing.
             reason = self._monitor.update(
                 commanded, np.where(np.isnan(angles), commanded, angles), PERIOD)

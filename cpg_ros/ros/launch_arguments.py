@@ -30,6 +30,14 @@ WHAT = {int: 'a whole number', float: 'a number', bool: 'true or false', list: '
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.
 Arguments = Mapping[str, tuple[str, type, str]]
+#: Parameters of the generator that are arguments of every launch file that starts it on a robot.
+GENERATOR: Arguments = {
+    'network': ('delayed', str, 'network, which must be one of the robot file'),
+    'gait': ('', str, "gait to start with; empty for the network's usual one"),
+    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
+    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
+    'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
+}
 #: Arguments that have been renamed; launch itself says nothing of one that it does not know.
 RENAMED = {'feedback': 'feedback.enabled'}
 

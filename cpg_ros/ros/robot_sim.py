@@ -27,7 +27,7 @@ from cpg_ros.ros.command_topics import Commands, HeldSubscription, KINDS, KpScal
 from cpg_ros.ros.feedback.odometry import has_transforms, odometry, PERIOD, transform
 from cpg_ros.ros.generator_io import joint_state, labelled
 from cpg_ros.ros.node.health import Health, HealthPublisher
-from cpg_ros.ros.node.message_block import each, MessageBlock, places, Template
+from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 from cpg_ros.ros.node.polled import latched
@@ -75,10 +75,10 @@ class Measurements:
         n = len(names)
         held = tuple(body.robot.held)
         sizes = n, n, n, len(feet), 3, 4, 6, *(3 * [len(held)] if held else [])
-        *joints, forces, base, quaternion, twist = places(sizes[:7])
+        *joints, forces, base, quaternion, twist = indices(sizes[:7])
         if held:
             names = *names, *held
-            joints = [np.concatenate(pair) for pair in zip(joints, places(sizes)[7:],
+            joints = [np.concatenate(pair) for pair in zip(joints, indices(sizes)[7:],
                                                            strict=True)]
         frames = 'odom', frame
         self._block = MessageBlock(node, sizes, [
@@ -89,7 +89,7 @@ class Measurements:
         self._transformed = -self._period
         if has_transforms():
             self._transform = MessageBlock(node, sizes[4:6], [transform(frames,
-                                                                        *places(sizes[4:6]))])
+                                                                        *indices(sizes[4:6]))])
         imu = Imu()
         imu.header.frame_id = frame
         self._imu = MessageBlock(node, [10], [('imu', Template(imu, [imu.header.stamp], numbers=[
@@ -175,7 +175,7 @@ class Lockstep(TickThread):
             self._commands.expect(now - period + 1)
             self._tell(now)
             if since < every:
-                if self._commands.take():
+                if self._commands.receive():
                     every, since = since, 0
             elif self._answered(patience):
                 since, patience, started = 0, PATIENCE, True
@@ -189,7 +189,7 @@ class Lockstep(TickThread):
                                    'the robot holds the last one; it expects them at '
                                    f'{self.rate:g} Hz', throttle_duration_sec=10.0)
                 else:
-                    logger.info('nothing commands the robot any more: it holds the last command',
+                    logger.info('no command publisher: holding the last command',
                                 throttle_duration_sec=10.0)
             if started:
                 self._keep_pace()
@@ -210,7 +210,7 @@ class Lockstep(TickThread):
     def _answered(self, patience: float) -> bool:
         """Wait for the commands; return whether they came."""
         deadline = time.monotonic() + patience
-        while not self._commands.take():
+        while not self._commands.receive():
             if time.monotonic() > deadline or self._ending.is_set():
                 return False
             time.sleep(LOOK)
@@ -403,7 +403,7 @@ class RobotSim(StartedNode):
 
     def _tick(self, dt: float, stamp: int) -> None:
         """Simulate a period in real time; with /clock the stamp is its time."""
-        self._commands.take()
+        self._commands.receive()
         if self._tell_time is not None:
             stamp = round(1e9 * self.ticker.ticks / self._rate)
             self._tell(stamp)
@@ -413,10 +413,10 @@ class RobotSim(StartedNode):
         if not self._now:
             self._began = time.monotonic()
         body = self._body
-        body.scale_kp(self._kp_scale.take(self._now / self._rate))
+        body.scale_kp(self._kp_scale.receive(self._now / self._rate))
         while self._requests:
             self._requests.popleft()()
-        if self._held is not None and (angles := self._held.take()) is not None:
+        if self._held is not None and (angles := self._held.receive()) is not None:
             body.hold(angles)
         for _ in range(self._steps):
             body.command(self._approach.towards(self._commands.angles))

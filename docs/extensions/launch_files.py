@@ -25,10 +25,13 @@ EVERY = ROOT / 'cpg_ros' / 'ros' / 'launch_arguments.py'
 
 def arguments(name: str) -> dict[str, tuple[str, str]]:
     """Return argument -> (default, what it is) of a launch file."""
-    found = _constants((LAUNCH / f'{name}.launch.py').read_text(), ast.Assign)
+    source, shared = (LAUNCH / f'{name}.launch.py').read_text(), EVERY.read_text()
+    found = _constants(source, ast.Assign)
     if name == 'rviz':
         return {**arguments('generator'), **found}
-    return {**found, **_constants(EVERY.read_text(), ast.FunctionDef)}
+    if 'GENERATOR' in source:
+        found = {**_constants(shared, ast.AnnAssign), **found}
+    return {**found, **_constants(shared, ast.FunctionDef)}
 
 
 def _constants(source: str, kind: type[ast.stmt]) -> dict[str, tuple[str, str]]:

@@ -42,7 +42,7 @@ def received(monkeypatch):
     def at(now, scale=None):
         if scale is not None:
             subscription._subscription.message = Float64(data=scale)
-        return subscription.take(now)
+        return subscription.receive(now)
 
     return at
 

@@ -48,7 +48,7 @@ PASSING = 0.38, 0.6
 CONTRARY = 4.0
 #: Inputs that failed count as valid again after this time, s.
 GOOD = 0.3
-#: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
+#: Joints that move further than this from tick to tick, rad and rad/s, were moved by hand.
 JUMP, FASTEST = 0.15, 40.0
 #: From the angles that are held to those of the feedback, s.
 TAKEOVER = 0.1

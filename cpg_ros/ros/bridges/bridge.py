@@ -53,188 +53,6 @@ from rclpy.publisher import Publisher
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-# The loop of a bridge: reads states and targets, steps the state machine, sends commands.
-
-#: At the end, the robot is damped for this long, s.
-REST = 1.0
-
-
-class BridgeLoop(StartedNode):
-    """One thread reads states and targets and sends commands; requests wait for it.
-
-    Attributes:
-        interface: topics and messages of the robot.
-        specs: of all parameters, see ``bridge_specs``.
-        robot: of the robot file.
-        supervisor: the state machine.
-        dry: whether nothing is sent.
-        topic: of the commands, resolved.
-        received: number of states so far.
-        sent: number of commands so far.
-        watchdog: connection to the watchdog; None in a dry run.
-
-    """
-
-    interface: ClassVar[type[RobotInterface]]
-    specs: ClassVar[Mapping[str, Spec]]
-
-    def __init__(self, state: RobotState) -> None:
-        """Declare the parameters, check them, and prepare to start.
-
-        Args:
-            state: into which the robot's states are read.
-
-        Raises:
-            CpgError: a parameter, the robot file or the messages cannot be used.
-
-        """
-        interface = self.interface
-        # A real robot has no simulated time.
-        super().__init__(interface.bridge_name(),
-                         parameter_overrides=[Parameter('use_sim_time', value=False)])
-        self._declare(fixed(self.specs))
-        self._one_of('command', KINDS)
-        value, period = self._value, 1.0 / self._value('rate')
-        self.dry: bool = value('dry_run')
-        command_type, state_type = interface.command_type(), interface.state_type()
-        self.robot = load_robot(value('robot'))
-        common = {'period': period, 'target_timeout': value('target_timeout'),
-                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4,
-                  'tracking_error': math.inf if self.dry else value('tracking_error'),
-                  'tracking_time': value('tracking_time')}
-        # Of what some robots do not measure, their bridges have no parameter.
-        if 'tilt' in self.specs:
-            common['tilt'] = math.radians(value('tilt'))
-        if 'hottest' in self.specs:
-            common['hottest'] = value('hottest')
-        settings = self.make_settings(self.robot, common)
-        self._order = np.array([self.robot.order.index(name) for name in settings.names])
-        self._changes: deque[tuple[BridgeState, str]] = deque()
-        self.supervisor = Supervisor(settings, state, self.make_command(),
-                                     lambda *change: self._changes.append(change))
-        self.topic = topic = self.resolve_topic_name(interface.command_topic)
-        domain = self.context.get_domain_id()
-        self._publisher: Publisher | None = None
-        self.watchdog: WatchdogLink | None = None
-        if not self.dry:
-            try:
-                self._lock = listening(address(interface.maker, 'bridge', domain, topic))
-            except NameTaken as error:
-                raise StartError(f'another bridge on this computer commands the robot on {topic} '
-                                 f'in domain {domain} already: {error}') from error
-            self._publisher = self.create_publisher(command_type, topic, command_qos())
-            self.watchdog = WatchdogLink(interface, domain, self.get_namespace(), topic,
-                                         period, value('watchdog_timeout')
-                                         or value('state_timeout'))
-        self._states = PolledSubscription(self, state_type, interface.state_topic,
-                                          raw=interface.raw_states)
-        self._commands = Commands(self, self.robot, value('command'), period,
-                                  settings.stand.take(self._order.argsort()))
-        self._kp_scale = KpScaleSubscription(self)
-        self._every = (max(1, round(value('rate') / value('sensor_rate')))
-                       if 'sensor_rate' in self.specs else 1)
-        self._requests: deque[Callable[[float], None]] = deque()
-        self._ending = self._new = False
-        self.received = self.sent = 0
-        self._state_publisher = self.create_publisher(String, '~/state', latched())
-        self._state_publisher.publish(String(data=BridgeState.IDLE.value))
-        self.ticker = Ticker(self, value('rate'), self._tick, lambda: None, self._fail,
-                             lambda _: None)
-
-    # -- what a bridge adds ---------------------------------------------------------------
-
-    def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
-        """Return joints, gains, torques and poses, with ``common`` as further settings.
-
-        Raises:
-            CpgError: a parameter or the robot file cannot be used.
-
-        """
-        raise NotImplementedError
-
-    def make_command(self) -> JointCommand:
-        """Return a command to be filled; that of the interface, unless joints are configured."""
-        return self.interface.make_command()
-
-    def stop_pressed(self) -> str:
-        """Return which stop button the last state reports as pressed, or ''."""
-        return ''
-
-    def publish_measurements(self, stamp: int) -> None:
-        """Publish the last state, stamp in ns; at most at ``sensor_rate``."""
-
-    # -- the thread -----------------------------------------------------------------------
-
-    def _tick(self, dt: float, stamp: int) -> None:
-        now, supervisor = time.monotonic(), self.supervisor
-        self._take_state(now)
-        self._take_targets(now)
-        supervisor.kp_scale = self._kp_scale.take(now)
-        while self._requests:
-            self._requests.popleft()(now)
-        # Before anything is sent: joints that have given way must not be driven back at once.
-        if self.watchdog is not None and self.watchdog.acted():
-            supervisor.damp(now, 'the watchdog has damped the robot: the bridge was silent')
-        if supervisor.step(now):
-            message = supervisor.command.encode()
-            if self._publisher is not None:
-                self._publisher.publish(message)
-                self.sent += 1
-            if self.watchdog is not None and (
-                    fault := self.watchdog.tick(supervisor.damping, now)):
-                supervisor.sit(now, fault)
-        # The robot comes first.
-        while self._changes:
-            self._report(*self._changes.popleft())
-        if self._new and not self.ticker.ticks % self._every:
-            self.publish_measurements(stamp)
-            self._new = False
-        if self._ending and self._resting(now):
-            self.stop.set()
-            self.ticker.end()
-
-    def _take_state(self, now: float) -> None:
-        last = None
-        for message, _ in self._states.take():
-            last = message
-            self.received += 1
-        if last is not None and self.supervisor.robot.read(last):
-            self._new = True
-            self.supervisor.state_received(now)
-            if reason := self.stop_pressed():
-                self._halt(reason, now)
-
-    def _take_targets(self, now: float) -> None:
-        complete = self._commands.take()
-        if self._commands.refused:
-            self.supervisor.reject_target(self._commands.refused, now)
-        if complete:
-            self._commands.expect(0)
-            self.supervisor.set_target(self._commands.angles[self._order], now)
-
-    def _report(self, state: BridgeState, reason: str) -> None:
-        """Log and publish a new state."""
-        severity = {BridgeState.DAMPING: LoggingSeverity.ERROR,
-                    BridgeState.SITTING: LoggingSeverity.WARN}
-        self.get_logger().log(f'{state.value}: {reason}',
-                              severity.get(state, LoggingSeverity.INFO))
-        self._state_publisher.publish(String(data=state.value))
-
-    def _halt(self, reason: str, now: float) -> None:
-        """Damp at once, and cancel a start under way."""
-        self._cancel_start(reason)
-        self.supervisor.damp(now, reason)
-
-    def _cancel_start(self, reason: str) -> None:
-        """Cancel a start under way."""
-        raise NotImplementedError
-
-    def _resting(self, now: float) -> bool:
-        state = self.supervisor.state
-        return state is BridgeState.IDLE or (state is BridgeState.DAMPING
-                                             and self.supervisor.time_in_state(now) > REST)
-
-
 # The start of a bridge, step by step, in a thread of its own; a step that fails ends it.
 
 #: Sleeps for some seconds; raises StartRefused once the start is cancelled.
@@ -291,6 +109,8 @@ class StartSequence(threading.Thread):
             raise StartRefused(self._reason)
 
 
+#: At the end, the robot is damped for this long, s.
+REST = 1.0
 #: How often the network is checked for others who command the robot, s.
 CHECK = 0.1
 #: How long a start waits for the first state, s.
@@ -303,22 +123,74 @@ FORGOTTEN = 25.0
 ONE_PRESS = 0.5
 
 
-class BridgeNode(BridgeLoop):
-    """Starts, stops and monitors the loop.
+class BridgeNode(StartedNode):
+    """Starts, stops and monitors a thread that reads states and targets and sends commands.
 
     A subclass sets ``interface`` and ``specs`` and overrides ``make_settings``. The other public
-    methods, here and in ``BridgeLoop``, have defaults.
+    methods have defaults.
 
     Attributes:
+        interface: topics and messages of the robot.
+        specs: of all parameters, see ``bridge_specs``.
         state_hint: what to check if the robot sends no state, added to the message.
+        robot: of the robot file.
+        supervisor: the state machine.
+        dry: whether nothing is sent.
+        topic: of the commands, resolved.
+        received: number of states so far.
+        sent: number of commands so far.
+        watchdog: connection to the watchdog; None in a dry run.
 
     """
 
+    interface: ClassVar[type[RobotInterface]]
+    specs: ClassVar[Mapping[str, Spec]]
     state_hint: ClassVar[str] = ''
 
     def __init__(self, state: RobotState) -> None:
-        """Declare the parameters, check them, and prepare to start; as the base class does."""
-        super().__init__(state)
+        """Declare the parameters, check them, and prepare to start.
+
+        Args:
+            state: into which the robot's states are read.
+
+        Raises:
+            CpgError: a parameter, the robot file or the messages cannot be used.
+
+        """
+        interface = self.interface
+        # A real robot has no simulated time.
+        super().__init__(interface.bridge_name(),
+                         parameter_overrides=[Parameter('use_sim_time', value=False)])
+        self._declare(fixed(self.specs))
+        self._one_of('command', KINDS)
+        value, period = self._value, 1.0 / self._value('rate')
+        self.dry: bool = value('dry_run')
+        command_type, state_type = interface.command_type(), interface.state_type()
+        self.robot = load_robot(value('robot'))
+        settings = self.make_settings(self.robot, self._common_settings())
+        self._order = np.array([self.robot.order.index(name) for name in settings.names])
+        self._changes: deque[tuple[BridgeState, str]] = deque()
+        self.supervisor = Supervisor(settings, state, self.make_command(),
+                                     lambda *change: self._changes.append(change))
+        self.topic = self.resolve_topic_name(interface.command_topic)
+        self._publisher: Publisher | None = None
+        self.watchdog: WatchdogLink | None = None
+        if not self.dry:
+            self._connect(command_type, period)
+        self._states = PolledSubscription(self, state_type, interface.state_topic,
+                                          raw=interface.raw_states)
+        self._commands = Commands(self, self.robot, value('command'), period,
+                                  settings.stand.take(self._order.argsort()))
+        self._kp_scale = KpScaleSubscription(self)
+        self._every = (max(1, round(value('rate') / value('sensor_rate')))
+                       if 'sensor_rate' in self.specs else 1)
+        self._requests: deque[Callable[[float], None]] = deque()
+        self._ending = self._new = False
+        self.received = self.sent = 0
+        self._state_publisher = self.create_publisher(String, '~/state', latched())
+        self._state_publisher.publish(String(data=BridgeState.IDLE.value))
+        self.ticker = Ticker(self, value('rate'), self._tick, lambda: None, self._fail,
+                             lambda _: None)
         self._start: StartSequence | None = None
         self._refusal = self._hazard = self._conflict = ''
         self._ended_at = 0.0
@@ -330,7 +202,54 @@ class BridgeNode(BridgeLoop):
         self._timer = self.create_timer(CHECK, self._check_network, clock=STEADY)
         self._warn_of_unknown()
 
-    # -- what a bridge may add ------------------------------------------------------------
+    def _common_settings(self) -> dict[str, float]:
+        """Return the settings that are parameters of every bridge."""
+        value = self._value
+        common = {'period': 1.0 / value('rate'), 'target_timeout': value('target_timeout'),
+                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4,
+                  'tracking_error': math.inf if self.dry else value('tracking_error'),
+                  'tracking_time': value('tracking_time')}
+        # Of what some robots do not measure, their bridges have no parameter.
+        if 'tilt' in self.specs:
+            common['tilt'] = math.radians(value('tilt'))
+        if 'hottest' in self.specs:
+            common['hottest'] = value('hottest')
+        return common
+
+    def _connect(self, command_type: type, period: float) -> None:
+        """Create the command publisher and the watchdog's link; refuse a second bridge."""
+        interface, topic, domain = self.interface, self.topic, self.context.get_domain_id()
+        try:
+            self._lock = listening(address(interface.maker, 'bridge', domain, topic))
+        except NameTaken as error:
+            raise StartError(f'another bridge on this computer commands the robot on {topic} '
+                             f'in domain {domain} already: {error}') from error
+        self._publisher = self.create_publisher(command_type, topic, command_qos())
+        self.watchdog = WatchdogLink(
+            interface, domain, self.get_namespace(), topic, period,
+            self._value('watchdog_timeout') or self._value('state_timeout'))
+
+    # -- what a bridge adds ---------------------------------------------------------------
+
+    def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
+        """Return joints, gains, torques and poses, with ``common`` as further settings.
+
+        Raises:
+            CpgError: a parameter or the robot file cannot be used.
+
+        """
+        raise NotImplementedError
+
+    def make_command(self) -> JointCommand:
+        """Return a command to be filled; that of the interface, unless joints are configured."""
+        return self.interface.make_command()
+
+    def stop_pressed(self) -> str:
+        """Return which stop button the last state reports as pressed, or ''."""
+        return ''
+
+    def publish_measurements(self, stamp: int) -> None:
+        """Publish the last state, stamp in ns; at most at ``sensor_rate``."""
 
     @property
     def title(self) -> str:
@@ -364,6 +283,73 @@ class BridgeNode(BridgeLoop):
         torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
         return f'the largest torque would be {abs(torque).max():.1f} N m'
 
+    # -- the thread -----------------------------------------------------------------------
+
+    def _tick(self, dt: float, stamp: int) -> None:
+        now, supervisor = time.monotonic(), self.supervisor
+        self._take_state(now)
+        self._take_targets(now)
+        supervisor.kp_scale = self._kp_scale.receive(now)
+        while self._requests:
+            self._requests.popleft()(now)
+        # Before anything is sent: joints that have given way must not be driven back at once.
+        if self.watchdog is not None and self.watchdog.acted():
+            supervisor.damp(now, 'the watchdog has damped the robot: the bridge was silent')
+        if supervisor.step(now):
+            message = supervisor.command.encode()
+            if self._publisher is not None:
+                self._publisher.publish(message)
+                self.sent += 1
+            if self.watchdog is not None and (
+                    fault := self.watchdog.tick(supervisor.damping, now)):
+                supervisor.sit(now, fault)
+        # The robot comes first.
+        while self._changes:
+            self._report(*self._changes.popleft())
+        if self._new and not self.ticker.ticks % self._every:
+            self.publish_measurements(stamp)
+            self._new = False
+        if self._ending and self._resting(now):
+            self.stop.set()
+            self.ticker.end()
+
+    def _take_state(self, now: float) -> None:
+        last = None
+        for message, _ in self._states.receive():
+            last = message
+            self.received += 1
+        if last is not None and self.supervisor.robot.read(last):
+            self._new = True
+            self.supervisor.state_received(now)
+            if reason := self.stop_pressed():
+                self._halt(reason, now)
+
+    def _take_targets(self, now: float) -> None:
+        complete = self._commands.receive()
+        if self._commands.refused:
+            self.supervisor.reject_target(self._commands.refused, now)
+        if complete:
+            self._commands.expect(0)
+            self.supervisor.set_target(self._commands.angles[self._order], now)
+
+    def _report(self, state: BridgeState, reason: str) -> None:
+        """Log and publish a new state."""
+        severity = {BridgeState.DAMPING: LoggingSeverity.ERROR,
+                    BridgeState.SITTING: LoggingSeverity.WARN}
+        self.get_logger().log(f'{state.value}: {reason}',
+                              severity.get(state, LoggingSeverity.INFO))
+        self._state_publisher.publish(String(data=state.value))
+
+    def _halt(self, reason: str, now: float) -> None:
+        """Damp at once, and cancel a start under way."""
+        self._cancel_start(reason)
+        self.supervisor.damp(now, reason)
+
+    def _resting(self, now: float) -> bool:
+        state = self.supervisor.state
+        return state is BridgeState.IDLE or (state is BridgeState.DAMPING
+                                             and self.supervisor.time_in_state(now) > REST)
+
     # -- start ----------------------------------------------------------------------------
 
     def _begin_start(self) -> None:
@@ -388,7 +374,7 @@ class BridgeNode(BridgeLoop):
                 name = self.interface.state_type().__name__
                 raise StartRefused(f'no {name} for {STATE:g} s{self.state_hint}')
             wait(0.02)
-        self.log_step('the robot is heard')
+        self.log_step('receiving robot state')
 
     def _others(self) -> str:
         """Return who else commands the robot, or ''."""
@@ -407,7 +393,7 @@ class BridgeNode(BridgeLoop):
                 self.log_step(f'waiting until a node that was killed is forgotten: {text}')
             logged = True
             wait(0.1)
-        self.log_step('nobody else commands it')
+        self.log_step('no other command publisher')
 
     def _start_watchdog(self, wait: Wait) -> None:
         if self.watchdog is not None and (refusal := self.watchdog.start()):
@@ -476,13 +462,13 @@ class BridgeNode(BridgeLoop):
             self.get_logger().error(self._conflict)
 
     def _find_conflict(self) -> tuple[str, bool]:
-        """Return who commands the robot beside the bridge, or sends targets beside a generator.
+        """Return which other node commands the robot, or publishes the generator's targets.
 
-        The text is '' for nobody. The second value is whether all have one name, as a node has
+        The text is '' for none. The second value is whether all have one name, as a node has
         that was killed and started again, until the network forgets it.
         """
         if names := self._others():
-            return (f'the robot is commanded by {names}, too',
+            return (f'another node commands the robot: {names}',
                     names == self.get_fully_qualified_name())
         for topic in self._commands.topics if self._value('exclusive') else ():
             if names := others_on(self, topic, 0, 1):
@@ -510,7 +496,7 @@ class BridgeNode(BridgeLoop):
         elif self._refusal and state is BridgeState.IDLE:
             level, text = DiagnosticStatus.ERROR, f'not started: {self._refusal}'
         elif not received:
-            level, text = DiagnosticStatus.WARN, 'the robot is not heard'
+            level, text = DiagnosticStatus.WARN, 'no robot state received'
         else:
             level, text = DiagnosticStatus.OK, state.value + ' (dry run)' * self.dry
         return level, text, {

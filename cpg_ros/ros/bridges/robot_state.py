@@ -200,7 +200,7 @@ class BridgeSettings(ShortRepr):
     tracking_time: float = 1.0
 
 
-def motor_places(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:
+def motor_indices(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:
     """Return the position of each motor's joint in ``robot.order``, shape (joints,).
 
     Args:
@@ -227,7 +227,7 @@ def settings_for(robot: Robot, places: np.ndarray, *, kp: np.ndarray, kd: np.nda
 
     Args:
         robot: provides limits, speeds and the stand (offsets).
-        places: as returned by ``motor_places``.
+        places: as returned by ``motor_indices``.
         kp: proportional gains, N m / rad.
         kd: damping gains, N m s / rad.
         torque: largest torques, N m.

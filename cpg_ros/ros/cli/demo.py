@@ -65,22 +65,22 @@ PUSH, END, SPEED, LONGEST = 0.1, 7.5, 0.4, 60.0
 FALLEN = 0.5
 
 
-def walk_course(robot: Operator, look: Callable[[], None]) -> bool:
+def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
     """Walk the course, then leave the robot to others; return whether it reached the end.
 
     Args:
         robot: the node that follows it.
-        look: called again and again; what it raises ends the run.
+        check: called repeatedly; an exception from it ends the run.
 
     """
     steer = robot.create_publisher(Twist, 'cmd_vel', 10)
     try:
-        return _walk(robot, look, steer)
+        return _walk(robot, check, steer)
     finally:
         robot.destroy_publisher(steer)
 
 
-def _walk(robot: Operator, look: Callable[[], None], steer: Publisher) -> bool:
+def _walk(robot: Operator, check: Callable[[], None], steer: Publisher) -> bool:
     push = robot.create_publisher(Wrench, 'robot_sim/push', 10)
     forward = Twist()
     forward.linear.x = SPEED
@@ -93,7 +93,7 @@ def _walk(robot: Operator, look: Callable[[], None], steer: Publisher) -> bool:
     report('flat ground')
     while robot.time < began + LONGEST:
         rclpy.spin_once(robot, timeout_sec=0.05)
-        look()
+        check()
         steer.publish(forward)
         x, _ = robot.place
         if robot.upright < FALLEN:
@@ -192,7 +192,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float | None,
     report(gaits[0])
     while tour or more or every is None or operator.time < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
-        interruption.look()
+        interruption.check()
         operator.check_alone()
         wanted = None
         if operator.taken_over:
@@ -214,7 +214,7 @@ def wait_for_page(page: subprocess.Popen, port: int, interruption: Interruption)
     """Wait until the page is served; return whether it is: the robot walks without it, too."""
     end = time.monotonic() + PAGE
     while page.poll() is None and time.monotonic() < end:
-        interruption.look()
+        interruption.check()
         with suppress(OSError), socket.create_connection(('127.0.0.1', port), 1.0):
             return True
         time.sleep(0.05)
@@ -231,7 +231,7 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
     end = time.monotonic() + PATIENCE
     while not operator.ready:
         rclpy.spin_once(operator, timeout_sec=0.1)
-        interruption.look()
+        interruption.check()
         operator.check_alone()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
@@ -306,7 +306,7 @@ def _own(args: Namespace, interruption: Interruption) -> DemoRobot:
     """Make and tune a robot of one's own, or use again what is there; errors as of prepare."""
     node = rclpy.create_node('cpg_demo')
     try:
-        return demo_parts.prepare(args, Steps(node, interruption.look))
+        return demo_parts.prepare(args, Steps(node, interruption.check))
     finally:
         node.destroy_node()
 
@@ -359,7 +359,7 @@ def demonstrate(args: Namespace) -> int:
                 address()
             wait_for(operator, interruption)
             if args.course:
-                walk_course(operator, interruption.look)
+                walk_course(operator, interruption.check)
             waits = args.tour is None and robot.steered
             say(f"the robot {'waits to be steered: page or cmd_vel' if waits else 'walks'}; "
                 'type a gait and Enter to switch, q to end')

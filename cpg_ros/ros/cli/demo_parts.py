@@ -112,7 +112,7 @@ class Operator(Node):
 
     @property
     def ready(self) -> bool:
-        """Whether the body moves, as it does once it is commanded, and the generator is heard."""
+        """Whether the body moves and messages of the generator arrive."""
         return self.pose is not None and self._heard
 
     @property
@@ -167,7 +167,7 @@ class Interruption:
             node.terminate()
         self._noted = True
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Return if nothing ended it.
 
         Raises:
@@ -263,17 +263,17 @@ def name_of(args: Namespace) -> str:
 class Steps:
     """Announces steps, and waits for each while the page shows it."""
 
-    def __init__(self, node: Node, look: Callable[[], None]) -> None:
+    def __init__(self, node: Node, check: Callable[[], None]) -> None:
         """Prepare.
 
         Args:
             node: by which the page knows what is waited for.
-            look: raises what ends the demonstration.
+            check: raises what ends the demonstration.
 
         """
-        self._node, self._look, self._count = node, look, 0
+        self._node, self._check, self._count = node, check, 0
 
-    def take(self, what: str, seconds: float, words: Sequence[str]) -> int:
+    def run(self, what: str, seconds: float, words: Sequence[str]) -> int:
         """Run an executable; return its exit code.
 
         Args:
@@ -289,7 +289,7 @@ class Steps:
                                    start_new_session=True)
         try:
             while process.poll() is None:
-                self._look()
+                self._check()
                 time.sleep(0.1)
         finally:
             progress.end()
@@ -328,7 +328,7 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
         _again(file, find_model(source[1]), 'velocity', args)
     else:
         limit = [] if args.velocity is None else ['--velocity', f'{args.velocity:g}']
-        code = steps.take(f'making {file} from {source[1]}', MADE,
+        code = steps.run(f'making {file} from {source[1]}', MADE,
                           ['check_robot', *source, '--make', str(file), *limit])
         if not file.exists():
             raise StepFailed(code)
@@ -365,7 +365,7 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
     seconds = BESIDES + evaluations * (PLANNED + SIMULATED / (os.cpu_count() or 1))
     codes = []
     for gait in gaits:
-        codes.append(steps.take(
+        codes.append(steps.run(
             f'tuning the {gait} in simulation', seconds,
             ['tune', '--robot', str(tuned if tuned.exists() else file), '--model', source,
              '--gaits', gait, '--evaluations', str(evaluations), '--out', str(tuned), *gains]))

@@ -247,7 +247,7 @@ class Topic:
         """
         silent = True
         while True:
-            for message, _ in self._subscription.take():
+            for message, _ in self._subscription.receive():
                 silent = False
                 yield message
             if silent and time.monotonic() > self._end:
@@ -268,7 +268,7 @@ class Topic:
         count, end = 0, time.monotonic() + COUNT
         while time.monotonic() < end:
             time.sleep(COUNT_PERIOD)
-            count += sum(1 for _ in self._subscription.take())
+            count += sum(1 for _ in self._subscription.receive())
         return count / COUNT
 
 

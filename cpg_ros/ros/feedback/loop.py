@@ -35,24 +35,51 @@ import numpy as np
 
 #: The wanted heading is at most this far ahead of the measured one, rad.
 FURTHEST = 0.5
-#: After a share of 0, displacements are as good as 0 after this time, s.
+#: After a fraction of 0, displacements are as good as 0 after this time, s.
 DIES_OUT = 0.3
-#: Share of a stride, on average, in which the contacts must agree with the gait.
+#: Fraction of a stride, on average, in which the contacts must agree with the gait.
 AGREES = 0.5
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
 
 
-class FeedbackLoop:
-    """Corrects a pattern by the robot's sensors, as long as they are plausible.
+class SensorLoop:
+    """Feeds the robot's sensors back to a pattern at every tick.
 
     Call ``sense`` from the thread of the ticks; all other methods are for any thread.
 
     Attributes:
-        feedback: its laws, whose gains may be replaced.
         wanted: whether the feedback is enabled.
         faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
         waiting: whether an input has never arrived.
+
+    """
+
+    def __init__(self, inputs: SensorInput, motion: Motion) -> None:
+        self._inputs, self._motion = inputs, motion
+        self.wanted, self.waiting, self.faults = False, True, ''
+
+    def learn(self, plan: GaitPlan) -> None:
+        """Tabulate a gait before the pattern changes to it."""
+
+    def ages(self, now: float) -> dict[str, float]:
+        """Return name -> time since the last plausible message, s; inf for none."""
+        return self._inputs.ages(now)
+
+    def latencies(self) -> dict[str, float]:
+        """Return name -> age of its measurements when they are used, low-passed, s."""
+        return self._inputs.latencies()
+
+    def targets(self, position: np.ndarray) -> np.ndarray:
+        """Return the angles to send for target angles, rad, shape (joints,)."""
+        return position
+
+
+class FeedbackLoop(SensorLoop):
+    """Corrects a pattern by the robot's sensors, as long as they are plausible.
+
+    Attributes:
+        feedback: its laws, whose gains may be replaced.
         fraction: of all corrections, 0 to 1.
         kp_scale: factor of the servos' proportional gain.
         odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
@@ -70,8 +97,8 @@ class FeedbackLoop:
             motion: returns the wanted motion.
 
         """
-        self._pattern, self._geometry, self._motion = pattern, geometry, motion
-        self._inputs = inputs
+        super().__init__(inputs, motion)
+        self._pattern, self._geometry = pattern, geometry
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._rates = RatesCheck(geometry)
         self._known: list[tuple[GaitPlan, Timetable]] = []
@@ -79,7 +106,6 @@ class FeedbackLoop:
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
                                       np.zeros((1, 2)), np.zeros(1), np.zeros(1))
-        self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
         self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
         self.odometry: Odometry | None = None
@@ -103,19 +129,11 @@ class FeedbackLoop:
             self.feedback.learn(plan)
             self._known = [*self._known, (plan, Timetable(plan, self._geometry))][-SLOTS:]
 
-    def ages(self, now: float) -> dict[str, float]:
-        """Return name -> time since the last plausible message, s; inf for none."""
-        return self._inputs.ages(now)
-
     @property
     def delay(self) -> float:
         """Age of the measured angles when they are used, low-passed, s; inf if not known."""
         age = self._inputs.joints.age
         return math.inf if math.isnan(age) else age
-
-    def latencies(self) -> dict[str, float]:
-        """Return name -> age of its measurements when they are used, low-passed, s."""
-        return self._inputs.latencies()
 
     def sense(self, dt: float, now: float) -> None:
         """Read the sensors and correct the coming tick by them; dt and now in s."""
@@ -125,7 +143,7 @@ class FeedbackLoop:
                 self._release()
             return
         self._dt = dt
-        inputs.take(now, pattern.level > 0.0)
+        inputs.update(now, pattern.level > 0.0)
         self._judge(now)
         self.fraction = self._fade.advance(self.wanted and not self.faults, dt)
         self._spent = 0.0 if self.fraction else self._spent + dt
@@ -194,7 +212,7 @@ class FeedbackLoop:
         return found[0]
 
     def targets(self, position: np.ndarray) -> np.ndarray:
-        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        """Do as the base class does, with targets moved where the virtual stiffness acts."""
         feedback, stiff = self.feedback, self.feedback.memory.stiff
         if not (stiff[0] and feedback.gains.virtual_stiffness):
             return position
@@ -211,16 +229,11 @@ class FeedbackLoop:
 
 # The balance of a biped: from the topics of its sensors to its feedback, at every tick.
 
-class BalanceLoop:
+class BalanceLoop(SensorLoop):
     """Balances a biped by its sensors, as long as they are plausible.
-
-    Call ``sense`` from the thread of the ticks; all other methods are for any thread.
 
     Attributes:
         feedback: its laws, whose gains may be replaced.
-        wanted: whether the feedback is enabled.
-        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
-        waiting: whether an input has never arrived.
 
     """
 
@@ -236,10 +249,9 @@ class BalanceLoop:
             InputError: the robot file's part ``biped`` cannot be used.
 
         """
-        robot = pattern.robot
-        self._pattern, self._inputs, self._motion = pattern, inputs, motion
+        super().__init__(inputs, motion)
+        self._pattern, robot = pattern, pattern.robot
         self.feedback = BipedFeedback(robot, plan=pattern.plan)
-        self.wanted, self.waiting, self.faults = False, True, ''
         self._balanced = False
         order = self.feedback.order
         names = [*(joint.name for joint in robot.joints), *robot.held]
@@ -252,24 +264,13 @@ class BalanceLoop:
 
     @property
     def fraction(self) -> float:
-        """Share of the robot's balance that is the feedback's: all or nothing."""
+        """Fraction of the robot's balance by the feedback: 0 or 1."""
         return 1.0 if self._pattern.balance is not None and self._pattern.balancing else 0.0
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
         self._pattern.release()
         self._inputs.restart()
-
-    def learn(self, plan: GaitPlan) -> None:
-        """Do nothing: laws of a biped know no gait."""
-
-    def ages(self, now: float) -> dict[str, float]:
-        """Return name -> time since the last plausible message, s; inf for none."""
-        return self._inputs.ages(now)
-
-    def latencies(self) -> dict[str, float]:
-        """Return name -> age of its measurements when they are used, low-passed, s."""
-        return self._inputs.latencies()
 
     @property
     def state(self) -> str:
@@ -294,12 +295,7 @@ class BalanceLoop:
             return ''
         if pattern.fallen:
             return 'the robot has fallen: holding the stand until it is on its feet'
-        return 'the robot was moved by somebody: standing it up again'
-
-    @staticmethod
-    def targets(position: np.ndarray) -> np.ndarray:
-        """Return what to send to joints that are wanted at angles: the torques are in them."""
-        return position
+        return 'the robot was moved by hand; standing up again'
 
     def sense(self, _: float, now: float) -> None:
         """Read the sensors for the coming tick; now in s."""
@@ -307,7 +303,7 @@ class BalanceLoop:
         if not self.wanted:
             pattern.balance = None
             return
-        inputs.take(now, pattern.enabled)
+        inputs.update(now, pattern.enabled)
         found, self.waiting = inputs.faults(now)
         pattern.failed = bool(found)
         found += [f'{inputs.monitors[one].name}: {why}' for one, why in pattern.doubts.items()]

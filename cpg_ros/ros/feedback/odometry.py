@@ -17,7 +17,7 @@
 from importlib import import_module, util
 
 from cpg_ros.feedback.estimate import INSTANT, Odometry, RATE
-from cpg_ros.ros.node.message_block import each, MessageBlock, places, Template
+from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry as OdometryMessage
 import numpy as np
@@ -83,7 +83,7 @@ class OdometryPublisher:
 
         """
         sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
-        parts = places(sizes)
+        parts = indices(sizes)
         messages = [odometry(topic, frames, *parts)]
         if transforms and has_transforms():
             messages.append(transform(frames, *parts[:2]))

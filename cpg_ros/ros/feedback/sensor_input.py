@@ -254,13 +254,13 @@ class SensorInput:
         self._mount = np.roll(turned, -1)
         self._heavy = np.zeros((len(self._legs), 1))
         # Types of the numbers in messages; inspecting them at every call would dominate the cost.
-        told = np.frombuffer(bytes(8))
-        self._judge_imu = specialised(judge_imu, told, 0.1, True, self._mount, self._memory,
+        bits = np.frombuffer(bytes(8))
+        self._judge_imu = specialised(judge_imu, bits, 0.1, True, self._mount, self._memory,
                                       self._lean,
                                 self._turning, self._push)
-        self._judge_joints = specialised(judge_joints, told, told, self._order, *self._limits,
+        self._judge_joints = specialised(judge_joints, bits, bits, self._order, *self._limits,
                                    self._angles, self._rates)
-        self._judge_loads = specialised(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
+        self._judge_loads = specialised(judge_loads, bits, self._order, 0.1, 0.1, self._heavy[0],
                                   self._felt)
         self.monitors: Sequence[InputMonitor] = [one.monitor for one in self._inputs]
         self.joints = self.monitors[1]
@@ -289,7 +289,7 @@ class SensorInput:
                 waiting = waiting or monitor.believed == -math.inf
         return found, waiting
 
-    def take(self, now: float, moving: bool) -> None:
+    def update(self, now: float, moving: bool) -> None:
         """Read the messages that have arrived.
 
         Args:

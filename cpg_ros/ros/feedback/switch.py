@@ -43,7 +43,7 @@ from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 import numpy as np
 from rclpy.parameter import Parameter
 
-# The parameters of the feedback: its laws, their gains, and the topics that it listens to.
+# The parameters of the feedback: its laws, their gains, and the topics it subscribes to.
 
 PREFIX = 'feedback.'
 #: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
@@ -73,10 +73,10 @@ TOPICS = fixed({
                                'stamps, low-passed over 0.1 s [s]: feedback fades out above it; '
                                f'by default {LATE:g}, and {LATE_BALANCE:g} for a robot with soles',
                                0.001, DELAYED),
-    f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, where the base is by the '
+    f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, computed from the '
                                     "robot's legs and IMU, such as odom; none by default"),
-    f'{PREFIX}odometry_scale': Spec(1.0, 'true way over the way by odometry, of the robot and its '
-                                    'ground', 0.5, 2.0),
+    f'{PREFIX}odometry_scale': Spec(1.0, 'true distance divided by odometry distance, for this '
+                                    'robot and ground', 0.5, 2.0),
     f'{PREFIX}odometry_scale_error': Spec(SCALE, 'standard deviation of that scale, for the '
                                           'covariance: about 0.015 where it was measured', 0.0,
                                           0.5),
@@ -246,8 +246,7 @@ class FeedbackSwitch:
         """Fade the feedback out as long as there is a reason, '' for none."""
         self._hindrance = reason
         if self.loop is not None:
-            self.loop.wanted = (self._node.get_parameter(ENABLED).value and not self.obstacle()
-                                and not reason)
+            self.apply()
 
     def _make(self) -> Any:
         """Return the loop, its kernels compiled."""
@@ -392,7 +391,7 @@ class BalanceSwitch(FeedbackSwitch):
         """Return why a gait cannot be run, or ''."""
         if plan.balanced or not self._value('enabled'):
             return ''
-        return f'no law balances the {plan.gait}: {", ".join(GAIT_SPEEDS)} are those there are'
+        return f'gait {plan.gait} cannot be balanced (supported: {", ".join(GAIT_SPEEDS)})'
 
     def _set_gains(self) -> None:
         self.loop.feedback.set_gains('walk', biped_gains(self._value))

@@ -78,7 +78,7 @@ def namespace(node: str) -> str:
     return node.rpartition('/')[0]
 
 
-def look(node: Node) -> Graph:
+def discover(node: Node) -> Graph:
     """Return the graph as a node sees it."""
     topics = {(name, kind) for name, kinds in node.get_topic_names_and_types() for kind in kinds}
     services = {(name, kind) for name, kinds in node.get_service_names_and_types()

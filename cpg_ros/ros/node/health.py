@@ -115,19 +115,19 @@ class OtherPublishers:
         self._node, self._topics = node, topics
         self.text = self._warned = ''
         self._since = 0.0
-        self._timer = node.create_timer(LOOK, self.look, clock=STEADY)
+        self._timer = node.create_timer(LOOK, self.check, clock=STEADY)
 
     def seek(self, seconds: float) -> str:
         """Search until one is found, or for some time in s; return the text."""
         end = time.monotonic() + seconds
-        while not self.look() and time.monotonic() < end:
+        while not self.check() and time.monotonic() < end:
             time.sleep(LOOK / 5)
         while NAMELESS in self.text and time.monotonic() < self._since + NAMING:
             time.sleep(LOOK / 5)
-            self.look()
+            self.check()
         return self.text
 
-    def look(self) -> str:
+    def check(self) -> str:
         """Search now; return the text. The warning waits up to NAMING for a name."""
         text = '; '.join(f'{topic} is published by {names}, too'
                          for topic in self._topics if (names := others_on(self._node, topic)))

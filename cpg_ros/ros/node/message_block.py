@@ -124,7 +124,7 @@ class Template:
         return raw, np.concatenate(words), np.concatenate([sources for _, sources in marks])
 
 
-def places(sizes: Sequence[int]) -> list[np.ndarray]:
+def indices(sizes: Sequence[int]) -> list[np.ndarray]:
     """Return the indices of each part of a block, given the sizes of the parts."""
     return [np.arange(*edge) for edge in pairwise(np.cumsum([0, *sizes]))]
 

@@ -16,6 +16,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
+from functools import partialmethod
 import gc
 import os
 from pathlib import Path
@@ -152,32 +153,19 @@ class Lifecycle(LifecycleNodeMixin):
             response.success = False
             return response
 
-    def _step(self, name: str) -> TransitionCallbackReturn:
+    def _step(self, name: str, state: LifecycleState) -> TransitionCallbackReturn:
+        """Do the step of a transition."""
         if reason := self._steps[name]():
             self._logger.warning(f'{name}: refused: {reason}')
             return TransitionCallbackReturn.FAILURE
         self._logger.info(f'{name}: done')
         return TransitionCallbackReturn.SUCCESS
 
-    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do its step."""
-        return self._step('configure')
-
-    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do its step."""
-        return self._step('activate')
-
-    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do its step."""
-        return self._step('deactivate')
-
-    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do its step."""
-        return self._step('cleanup')
-
-    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do its step."""
-        return self._step('shutdown')
+    on_configure = partialmethod(_step, 'configure')
+    on_activate = partialmethod(_step, 'activate')
+    on_deactivate = partialmethod(_step, 'deactivate')
+    on_cleanup = partialmethod(_step, 'cleanup')
+    on_shutdown = partialmethod(_step, 'shutdown')
 
 
 #: Domains above it have ports that are too high for UDP.

@@ -18,13 +18,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 import ctypes
 from dataclasses import dataclass, replace
 from functools import partial
+from queue import SimpleQueue
 import re
 import threading
 import traceback
+from types import SimpleNamespace
 from typing import Any
 import weakref
 
-from cpg_ros.ros.node.polled import PolledGroup
 from rcl_interfaces import srv
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -169,36 +170,25 @@ def bounded(service: type, most: int) -> type:
 
 #: Limit of the names or values in a request; no node has nearly as many parameters.
 MOST = 1000
-#: How often to check whether the node ends, ns.
-LOOK = 100_000_000
-
-
-#: Stand-ins for the requests, bounded in length.
-_BOUNDED = {kind: bounded(kind, MOST)
-            for kind in (srv.SetParameters, srv.SetParametersAtomically)}
-
-
-def _too_many(count: int) -> str:
-    return f'{count} parameters in one request: at most {MOST} are allowed'
 
 
 def _refused(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
 
 
-class _Batch:
-    """Changes that are accepted as a whole or not at all, and what takes the result."""
+class _Change:
+    """Parameters that are set together or not at all, and what takes the result."""
 
     def __init__(self, parameters: list[Parameter],
                  answer: Callable[[SetParametersResult], None]) -> None:
         self.parameters, self.answer = parameters, answer
         self.names = frozenset(parameter.name for parameter in parameters)
         #: Earlier ones that this one replaces if it is accepted.
-        self.replaced: list[_Batch] = []
+        self.replaced: list[_Change] = []
 
 
 class StrictParameterService(ParameterService):
-    """rclpy's services, with changes applied in a thread of their own.
+    """rclpy's services in a callback group of their own, with changes applied in a thread.
 
     The executor stays free for what must not wait, such as a stop. Of several waiting changes of
     the same parameters, only the last one that is valid is applied. Values of no known type,
@@ -214,93 +204,61 @@ class StrictParameterService(ParameterService):
     def __init__(self, node: Node) -> None:
         # Not rclpy's own: its services are in the group of all that must not wait for them.
         self._node_weak_ref = weakref.ref(node)
-        group = ReentrantCallbackGroup()
-        for kind, answer in (
-                (srv.DescribeParameters, self._describe_parameters_callback),
-                (srv.GetParameters, self._get_parameters_callback),
-                (srv.GetParameterTypes, self._get_parameter_types_callback),
-                (srv.ListParameters, self._list_parameters_callback)):
-            self._serve(kind, partial(self._counted, answer), group)
-        own = PolledGroup()
-        self._each = self._serve(srv.SetParameters, _untaken, own)
-        self._together = self._serve(srv.SetParametersAtomically, _untaken, own)
+        self._group = ReentrantCallbackGroup()
+        for kind in (srv.DescribeParameters, srv.GetParameters, srv.GetParameterTypes,
+                     srv.ListParameters, srv.SetParameters, srv.SetParametersAtomically):
+            self._serve(kind)
         self._ending = False
+        #: Service, request and header; None at the end.
+        self._requests: SimpleQueue[tuple[Any, Any, Any] | None] = SimpleQueue()
         self.thread = threading.Thread(target=self._work, name='parameters', daemon=True)
 
-    def _serve(self, kind: Any, answer: Callable, group: Any) -> Service:
+    def _serve(self, kind: Any) -> None:
         node = self._get_node()
         name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
-        return node.create_service(kind, f'{node.get_name()}/{name[1:]}', answer,
-                                   qos_profile=qos_profile_parameters, callback_group=group)
+        changes = kind in (srv.SetParameters, srv.SetParametersAtomically)
+        # A request is passed on in place of a response.
+        answer = ((lambda request, _: request) if changes else
+                  getattr(self, f'{name}_callback'))
 
-    def _counted(self, answer: Callable, request: Any, response: Any) -> Any:
-        """Answer a request; return an empty response if it has too many names."""
-        names = request.prefixes if hasattr(request, 'prefixes') else request.names
-        if len(names) <= MOST:
-            return answer(request, response)
-        self._get_node().get_logger().warning(
-            f'{type(request).__name__}: {_too_many(len(names))}', throttle_duration_sec=1.0)
+        def limited(request: Any, response: Any) -> Any:
+            return (self._too_many(kind, request, response) if isinstance(request, int) else
+                    answer(request, response))
+
+        service: Any = node.create_service(
+            kind, f'{node.get_name()}/{name[1:]}', limited, qos_profile=qos_profile_parameters,
+            callback_group=self._group)
+        # Used by the executor to take requests and to send responses.
+        service.srv_type = SimpleNamespace(Request=bounded(kind, MOST), Response=kind.Response)
+        if changes:
+            service.send_response = partial(self._defer, service)
+
+    def _too_many(self, kind: type, count: int, response: Any) -> Any:
+        reason = f'{count} parameters in one request: at most {MOST} are allowed'
+        if kind is srv.SetParameters:
+            response.results = [_refused(reason)]
+        elif kind is srv.SetParametersAtomically:
+            response.result = _refused(reason)
+        else:
+            self._get_node().get_logger().warning(f'{kind.__name__}: {reason}',
+                                                  throttle_duration_sec=1.0)
         return response
 
-    def end(self) -> None:
-        """Stop after the change that is being applied."""
-        self._ending = True
+    def _defer(self, service: Any, response: Any, header: Any) -> None:
+        """Send a response; leave a request to the thread."""
+        if isinstance(response, service.srv_type.Response):
+            Service.send_response(service, response, header)
+        else:
+            self._requests.put((service, response, header))
 
-    def _work(self) -> None:
-        waiting: list[_Batch] = []
-        try:
-            while not self._ending:
-                if not waiting:
-                    self._wait()
-                waiting = _thinned(waiting + self._taken())
-                if waiting and not self._ending:
-                    batch = waiting.pop(0)
-                    result = self._judged(batch)
-                    batch.answer(result)
-                    if not result.successful:
-                        waiting[:0] = batch.replaced
-                        continue
-                    for one in batch.replaced:
-                        one.answer(_refused('superseded: a later request that came while this '
-                                            'one was waiting sets the same'))
-        except rclpy_implementation.RCLError:
-            # The graph is gone when the node ends while this thread is at work.
-            if not self._ending:
-                raise
-
-    def _wait(self) -> None:
-        """Wait for a request, or a while."""
-        handles = [one.handle for one in (self._each, self._together)]
-        context = self._get_node().context.handle
-        with handles[0], handles[1], context:
-            waiting = rclpy_implementation.WaitSet(0, 0, 0, 0, len(handles), 0, context)
-            waiting.clear_entities()
-            for handle in handles:
-                waiting.add_service(handle)
-            waiting.wait(LOOK)
-
-    def _taken(self) -> list[_Batch]:
-        """Take all requests that have arrived; reject at once those that cannot be read."""
-        batches = []
-        for service in (self._each, self._together):
-            bounds = _BOUNDED[service.srv_type]
-            while True:
-                with service.handle:
-                    request, header = service.handle.service_take_request(bounds)
-                if header is None:
-                    break
-                respond = partial(_respond, service, header)
-                if isinstance(request, int):
-                    respond([_refused(_too_many(request))])
-                    continue
-                batches += self._batches(
-                    [request.parameters] if service is self._together else
-                    [[one] for one in request.parameters], respond)
-        return batches
-
-    def _batches(self, parts: Sequence[Sequence[ParameterMessage]],
-                 respond: Callable[[list[SetParametersResult]], None]) -> list[_Batch]:
-        """Read the parts of a request, which is answered once all of them are processed."""
+    def _next(self) -> list[_Change]:
+        """Wait for a request; return its changes, each of which is answered on its own."""
+        if (received := self._requests.get()) is None:
+            return []
+        service, request, header = received
+        response = service.srv_type.Response()
+        together = hasattr(response, 'result')
+        parts = [request.parameters] if together else [[one] for one in request.parameters]
         results: list[Any] = [None] * len(parts)
         left = set(range(len(parts)))
 
@@ -308,17 +266,24 @@ class StrictParameterService(ParameterService):
             results[k] = result
             left.discard(k)
             if not left:
-                respond(results)
+                respond()
+
+        def respond() -> None:
+            if together:
+                response.result, = results
+            else:
+                response.results = results
+            Service.send_response(service, response, header)
 
         if not parts:
-            respond(results)
-        batches = []
+            respond()
+        changes = []
         for k, messages in enumerate(parts):
             try:
-                batches.append(_Batch(self._read(messages), partial(answer, k)))
+                changes.append(_Change(self._read(messages), partial(answer, k)))
             except ValueError as error:
                 answer(k, _refused(str(error)))
-        return batches
+        return changes
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
         """Read parameters that the node has and that may be set while it runs.
@@ -342,10 +307,42 @@ class StrictParameterService(ParameterService):
                 raise ValueError(f'{parameter.name} is read-only: set it when the node starts')
         return parameters
 
-    def _judged(self, batch: _Batch) -> SetParametersResult:
+    def end(self) -> None:
+        """Stop after the change that is being applied."""
+        self._ending = True
+        self._requests.put(None)
+
+    def _work(self) -> None:
+        try:
+            self._apply_changes()
+        except rclpy_implementation.RCLError:
+            # The graph is gone when the node ends while this thread is at work.
+            if not self._ending:
+                raise
+
+    def _apply_changes(self) -> None:
+        waiting: list[_Change] = []
+        while not self._ending:
+            if not waiting:
+                waiting = self._next()
+            while not self._requests.empty():
+                waiting = waiting + self._next()
+            waiting = _thinned(waiting)
+            if waiting and not self._ending:
+                change = waiting.pop(0)
+                result = self._judged(change.parameters)
+                change.answer(result)
+                if not result.successful:
+                    waiting[:0] = change.replaced
+                    continue
+                for earlier in change.replaced:
+                    earlier.answer(_refused('superseded: a later request that came while this '
+                                            'one was waiting sets the same'))
+
+    def _judged(self, parameters: list[Parameter]) -> SetParametersResult:
         node = self._get_node()
         try:
-            return node.set_parameters_atomically(batch.parameters)
+            return node.set_parameters_atomically(parameters)
         except Exception as error:
             # One bad request must not end a node that moves a robot.
             if not self._ending:
@@ -353,29 +350,14 @@ class StrictParameterService(ParameterService):
             return _refused(f'{type(error).__name__}: {error}')
 
 
-def _untaken(request: object, response: Any) -> Any:
-    """Stand in for a callback: the thread takes the requests."""
-    return response
-
-
-def _respond(service: Service, header: object, results: list[SetParametersResult]) -> None:
-    kind: Any = service.srv_type
-    response = kind.Response()
-    if kind is srv.SetParametersAtomically:
-        response.result, = results
-    else:
-        response.results = results
-    service.send_response(response, header)
-
-
-def _thinned(batches: list[_Batch]) -> list[_Batch]:
-    """Put batches whose parameters a later one sets, too, behind that one; return the others."""
-    left: list[_Batch] = []
-    for batch in reversed(batches):
-        later = next((one for one in left if batch.names <= one.names), None)
+def _thinned(changes: list[_Change]) -> list[_Change]:
+    """Put changes whose parameters a later one sets, too, behind that one; return the others."""
+    left: list[_Change] = []
+    for change in reversed(changes):
+        later = next((one for one in left if change.names <= one.names), None)
         if later is None:
-            left.append(batch)
+            left.append(change)
         else:
-            later.replaced[:0] = [*batch.replaced, batch]
-            batch.replaced = []
+            later.replaced[:0] = [*change.replaced, change]
+            change.replaced = []
     return left[::-1]

@@ -91,7 +91,7 @@ class PolledSubscription:
         self._kind, self._raw = kind, raw
         self._depth: int = self._subscription.qos_profile.depth
 
-    def take(self) -> Iterator[tuple[Any, int]]:
+    def receive(self) -> Iterator[tuple[Any, int]]:
         """Take what has arrived: each message, and its time of arrival, ns of system time."""
         handle = self._subscription.handle
         with handle:

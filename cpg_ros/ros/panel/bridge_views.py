@@ -58,7 +58,7 @@ class BridgeViews:
         self.message: dict[str, Any] = {}
         self._update()
 
-    def look(self, names: Iterable[str], wanted: bool) -> None:
+    def update(self, names: Iterable[str], wanted: bool) -> None:
         """Subscribe to these bridges, or to none if no page is open."""
         names = set(names)
         for name in set(self._shown) - names:
@@ -90,7 +90,7 @@ class BridgeViews:
             if (state := topic.newest()) is not None:
                 self._shown[name]['state'] = state.data[:LONGEST]
         now = time.monotonic()
-        for message, _ in self._health.take() if self._health is not None else ():
+        for message, _ in self._health.receive() if self._health is not None else ():
             for status in message.status:
                 if (name := status.name.partition(': ')[0]) in self._shown:
                     self._when[name] = now

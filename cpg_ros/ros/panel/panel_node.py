@@ -32,7 +32,14 @@ from cpg_ros.common.files import is_loopback
 from cpg_ros.fitting.recordings.bag_writer import BagError
 from cpg_ros.motion.description import load_urdf
 from cpg_ros.ros.bag_recorder import BagRecorder, EVERY
-from cpg_ros.ros.node.client import Graph, look, namespace, NodeClient, PATIENCE, ServiceClients
+from cpg_ros.ros.node.client import (
+    discover,
+    Graph,
+    namespace,
+    NodeClient,
+    PATIENCE,
+    ServiceClients,
+)
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
@@ -63,7 +70,7 @@ class StartWatch:
         self._topic: PolledSubscription | None = None
         self._text, self._when = '', 0.0
 
-    def look(self, on: bool) -> str:
+    def update(self, on: bool) -> str:
         """Return what the node that starts waits for, '' if it is not known."""
         if not on:
             self.close()
@@ -71,7 +78,7 @@ class StartWatch:
         if self._topic is None:
             self._topic = PolledSubscription(self._watch, DiagnosticArray, '/diagnostics',
                                              best_effort(20), overridable=False)
-        for message, _ in self._topic.take():
+        for message, _ in self._topic.receive():
             for status in message.status:
                 node, _, part = status.name.partition(': ')
                 if part == START:
@@ -445,12 +452,12 @@ class Panel(StartedNode):
         await server.wait_closed()
 
     def _look(self) -> None:
-        graph = look(self)
-        starting = self._starts.look(not graph.generators)
+        graph = discover(self)
+        starting = self._starts.update(not graph.generators)
         if (graph, starting) != (self._graph, self._starting):
             self._graph, self._starting = graph, starting
             self._pages.send(self._pages.everyone, self._state())
-        self._bridges.look(graph.bridges, bool(self._pages.everyone))
+        self._bridges.update(graph.bridges, bool(self._pages.everyone))
         for name in set(self._views) - set(graph.generators):
             self._views.pop(name).close()
         for name in graph.generators:
@@ -458,7 +465,7 @@ class Panel(StartedNode):
                 self._views[name] = self._view(name)
             self._views[name].listen(graph, bool(self._pages.of(name)))
             self._views[name].ready()
-            self._views[name].teleop.look()
+            self._views[name].teleop.update()
         for page in self._pages.everyone:
             # A page never turns to another robot by itself, whoever steers that.
             if not page.node and (first := self._first()):

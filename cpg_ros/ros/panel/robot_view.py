@@ -100,7 +100,7 @@ class Controls:
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
         self.known = known
 
-    def hear(self, event: ParameterEvent) -> dict[str, Any]:
+    def update(self, event: ParameterEvent) -> dict[str, Any]:
         """Store the changes of an event; return name -> value if they are this node's."""
         if event.node != self._node.name:
             return {}
@@ -323,16 +323,16 @@ class RobotView:
         if (gait := self._newest(f'{self.name}/gait')) is not None:
             self._keep({'type': 'gait', 'gait': gait.data})
         if events := self._topics.get('/parameter_events'):
-            for event, _ in events.take():
+            for event, _ in events.receive():
                 # A node of the same name has started again.
                 self._stale |= event.node == self.name and bool(event.new_parameters)
-                if values := self.controls.hear(event):
+                if values := self.controls.update(event):
                     self._send({'type': 'values', 'values': values})
         if health := self._topics.get('/diagnostics'):
             beside = (self.graph.beside(self.name, kind)
                       for kind in (self.graph.simulations, self.graph.bridges))
             owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
-            for message, _ in health.take():
+            for message, _ in health.receive():
                 for status in message.status:
                     if status.name.startswith(owners):
                         self._keep_health(status)

@@ -164,7 +164,7 @@ class Teleop:
         """Give a page the lease in any case; return the page that has lost it."""
         self.stop()
         self._send(now)
-        self.look()
+        self.update()
         lost: Any = self.lease.take_over(page, now, frozenset(self.others))
         page.lost_to = ''
         if lost is not None:
@@ -195,7 +195,7 @@ class Teleop:
                 self.stop()
             return
         self.acquire(page, now)
-        self.look()
+        self.update()
         if not self.confirmed:
             self.stop()
             raise LeaseError(f'{self._topic} is also published by {self.names}: take over to '
@@ -244,7 +244,7 @@ class Teleop:
         """Names of the other nodes."""
         return ', '.join(sorted(set(self.others.values())))
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Find the other publishers."""
         if self._publisher is not None and not self._own:
             self._own = self._named() - self._before

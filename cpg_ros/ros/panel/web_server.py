@@ -46,12 +46,12 @@ class AccessError(CpgError):
     """The panel would be open to everybody; one line for the user."""
 
 
-def token_for(host: str, wish: str, terminal: bool) -> str:
+def token_for(host: str, setting: str, terminal: bool) -> str:
     """Return the token to require; '' for none.
 
     Args:
         host: to listen on.
-        wish: the user's choice: a token, ``auto`` for a new one, or '' for none.
+        setting: the user's choice: a token, ``auto`` for a new one, or '' for none.
         terminal: whether there is a terminal to show a new token in.
 
     Raises:
@@ -59,18 +59,18 @@ def token_for(host: str, wish: str, terminal: bool) -> str:
             or nobody would see a new one.
 
     """
-    if wish == AUTO:
+    if setting == AUTO:
         if not terminal:
             raise AccessError(f'token:={AUTO} shows the token in the terminal, and there is none: '
                               f'make one ({RECIPE}) and set it in a parameter file')
         return secrets.token_urlsafe(16)
-    if not wish and not is_loopback(host):
+    if not setting and not is_loopback(host):
         raise AccessError(f"host '{host}' can be reached from other machines: set the parameter "
                           f'token to protect it; token:={AUTO} makes one')
-    if wish and len(wish) < SHORTEST:
-        raise AccessError(f'the token has {len(wish)} characters, and can be guessed: it '
+    if setting and len(setting) < SHORTEST:
+        raise AccessError(f'the token has {len(setting)} characters, and can be guessed: it '
                           f'needs {SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
-    return wish
+    return setting
 
 
 class AccessControl:

@@ -259,7 +259,7 @@ def test_a_bridge_drives_servos_on_a_serial_bus_which_are_let_go_whatever_fails(
               and np.abs(goals() - servo_steps(STAND)).max() <= 1, 'the stand')
         # The watchdog lets them go when the bridge is killed.
         bridge.signal(signal.SIGKILL)
-        bus.wait_for('the servos are let go: as commanded')
+        bus.wait_for('servo torque disabled: as commanded')
         until(lambda: not any(chain.torque.values()), 'no torque')
         bridge = started(domain, path)
         bridge.wait_for('standing: it has risen')

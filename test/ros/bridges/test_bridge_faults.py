@@ -96,7 +96,7 @@ def test_stops_are_accepted_in_every_state(robot, name):
 
     call(name)
     call('start')
-    until(lambda: count('nobody else commands it'), 'the start')
+    until(lambda: count('no other command publisher'), 'the start')
     call(name)
     until(lambda: count(f'not started: ~/{name}'), 'the end of the start')
     assert not count('rising')

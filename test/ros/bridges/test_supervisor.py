@@ -190,7 +190,7 @@ def lean(rig):
     (set_('q', np.nan), 'not a number'), (set_('dq', np.inf), 'not a number'),
     (set_('quaternion', np.nan), 'no orientation'), (lean, 'leans by 51 degrees'),
     (set_('temperature', 85), 'FR_thigh_joint has 85 deg C'),
-    (set_('lost', 1000), 'FR_thigh_joint does not hear'),
+    (set_('lost', 1000), 'FR_thigh_joint receives no commands'),
     (lambda rig: setattr(rig, 'target', GO2.stand * np.nan), 'a target is not a number'),
     (lambda rig: rig.machine.reject_target('joint a is missing', rig.now), 'joint a is missing'),
     (lambda rig: rig.machine.damp(rig.now, '~/stop'), '~/stop')])

@@ -63,7 +63,7 @@ def test_a_bus_obeys_its_bridge_and_refuses_a_stranger(servo_robot):
     with Sender(robot.domain, '/a/servo/commands', [0.7, -0.4, 0.7, -0.4]):
         robot.bus.wait_for('refused: commands of .*: the servos are driven by /a/servo_bridge')
         # The bridge makes it sit, says who it is, and lets the servos go.
-        robot.bridge.wait_for('the robot is commanded by /stranger, too')
+        robot.bridge.wait_for('another node commands the robot: /stranger')
         robot.bridge.wait_for('damping: it has sat down')
         until(lambda: not any(robot.chain.torque.values()), 'no torque')
         # Nor does the stranger take the servos over now.
@@ -112,7 +112,7 @@ def test_a_unitree_bridge_moves_the_robot_of_its_topics_only(ending):
     until(lambda: one.contacts == [20.0, 0.0, 80.0, 0.0], f'forces, not {one.contacts}')
     # The robot's own topic is one robot's: a bridge to both is none.
     second = unitree_bridge(ending, domain, 'b')
-    second.wait_for('nobody else commands it')
+    second.wait_for('no other command publisher')
     until(lambda: other.driven, 'motion of the other')
     third = unitree_bridge(ending, domain, 'a')
     assert third.wait() == 1

@@ -167,10 +167,10 @@ def test_another_publisher_is_refused_and_sits_it_down(walk):
     walk.walking()
     rival = walk.watcher.node.create_publisher(LowCmd, '/lowcmd', 1)
     walk.wait_for('sitting').wait_for('damping')
-    assert 'the robot is commanded by /watcher, too' in walk.bridge.log
+    assert 'another node commands the robot: /watcher' in walk.bridge.log
     answer = walk.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
     assert answer.success
-    walk.bridge.wait_for('not started: the robot is commanded by /watcher')
+    walk.bridge.wait_for('not started: another node commands the robot: /watcher')
     walk.watcher.destroy(rival)
     assert walk.robot.damped
 

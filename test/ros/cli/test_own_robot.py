@@ -45,7 +45,7 @@ class Made:
     def __init__(self, *codes, writing=(0,)):
         self.codes, self.words, self.writing = list(codes), [], writing
 
-    def take(self, what, seconds, words):
+    def run(self, what, seconds, words):
         assert what and seconds > 0.0
         self.words.append(words)
         code = self.codes.pop(0) if self.codes else 0

@@ -285,5 +285,5 @@ def test_feet_in_the_air_may_be_minus_zero(monkeypatch):
     monitor = inputs.monitors[-1]
     for k in range(100):
         Wire.wires['foot_contacts'].data = serialize_message(Float64MultiArray(data=[-0.0] * 4))
-        inputs.take(0.002 * k, True)
+        inputs.update(0.002 * k, True)
     assert not monitor.fault(0.2)

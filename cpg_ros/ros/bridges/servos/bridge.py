@@ -23,7 +23,7 @@ from cpg_ros.ros.bridges.bridge import BridgeNode
 from cpg_ros.ros.bridges.robot_state import (
     bridge_specs,
     BridgeSettings,
-    motor_places,
+    motor_indices,
     settings_for,
 )
 from cpg_ros.ros.bridges.servos.calibration import load_calibration
@@ -42,7 +42,7 @@ SPECS = fixed({
     'rate': Spec(50.0, 'commands per second [Hz]', 10.0, 200.0),
     # Servos that hold their last angle do not mind a computer that is late.
     'state_timeout': Spec(0.5, 'time without a new state, or without a tick of the bridge, after '
-                          'which the servos are let go [s]', 0.05, 5.0)})
+                          'which servo torque is disabled [s]', 0.05, 5.0)})
 
 
 class ServoBridge(BridgeNode):
@@ -65,7 +65,7 @@ class ServoBridge(BridgeNode):
         self._state.expect(joints)
         ones = np.ones(len(joints))
         # Infinite torque: a servo goes to its angle with what it has.
-        return settings_for(robot, motor_places(robot, joints, 'these servos'), kp=ones,
+        return settings_for(robot, motor_indices(robot, joints, 'these servos'), kp=ones,
                             kd=0.0 * ones, torque=np.inf * ones, lying=calibration.rest, **common)
 
     def make_command(self) -> ServoCommand:

@@ -65,18 +65,18 @@ def open_board(calibration: Calibration) -> ServoBoard:
         raise ServoError(f'{device}: {error.strerror or error}') from error
 
 
-# Whose commands drive the servos: those of one sender, until the servos are released.
+# Whose commands drive the servos: those of one sender, until servo torque is disabled.
 
 class CommandOwner:
     """Accepts the commands of one sender and refuses those of all others.
 
-    The first sender whose command drives the servos owns them until they are released. If they
-    are released without its doing, by its watchdog or a timeout, its commands stay refused until
+    The first sender whose command drives the servos owns them until torque is disabled. If it
+    is disabled without its doing, by its watchdog or a timeout, its commands stay refused until
     it releases them, too: it does not know, and would move them at full speed from where they
     have sunk to. A sender without a name, such as ``ros2 topic pub``, may go on.
 
     Attributes:
-        sender: whose commands are accepted; None while the servos are released.
+        sender: whose commands are accepted; None while torque is disabled.
         blocked: the sender that has to release the servos first, '' for none.
 
     """
@@ -116,11 +116,11 @@ SPECS = fixed({
                                  'the robot lies in its rest pose'),
     'rate': Spec(50.0, 'times that servos are commanded, and asked where they are, a second [Hz]',
                  10.0, 200.0),
-    'command_timeout': Spec(0.5, 'time without a command after which the servos are let go [s]',
+    'command_timeout': Spec(0.5, 'time without a command after which servo torque is disabled [s]',
                             0.05, 5.0),
     'end_timeout': Spec(0.0, 'time for which Ctrl-C or SIGTERM waits for the commands to stop, as '
-                        'they do when the bridge has made the robot sit down [s]; 0 lets the '
-                        'servos go at once', 0.0, 30.0)})
+                        'they do when the bridge has made the robot sit down [s]; 0 disables '
+                        'servo torque at once', 0.0, 30.0)})
 #: Least time between two warnings that a servo does not answer, s.
 QUIET = 5.0
 #: Commands that may wait for a tick.
@@ -132,7 +132,7 @@ SHOWN = 2.0
 
 
 class ServoBus(StartedNode):
-    """One thread takes commands, drives the servos and publishes where they are."""
+    """One thread applies commands and publishes the servos' positions."""
 
     def __init__(self) -> None:
         """Open the bus.
@@ -183,7 +183,7 @@ class ServoBus(StartedNode):
 
     def _report_health(self) -> Health:
         level, text = DiagnosticStatus.OK, ('driven' if self._driven else
-                                            f'the servos are released: {self._reason}')
+                                            f'servo torque disabled: {self._reason}')
         if time.monotonic() < self._refused_at + SHOWN:
             level, text = DiagnosticStatus.ERROR, self._refusal
         elif self._others:
@@ -193,7 +193,7 @@ class ServoBus(StartedNode):
 
     def _tick(self, dt: float, stamp: int) -> None:
         now = time.monotonic()
-        for message, _ in self._commands.take():
+        for message, _ in self._commands.receive():
             self._take(sender_of(message), np.array(message.data, dtype=float), now)
         if self._driven and now - self._heard > self._timeout:
             self._release(f'no command for {1e3 * self._timeout:.0f} ms', self._owner.sender)
@@ -213,7 +213,7 @@ class ServoBus(StartedNode):
                 name=self._calibration.joints, position=angles.tolist()))
 
     def _take(self, sender: str, angles: np.ndarray, now: float) -> None:
-        """Follow a command, or let the servos go if it has no angles or cannot be used."""
+        """Apply a command, or disable torque if it has no angles or cannot be used."""
         wanted, owner = len(self._calibration.joints), self._owner
         if not angles.size:
             if owner.may_release(sender):
@@ -225,7 +225,7 @@ class ServoBus(StartedNode):
                          f'{self._commands.topic}', now)
         elif not owner.may_drive(sender):
             self._refuse(f'commands of {sender or self._others or "a nameless sender"}: ' + (
-                'the servos were released in its absence' if owner.sender is None else
+                'servo torque was disabled in its absence' if owner.sender is None else
                 f'the servos are driven by {owner.sender or "a nameless sender"}'), now)
         elif len(angles) != wanted:
             self._release(f'a command has {len(angles)} angles for {wanted} servos', sender)
@@ -241,7 +241,7 @@ class ServoBus(StartedNode):
         self.get_logger().error(self._refusal, throttle_duration_sec=QUIET)
 
     def _release(self, reason: str, blocked: str | None) -> None:
-        """Let the servos go; a sender that is blocked has to release them, too, before it drives.
+        """Disable torque; a blocked sender must disable it, too, before it drives.
 
         Args:
             reason: for the log.
@@ -251,7 +251,7 @@ class ServoBus(StartedNode):
         self._owner.released(blocked or '')
         self._reason = reason
         self._board.detach()
-        self.get_logger().warning(f'the servos are let go: {reason}')
+        self.get_logger().warning(f'servo torque disabled: {reason}')
 
     def _failed(self, error: BaseException) -> None:
         """End: in one line if it is the bus or a servo."""
@@ -270,7 +270,7 @@ class ServoBus(StartedNode):
         self._ticker.start()
 
     def finish(self) -> None:
-        """End the thread, and let the servos go, whatever has failed."""
+        """End the thread and disable torque, whatever has failed."""
         longest = time.monotonic() + self._value('end_timeout')
         while self._driven and self.failure is None and time.monotonic() < longest:
             time.sleep(0.02)
@@ -279,7 +279,7 @@ class ServoBus(StartedNode):
         try:
             self._board.detach()
         except OSError:
-            self.get_logger().fatal('the servos could not be let go: cut their power')
+            self.get_logger().fatal('servo torque could not be disabled: cut their power')
         self._board.close()
 
 

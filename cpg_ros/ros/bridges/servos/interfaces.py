@@ -51,7 +51,7 @@ class ServoCommand(JointCommand):
         self._layout = MultiArrayLayout(dim=[MultiArrayDimension(label=sender)])
 
     def encode(self) -> Float64MultiArray:
-        """Return the angles, rad; none if the servos are to be let go."""
+        """Return the angles, rad; empty to disable torque."""
         return Float64MultiArray(layout=self._layout,
                                  data=self.q.tolist() if self.kp.any() else [])
 

@@ -28,7 +28,7 @@ from cpg_ros.ros.bridges.unitree.messages import BUTTONS, FootForces, LowState
 from cpg_ros.ros.bridges.unitree.models import JOINTS, MODELS, PARTS, settings_of
 from cpg_ros.ros.bridges.unitree.participants import Announcements
 from cpg_ros.ros.generator_io import joint_state, labelled
-from cpg_ros.ros.node.message_block import each, MessageBlock, places, Template
+from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import run
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 from cpg_ros.ros.node.polled import OVERRIDABLE, PolledSubscription
@@ -73,7 +73,7 @@ class Sensors:
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
         n = len(names)
         sizes = n, n, n, 4, 3, 3, len(self._feet)
-        *joints, orientation, rates, acceleration, forces = places(sizes)
+        *joints, orientation, rates, acceleration, forces = indices(sizes)
         imu = Imu()
         imu.header.frame_id = 'imu'
         self._block = MessageBlock(node, sizes, [
@@ -158,7 +158,7 @@ class RobotService:
             self._wait(0.05)
         self._publisher.publish(request)
         while time.monotonic() < end + ANSWER:
-            for answer, _ in self._answers.take():
+            for answer, _ in self._answers.receive():
                 if answer.header.identity.id == request.header.identity.id:
                     if code := answer.header.status.code:
                         raise StartRefused(f"the robot's service '{self._name}' refuses request "
@@ -252,7 +252,7 @@ class UnitreeBridge(BridgeNode):
 
     def network_hazard(self) -> str:
         """Return a participant that crashes the robot's software, or ''."""
-        found = self._announcements.look()
+        found = self._announcements.check()
         return found and (f'{found} is on this network: it crashes the 0.10 in '
                           "Unitree's firmware; stop it")
 

@@ -216,7 +216,7 @@ class LowState(RobotState):
         lost = self.lost - self._lost_before
         if lost.max() > MOST_LOST:
             worst = int(lost.argmax())
-            return f'the motor of {JOINTS[worst]} does not hear the robot any more'
+            return f'the motor of {JOINTS[worst]} receives no commands'
         return ''
 
     @property

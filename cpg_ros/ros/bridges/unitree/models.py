@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.motion.robot import Robot
-from cpg_ros.ros.bridges.robot_state import BridgeSettings, motor_places, settings_for
+from cpg_ros.ros.bridges.robot_state import BridgeSettings, motor_indices, settings_for
 import numpy as np
 
 PARTS = ('hip', 'thigh', 'calf')
@@ -74,14 +74,14 @@ def each(values: list[float], what: str, most: float) -> np.ndarray:
     return np.resize(np.array(values, dtype=float), len(JOINTS))
 
 
-def places(robot: Robot) -> np.ndarray:
+def motor_order(robot: Robot) -> np.ndarray:
     """Return the position of each of Unitree's motors in ``robot.order``, shape (12,).
 
     Raises:
         InputError: the robot's joints are not those of a Unitree robot.
 
     """
-    return motor_places(robot, JOINTS, "Unitree's robots")
+    return motor_indices(robot, JOINTS, "Unitree's robots")
 
 
 def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
@@ -102,6 +102,7 @@ def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
     """
     n = len(JOINTS)
     return settings_for(
-        robot, places(robot), kp=each(kp, 'kp', model.most_kp), kd=each(kd, 'kd', model.most_kd),
+        robot, motor_order(robot), kp=each(kp, 'kp', model.most_kp),
+        kd=each(kd, 'kd', model.most_kd),
         torque=torque_factor * np.resize(model.torque, n), lying=np.resize(model.lying, n),
         most_kp=model.most_kp, **others)

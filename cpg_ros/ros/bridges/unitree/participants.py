@@ -65,7 +65,7 @@ class Announcements:
             # An interface without multicast has no announcements.
             return
 
-    def look(self) -> str:
+    def check(self) -> str:
         """Return which harmful participant has announced itself since the last call, or ''."""
         found = ''
         while self._socket.fileno() >= 0:
