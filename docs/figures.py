@@ -37,19 +37,21 @@ FIGURES = {
     **{name: ('analysis.gait_diagram', ['FOLDER/it.png', '--network', network], 'it.png')
        for name, network in {'footfalls': 'delayed', 'quadruped': 'quadruped', 'biped': 'biped',
                              'phase': 'phase', 'hopf': 'hopf', 'matsuoka': 'matsuoka'}.items()},
-    'branches': ('analysis.analyze', ['--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2',
-                             'tau=0.4', '--plot', 'FOLDER/it.png'], 'it.png'),
-    'branches_quadruped': ('analysis.analyze', ['--network', 'quadruped', '--preset', 'pace', '--along',
-                                       'alpha=beta', '--range=-0.1:0.6', '--plot',
-                                       'FOLDER/it.png'], 'it.png'),
-    'phase_response': ('analysis.analyze', ['--network', 'quadruped', '--preset', 'trot', '--prc',
-                                   'FOLDER/it.png'], 'it.png'),
-    'inversion': ('ros.cli.inversion', ['--csv', str(WALK), '--out', 'FOLDER/fitted.yaml', '--report',
-                                'FOLDER/report.html'], 'report.html'),
+    'branches': ('analysis.analyze', [
+        '--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2', 'tau=0.4',
+        '--plot', 'FOLDER/it.png'], 'it.png'),
+    'branches_quadruped': ('analysis.analyze', [
+        '--network', 'quadruped', '--preset', 'pace', '--along', 'alpha=beta',
+        '--range=-0.1:0.6', '--plot', 'FOLDER/it.png'], 'it.png'),
+    'phase_response': ('analysis.analyze', [
+        '--network', 'quadruped', '--preset', 'trot', '--prc', 'FOLDER/it.png'], 'it.png'),
+    'inversion': ('ros.cli.inversion', [
+        '--csv', str(WALK), '--out', 'FOLDER/fitted.yaml', '--report', 'FOLDER/report.html'],
+        'report.html'),
     'tour': ('ros.cli.demo', ['--tour', '--no-panel', '--out', 'FOLDER'], 'footfalls.png'),
-    'hexapod_footfalls': ('ros.cli.demo', ['--hexapod', '--tour', 'tripod', 'ripple', 'wave', '--every',
-                                   '4', '--no-panel', '--out', 'FOLDER'],
-                          'footfalls.png')}
+    'hexapod_footfalls': ('ros.cli.demo', [
+        '--hexapod', '--tour', 'tripod', 'ripple', 'wave', '--every', '4', '--no-panel',
+        '--out', 'FOLDER'], 'footfalls.png')}
 #: Diagrams, and the colours of their dark copies.
 DIAGRAMS = 'rooms', 'threads', 'tick'
 DARK_COLOURS = (':root { --ink: #e6edf3; --faint: #9da7b3; --ground: #131416; --line: #6e7681; '
