@@ -63,7 +63,7 @@ class WheelMetadata(dist_info):
 
 setup(
     name='cpg_ros',
-    version='0.1.0',
+    version='0.2.0',
     cmdclass={'install_scripts': Scripts, 'dist_info': WheelMetadata},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
     package_data={'cpg_ros': ['py.typed', 'analysis/atlas/*.css', 'analysis/atlas/*.js',

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from cpg_ros.networks.registry import NETWORKS, PRESETS
     from cpg_ros.networks.symmetry import Symmetry
 
-__version__ = '0.1.0'
+__version__ = '0.2.0'
 __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLine', 'Pattern',
            'Preset', 'Range', 'Stepper', 'Symmetry', 'continue_orbit', 'fit_recording',
            'hopf_points', 'load_robot', 'multipliers', 'plan', 'read_bag', 'read_csv',
