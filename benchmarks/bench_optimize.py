@@ -107,8 +107,8 @@ def main() -> None:
         began = time.perf_counter()
         front = optimise('biped', gait, progress=False)
         searches[gait] = {'seconds': time.perf_counter() - began,
-                          'largest_phase_error_deg': float(front.args.errors.max()),
-                          'leading_multiplier': front.args.leading}
+                          'largest_phase_error_deg': float(front.best.errors.max()),
+                          'leading_multiplier': front.best.leading}
     speedup = ivp_ms[0] / ours_ms[0]
     emit(benchmark='optimize', ours_ms_per_network=ours_ms, ivp_ms_per_network=ivp_ms,
          ivp_numpy_ms_per_network=ivp_numpy_ms, speedup_per_network=speedup,

@@ -96,12 +96,12 @@ def _yes(value: bool) -> str:
     return 'yes' if value else 'no'
 
 
-def _which(verdict: GaitAssessment, args: GaitAssessment) -> str:
+def _which(verdict: GaitAssessment, meant: GaitAssessment) -> str:
     """Return which of a gait's orbits is meant where it is not the first."""
-    if args is verdict:
+    if meant is verdict:
         return ''
-    assert args.orbit is not None
-    return f' (the orbit of period {args.orbit.period:.6f})'
+    assert meant.orbit is not None
+    return f' (the orbit of period {meant.orbit.period:.6f})'
 
 
 def _kind(point: HopfPoint) -> tuple[str, str]:

@@ -200,14 +200,14 @@ class Front:
         space: what was varied.
         scores: the Pareto front of all sets that were tried, best first.
         tried: all of them, in the order in which they were tried.
-        args: the best one, with its exact orbit.
+        best: the first of them, with its exact orbit.
 
     """
 
     space: Space
     scores: tuple[Score, ...]
     tried: tuple[Score, ...]
-    args: VerifiedGait
+    best: VerifiedGait
 
 
 def optimise(network_name: str, gait: str, *, population: int = 60, generations: int = 12,
@@ -263,14 +263,14 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
     for _ in range(TRIALS):
         front = sorted(_non_dominated(left), key=_order)
         try:
-            args = polish(front[0], space.gait, seed)
+            verified = polish(front[0], space.gait, seed)
         except NotVerified as error:
             why = f'the best has the phases, but {error}'
             left.remove(front[0])
             if not left:
                 break
             continue
-        return Front(space, tuple(front), tried, args)
+        return Front(space, tuple(front), tried, verified)
     raise _nothing(space, tried, why)
 
 

@@ -72,7 +72,7 @@ def write_front(path: Path, front: Front) -> None:
                        f'{score.stability:.6g}',
                        *([f'{score.difference:.6g}'] if two else []),
                        f'{score.period:.6f}',
-                       int(score.network == front.args.preset.network)])
+                       int(score.network == front.best.preset.network)])
     write_atomically(path, text.getvalue())
 
 
@@ -80,7 +80,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
     """Draw two objectives of all sets; the front and the chosen set stand out."""
     on = np.array([score.network in {one.network for one in front.scores}
                    for score in front.tried])
-    args = np.array([score.network == front.args.preset.network for score in front.tried])
+    selected = np.array([score.network == front.best.preset.network for score in front.tried])
     exact = np.array([score.exact for score in front.tried])
     axes.scatter(values[x][~exact], values[y][~exact], s=12, color=TRIED, marker='x',
                  linewidths=0.7, label='tried, multiplier estimated')
@@ -88,7 +88,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
     axes.scatter(values[x][rest], values[y][rest], s=12, color=SOLVED, alpha=0.7, linewidths=0,
                  label='tried, orbit solved')
     axes.scatter(values[x][on], values[y][on], s=22, color=BEST, label='Pareto front', zorder=3)
-    axes.scatter(values[x][args], values[y][args], s=110, facecolors='none',
+    axes.scatter(values[x][selected], values[y][selected], s=110, facecolors='none',
                  edgecolors='#1a202c', linewidths=1.3, label='chosen', zorder=4)
     for name, scale, limits in ((x, axes.set_xscale, axes.set_xlim),
                                 (y, axes.set_yscale, axes.set_ylim)):
@@ -105,7 +105,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
 
 def _signals(axes: Axes, front: Front) -> None:
     """Draw what every cell does over two cycles of the exact orbit, one row each."""
-    orbit = front.args.orbit
+    orbit = front.best.orbit
     points = 512
     once = orbit_signals(orbit, points)[:, :orbit.network.cells]
     signals = np.concatenate([once, once, once[:1]])
@@ -143,7 +143,7 @@ def draw_front(path: Path, front: Front) -> None:
     worst = 'largest phase error [deg]'
     values[worst] = np.max([values[name] for name in phases], axis=0)
     panels = [(phases[0], phases[1]), (worst, multiplier)]
-    if front.args.orbit.waves.max():
+    if front.best.orbit.waves.max():
         difference = 'difference in shape of the waveforms [1]'
         values[difference] = np.array([one.difference for one in front.tried])
         # Elsewhere the gait's two waveforms are not there to be compared.
@@ -164,11 +164,11 @@ def draw_front(path: Path, front: Front) -> None:
     _signals(axes, front)
     axes.spines[['top', 'right', 'left']].set_visible(False)
     axes.tick_params(left=False)
-    orbit = front.args.orbit
+    orbit = front.best.orbit
     figure.suptitle(f'{front.space.gait.replace("_", " ")} of the {front.space.network.name}: '
                     f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
                     f'chosen: period {orbit.period:.3f} model time, leading multiplier '
-                    f'{front.args.leading:.2g} a cycle', fontsize=11)
+                    f'{front.best.leading:.2g} a cycle', fontsize=11)
     image = io.BytesIO()
     figure.savefig(image, dpi=120, format='png')
     pyplot.close(figure)
@@ -233,18 +233,18 @@ def _parser() -> Parser:
 
 def table(front: Front) -> str:
     """Say what was chosen, in lines of a name, a value and a unit."""
-    args, space = front.args, front.space
-    parameters = args.preset.network.as_dict()
+    best, space = front.best, front.space
+    parameters = best.preset.network.as_dict()
     rows = []
     for variable in space.variables:
         members = variable.members if len(variable.members) == 2 else (variable.name,)
         rows.append((' = '.join(members), f'{parameters[variable.members[0]]:.4f}',
                      '' if variable.free else 'given'))
-    rows.append(('phase errors', ', '.join(f'{error:.3f}' for error in args.errors), 'degrees'))
-    rows.append(('period', f'{args.orbit.period:.4f}', 'model time'))
-    rows.append(('leading multiplier', f'{args.leading:.4f}', 'a cycle'))
-    if args.orbit.waves.max():
-        rows.append(('waveforms differ by', f'{args.differences[0]:.3f}', 'of their RMS'))
+    rows.append(('phase errors', ', '.join(f'{error:.3f}' for error in best.errors), 'degrees'))
+    rows.append(('period', f'{best.orbit.period:.4f}', 'model time'))
+    rows.append(('leading multiplier', f'{best.leading:.4f}', 'a cycle'))
+    if best.orbit.waves.max():
+        rows.append(('waveforms differ by', f'{best.differences[0]:.3f}', 'of their RMS'))
     width, middle = (max(len(row[k]) for row in rows) for k in (0, 1))
     lines = [f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
              f'{len(front.scores)} on the Pareto front; chosen:']
@@ -267,7 +267,7 @@ def _optimize(args: argparse.Namespace) -> int:
                          islands=args.islands, executor=executor)
     write_front(args.out / 'front.csv', front)
     draw_front(args.out / 'front.png', front)
-    write_presets(args.out / 'preset.yaml', front.space.network, {name: front.args.preset},
+    write_presets(args.out / 'preset.yaml', front.space.network, {name: front.best.preset},
                   f'Found by: {args.command}')
     say(f'{table(front)}\n'
         f'written: front.csv, front.png and preset.yaml (preset {name}) in {args.out}')

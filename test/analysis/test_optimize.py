@@ -63,7 +63,7 @@ def written(tmp_path_factory):
 
 
 def test_it_finds_the_walk(found):
-    args = found.args
+    args = found.best
     assert len(found.tried) <= 24 * 4
     assert args.errors.max() <= 1.0
     assert args.leading < 1.0
@@ -77,7 +77,7 @@ def test_it_finds_the_walk(found):
 
 
 def test_the_chosen_set_is_the_best_of_a_front_that_nothing_dominates(found):
-    assert found.scores[0].network == found.args.preset.network
+    assert found.scores[0].network == found.best.preset.network
     exact = np.array([one.objectives for one in found.tried if one.exact])
     for score in found.scores:
         assert score.exact and score.shortfall == 0.0
@@ -93,7 +93,7 @@ def test_the_executable_writes_what_the_function_finds(found, written):
         'front.csv', 'front.png', 'preset.yaml']
     presets = read_presets(out / 'preset.yaml', Biped)
     # The same seed in another process: the very same set.
-    assert presets == {'my_walk': found.args.preset}
+    assert presets == {'my_walk': found.best.preset}
     assert '--seed' not in process.stdout
     for what in ('w_a', 'phase errors', 'leading multiplier', 'period', 'degrees', 'my_walk'):
         assert what in process.stdout
@@ -117,8 +117,8 @@ def test_the_front_is_a_table_with_units(found, written):
     assert len(rows) == len(found.scores)
     assert all(name.endswith(']') or name == 'chosen' for name in rows[0])
     assert [row['chosen'] for row in rows] == ['1'] + ['0'] * (len(rows) - 1)
-    assert float(rows[0]['w_a [1]']) == found.args.preset.network.w_21
-    assert float(rows[0]['period [model time]']) == pytest.approx(found.args.orbit.period,
+    assert float(rows[0]['w_a [1]']) == found.best.preset.network.w_21
+    assert float(rows[0]['period [model time]']) == pytest.approx(found.best.orbit.period,
                                                                   abs=1e-5)
 
 

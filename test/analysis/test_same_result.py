@@ -49,7 +49,7 @@ def weights(executor):
     front = optimise('biped', 'walk', population=10, generations=4, seed=3, fixed=FIXED,
                      progress=False, islands=2, executor=executor)
     return ([(one.network, tuple(one.objectives)) for one in front.tried],
-            front.args.preset.network, front.args.orbit.period)
+            front.best.preset.network, front.best.orbit.period)
 
 
 @pytest.mark.no_cover

@@ -103,8 +103,8 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
         curve: its points in fractions of the ranges, and orbits beside them.
 
     """
-    args = np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(curve)).astype(int))
-    for fraction, beside in (curve[k] for k in args):
+    indices = np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(curve)).astype(int))
+    for fraction, beside in (curve[k] for k in indices):
         plane.last = beside
         try:
             orbit = plane.orbit(fraction)

@@ -436,8 +436,8 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
     if t.size > LONGEST:
         # At random, as sampling that stays regular would hide harmonics.
         edges = np.linspace(0, t.size, LONGEST + 1).astype(int)
-        args = np.random.default_rng(0).integers(edges[:-1], edges[1:])
-        t, signals = t[args], signals[args]
+        indices = np.random.default_rng(0).integers(edges[:-1], edges[1:])
+        t, signals = t[indices], signals[indices]
     x = signals - signals.mean(axis=0)
     channels, power = np.ascontiguousarray(x.T), float(np.mean(x * x))
 

@@ -252,12 +252,12 @@ def best_stretch(found: list[Stretch]) -> Stretch:
 
     Of half a period cycles are more, but they differ; the multiple is then taken.
     """
-    args = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
+    best = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
     for times in (2, 3):
         for one in found:
-            if (abs(one.period / args.period / times - 1.0) < NEAR / 2
-                    and not one.outside(args.begin, args.end)
-                    and one.end - one.begin >= LASTING * (args.end - args.begin)
-                    and one.difference < BETTER * (args.difference - LESS)):
+            if (abs(one.period / best.period / times - 1.0) < NEAR / 2
+                    and not one.outside(best.begin, best.end)
+                    and one.end - one.begin >= LASTING * (best.end - best.begin)
+                    and one.difference < BETTER * (best.difference - LESS)):
                 return one
-    return args
+    return best

@@ -275,13 +275,13 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     if set(legs) != set(own):
         raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
                          f'{", ".join(own)}')
-    args, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
+    usable, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
     times = recording.times
-    names = [name for name in recording.joints if any(name in one for one in args.values())]
+    names = [name for name in recording.joints if any(name in one for one in usable.values())]
     rough, others = _regions(times, positions, source)
     notes += others
     within = index_range(times, rough.begin, rough.end)
-    names, args, full = with_angles(names, args, positions[within], source, notes)
+    names, usable, full = with_angles(names, usable, positions[within], source, notes)
     positions = positions[:, full]
     warp = estimate_phase(times, positions, rough)
     if warp.cycles < CYCLES:
@@ -291,11 +291,11 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
     # Of the rough stretch, strides that differ at its ends were left out.
-    names, args, full = with_angles(names, args, x, source, notes)
+    names, usable, full = with_angles(names, usable, x, source, notes)
     x = x[:, full]
     try:
         found = average_cycles(phases, x, theta,
-                               [names.index(name) for name in args[next(iter(own))]])
+                               [names.index(name) for name in usable[next(iter(own))]])
     except InputError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
@@ -309,7 +309,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     # A leg's phase is that of its first cell.
     leading = {leg: tuple(name for name in listed
                           if cells is None or cells.get(name) == own[leg][0]) or listed
-               for leg, listed in args.items()}
+               for leg, listed in usable.items()}
     ahead, by_legs, vague, opposite = leg_phases(leading, c)
     contacts = None if loads is None else foot_contacts(
         loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
@@ -323,7 +323,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
               *check_angles(names, mean), *check_legs(vague),
               *check_sway(ahead, mean),
               *check_change(phases, x, leading, names),
-              *check_travel(args, c, kind.girdles, opposite)]
+              *check_travel(usable, c, kind.girdles, opposite)]
     if warp.cycles < SURE:
         issues.append(QualityIssue('', FEW_CYCLES))
     if cells is not None and gains is not None and len(gait.alike) > 1:
@@ -343,7 +343,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                   gait.nearest, gait.alike, gait.distance, gait.margin,
                   gait.sure * float(np.prod([one.left for one in issues])),
                   tuple(one.message for one in issues if one.message),
-                  (*notes, *by_legs, *limping(args, c), *gait.notes),
+                  (*notes, *by_legs, *limping(usable, c), *gait.notes),
                   replace(warp, phases=warp.phases - found.zero), contacts)
 
 

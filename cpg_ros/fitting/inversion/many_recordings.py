@@ -85,11 +85,11 @@ class Task:
 
 def read(path: Path, settings: FitSettings) -> Recording:
     """Read a recording of any format, by those of the options that it has."""
-    args, robot = format_of(path), settings.robot
+    kind, robot = format_of(path), settings.robot
     return read_recording(
-        path, args.name, progress=False,
+        path, kind.name, progress=False,
         robot_joints=[joint.name for joint in robot.joints] if robot else (),
-        **{name: value for name, value in settings.reading.items() if not args.refusal(name)})
+        **{name: value for name, value in settings.reading.items() if not kind.refusal(name)})
 
 
 def invert_recording(task: Task) -> dict[str, Any]:

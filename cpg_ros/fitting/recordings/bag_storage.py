@@ -141,15 +141,15 @@ class Bag:
             there = ', '.join(f'{topic} ({", ".join(sorted(types[topic]))})'
                               for topic in list(types)[:6])
             raise RecordingError(f'{self.path}: no topic of type {JOINT_STATE}; it has {there}')
-        args = [topic if topic in types else '/' + topic.lstrip('/') for topic in topics]
-        for topic in args:
+        resolved = [topic if topic in types else '/' + topic.lstrip('/') for topic in topics]
+        for topic in resolved:
             if topic not in types:
                 raise RecordingError(f'{self.path}: no topic {topic!r}; '
                                      f'there are {abbreviate(list(types), 20)}')
             if topic not in fitting:
                 raise RecordingError(f'{self.path}, {topic}: {" and ".join(sorted(types[topic]))}'
                                      f', where {JOINT_STATE} is needed')
-        return list(dict.fromkeys(args)) or fitting
+        return list(dict.fromkeys(resolved)) or fitting
 
     def expected(self) -> Counter[str]:
         """Return the number of messages of each topic in the bag's metadata."""
@@ -163,8 +163,9 @@ class Bag:
         read: Counter[str] = Counter()
         unpacked = UnpackedSize(self.size)
         for reader in self.readers:
-            args = [one for one in reader.connections if one.topic in topics]
-            for some in [[one] for one in args] if self.apart else [args] * bool(args):
+            connections = [one for one in reader.connections if one.topic in topics]
+            for some in [[one] for one in connections] if self.apart else (
+                    [connections] * bool(connections)):
                 try:
                     for connection, received, message in reader.messages(some):
                         if not isinstance(received, int) or not isinstance(message, bytes):

@@ -76,17 +76,17 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
         angles = np.radians(rows[:, turning])
         angles[~(np.abs(angles) <= FARTHEST)] = np.nan
         moving = [k for k, column in enumerate(angles.T) if not (column == column[0]).all()]
-    args = ([names.index(name) for name in matching(joints, names, str(path))] if joints
+    columns = ([names.index(name) for name in matching(joints, names, str(path))] if joints
               else moving)
-    if not args:
+    if not columns:
         raise RecordingError(f'{path}: no joint moves in {pluralize(len(rows), "frame")}')
     if not joints and len(moving) < len(names):
         notes.append(f'{pluralize(len(names) - len(moving), "channel")} left out: no motion')
-    for k in args:
+    for k in columns:
         there = np.isfinite(angles[:, k])
         angles[there, k] = np.unwrap(angles[there, k])
     stamps = np.rint(np.arange(len(rows)) * interval * 1e9).astype(np.int64)
-    found = merged([(stamps, [names[k] for k in args], angles[:, args])],
+    found = merged([(stamps, [names[k] for k in columns], angles[:, columns])],
                    printable(str(path)))
     return replace(found, notes=(*notes, *found.notes))
 

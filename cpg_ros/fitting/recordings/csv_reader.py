@@ -222,7 +222,7 @@ class _Table:
                      for column in columns if (match := POSITION.match(column.joint))]
         named = {column.index: column for column in (*columns, *positions)}
         if wanted:
-            args = []
+            matches = []
             for pattern in wanted:
                 fitting = [column for column in named.values() if any(
                     pattern == name or fnmatchcase(name, pattern)
@@ -230,8 +230,8 @@ class _Table:
                 if not fitting:
                     raise RecordingError(f'{self.path}: no column {pattern!r}; there are '
                                          f'{abbreviate([one.header for one in columns], 40)}')
-                args += fitting
-            columns = list(dict.fromkeys(args))
+                matches += fitting
+            columns = list(dict.fromkeys(matches))
         else:
             others += [one.header for one in columns] if positions else []
             columns = positions or columns

@@ -191,11 +191,11 @@ def _of_track(lines: list[str], layout: _Layout, path: Path, individual: str | N
     split = [_cells(line) for line in lines]
     tracks = list(dict.fromkeys(cells[at] for cells in split if len(cells) > at))
     _require(individual, tracks, path)
-    args = individual if individual is not None else (tracks or [''])[0]
+    animal = individual if individual is not None else (tracks or [''])[0]
     frames: set[str] = set()
     kept = []
     for number, cells in enumerate(split, layout.line):
-        if len(cells) > max(at, layout.frame) and cells[at] != args:
+        if len(cells) > max(at, layout.frame) and cells[at] != animal:
             kept.append('\n')
             continue
         frame = cells[layout.frame] if len(cells) > layout.frame else ''

@@ -65,17 +65,17 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
     counts: Counter[str] = Counter()
     with opened(path) as bag:
         there = {one.topic: one for one in bag.connections}
-        args = [node.resolve_topic_name(one) for one in wanted] or list(there)
-        for topic in args:
+        names = [node.resolve_topic_name(one) for one in wanted] or list(there)
+        for topic in names:
             if topic not in there:
                 raise RecordingError(f'{path}: no topic {topic!r}; there are {", ".join(there)}')
-        publishers = {topic: _publisher(node, there[topic]) for topic in args}
+        publishers = {topic: _publisher(node, there[topic]) for topic in names}
         _wait_for_listeners(node, list(publishers.values()))
         expected = bag.expected()
-        with progress_bar(f'playing {path.name}', max(1, sum(expected[one] for one in args))
+        with progress_bar(f'playing {path.name}', max(1, sum(expected[one] for one in names))
                           ) as bar:
             start, began = None, time.monotonic()
-            for done, (topic, received, message) in enumerate(bag.messages(args)):
+            for done, (topic, received, message) in enumerate(bag.messages(names)):
                 start = received if start is None else start
                 while (left := began + (received - start) * 1e-9 / rate - time.monotonic()) > 0.0:
                     rclpy.spin_once(node, timeout_sec=min(left, 0.05))

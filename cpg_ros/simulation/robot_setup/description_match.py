@@ -203,11 +203,11 @@ def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
     near = _nearest(robot, known)
     joints = tuple(JointCheck(joint, known.joints.get(joint.name), tuple(
         _faults(joint, known, near.get(joint.name, '')))) for joint in robot.joints)
-    args = [(network, name) for network in robot.networks for name in
+    pairs = [(network, name) for network in robot.networks for name in
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
     return RobotCheck(*names, known.format, joints, tuple(
-        _gait(robot, known, network, name, frequency, amplitude) for network, name in args),
-        tuple(_lopsided(robot)), tuple(_shape(robot, known, args, geometry)),
+        _gait(robot, known, network, name, frequency, amplitude) for network, name in pairs),
+        tuple(_lopsided(robot)), tuple(_shape(robot, known, pairs, geometry)),
         (*notes, *_notes(robot, known)))
 
 
