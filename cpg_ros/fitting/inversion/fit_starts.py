@@ -39,7 +39,7 @@ LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.
 TINY = 1e-3
 #: Fewest and most starts beside the network's own values; and how far apart two minima are, each
 #: number over its size.
-LEAST, MOST, APART = 1, 2, 0.03
+LEAST, MOST, APART = 2, 3, 0.03
 
 
 def distinct(one: np.ndarray, other: np.ndarray) -> bool:

@@ -87,13 +87,13 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
     readout = readout or GaitReadout.of(type(network), gait)
     first, known = '', tuple(free) or network.free
 
-    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]],
-               profiles: bool = True) -> tuple[Fit, tuple[str, ...]]:
+    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]]
+               ) -> tuple[Fit, tuple[str, ...]]:
         if not names:
             # Phases are known beforehand, and no other parameter shows.
             return _as_it_is(cycle, cells, network, gait, lower, readout, done), ()
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
-                      profiles=profiles, done=done), ()
+                      done=done), ()
 
     for names, lower, begins, relaxation in _ways(known, order, starts):
         try:
@@ -123,16 +123,15 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit with legs that stand as the cells do, unless the recording tells another duty."""
     try:
-        # Intervals take most of the time, and mostly this is not the fit that is returned.
-        other, _ = fitted((*names, GAIT_DUTY), order, (), False)
+        other, _ = fitted((*names, GAIT_DUTY), order, ())
     except NoOrbit:
         return fitted(names, order, ())
-    own, _ = fitted(names, order, [dict(zip(names, one.values.tolist(), strict=False))
-                                    for one in other.minima])
+    own, _ = fitted(names, order, [{}, *(dict(zip(names, one.values.tolist(), strict=False))
+                                         for one in other.minima)])
     sizes = np.array(list(other.sizes.values()))[:, None]
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
     if rise > 0.5 * ASKED**2 * other.sharing:
-        return fitted((*names, GAIT_DUTY), order, ())
+        return other, ()
     error = other.parameters[GAIT_DUTY].stderr
     return own, () if error < KNOWN else (
         'the recording does not tell how long legs stand: they are taken to stand as the cells of '
