@@ -306,7 +306,8 @@ class BalanceLoop(SensorLoop):
         inputs.update(now, pattern.enabled)
         found, self.waiting = inputs.faults(now)
         pattern.failed = bool(found)
-        found += [f'{inputs.monitors[one].name}: {why}' for one, why in pattern.doubts.items()]
+        found += [f'{inputs.feet if one == FEET else inputs.monitors[one].name}: {why}'
+                  for one, why in list(pattern.doubts.items())]
         self.faults = '; '.join(found)
         measured, sensors = inputs.sensor_data, self._sensors
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
