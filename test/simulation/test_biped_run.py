@@ -71,7 +71,7 @@ def test_the_cost_of_transport_counts_all_motors_and_no_work_that_joints_give_ba
         work.append(power[power > 0.0].sum() * run.dt)
 
     monkeypatch.setattr(body, 'step', counted)
-    found = run.run(3.0, ((0.5, 0.4, 0.0, 0.0),), seed=7)
+    found = run.run(5.0, ((0.5, 0.4, 0.0, 0.0),), seed=7)
     distance = math.dist(found.path[-1, 1:3], found.path[0, 1:3])
     assert found.cost == pytest.approx(sum(work) / (9.81 * body.mass * distance))
 
