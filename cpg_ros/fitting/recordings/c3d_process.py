@@ -57,7 +57,7 @@ def read_apart(path: Path, size: int) -> tuple[dict[str, Any], np.ndarray, np.nd
         UnreadableC3D: the library refuses the file, crashes, or exceeds a limit.
 
     """
-    package = str(Path(__file__).resolve().parents[2])
+    package = str(Path(__file__).resolve().parents[3])
     others = os.environ.get('PYTHONPATH', '')
     seconds = TIME + TIME_PER_BYTE * size
     with TemporaryDirectory(prefix='cpg_ros-') as folder:
