@@ -247,7 +247,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
     fleet = ResilientExecutor(*connect(ANSWERS), again, close)
     if where := exposed(address, *own):
         say(f'warning: the scheduler at {where} can be reached from other machines without TLS: '
-            'whoever reaches it can run any program on its workers and here')
+            'anyone who can reach it can run any program on its workers and here')
     try:
         _workers_checked(held[0], address)
     except NoCluster:

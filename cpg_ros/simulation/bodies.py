@@ -138,7 +138,7 @@ class BatchPhysics:
         return self._models[key]
 
 
-# Many runs at once, open loop: what a program publishes, and bodies that follow it on all cores.
+# Many runs at once, open loop: what a plan publishes, and bodies that follow it on all cores.
 
 #: Runs whose states are kept at the same time.
 TOGETHER = 12

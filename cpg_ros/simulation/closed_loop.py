@@ -81,7 +81,7 @@ class PatternBatch:
 
     def __init__(self, plans: Mapping[str, GaitPlan], tables: Sequence[Timetable],
                  scenarios: Sequence[Scenario], dt: float) -> None:
-        """Stand; the first program is the one that all runs begin with."""
+        """Stand; the first plan is the one that all runs begin with."""
         self._programs, self._names, self._dt = list(plans.values()), list(plans), dt
         robot, runs = self._programs[0].robot, len(scenarios)
         self._gaits = _Gaits(
@@ -179,7 +179,7 @@ class ClosedLoopBatch(BatchPhysics):
 
     def __init__(self, name: str, *plans: GaitPlan, timestep: float = 0.002,
                  threads: int = 1, kp: float | None = None, kd: float | None = None) -> None:
-        """Load the model of the programs' robot; name, kp and kd as of ``robot_model.load``.
+        """Load the model of the plans' robot; name, kp and kd as of ``robot_model.load``.
 
         Raises:
             SimulationError: MuJoCo is missing, or the model cannot be used.

@@ -112,7 +112,7 @@ class BalancedPattern(Pattern):
         """Do nothing: feet are placed for the wished speed."""
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
-        """Change to a program; with feedback at once, whatever the transition."""
+        """Change to a plan; with feedback at once, whatever the transition."""
         if self.balance is None:
             super().apply(plan, transition)
         else:

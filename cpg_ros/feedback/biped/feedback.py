@@ -93,7 +93,7 @@ class BipedFeedback:
 
         Args:
             robot: whose robot file has the part ``biped``.
-            gains: of the laws in the program's gait; the robot file's if not given.
+            gains: of the laws in the plan's gait; the robot file's if not given.
             plan: gait whose orbit is the clock; the walk of the robot's first network if not
                 given.
 
