@@ -37,7 +37,7 @@ TARGETS = {'real_time_factor_error': 0.01}
 #: The node with its periods' delays kept: a line on standard output at its end.
 MEASURED = """
 import sys
-from cpg_ros.ros import deadline_thread as ticker
+from cpg_ros.ros.node import ticker
 from cpg_ros.ros.robot_sim import main
 delays, stalled = [], ticker.Ticker._stalled
 def noted(self, behind, period):

@@ -33,12 +33,13 @@ from common import emit, log, ROOT
 from cpg_ros import read_recording
 from cpg_ros.common.errors import CpgError
 from cpg_ros.fitting.inversion.gait_schedule import fit_stretches, StretchFit
-from cpg_ros.fitting.inversion.recording_fit import ORDERS
 from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.simulation.robot_model import find_model
 import mujoco
 import numpy as np
 
+#: Orders of the readout that are compared.
+ORDERS = (1, 2, 3)
 #: Joints of a G1 in LAFAN1's order, 30 frames a second.
 G1 = tuple(f'{side}_{joint}_joint' for side in ('left', 'right') for joint in (
     'hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll'))

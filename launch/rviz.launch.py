@@ -21,6 +21,7 @@ its robot file and its URDF: robot:=$PWD/my_robot.yaml urdf:=$PWD/my.urdf.
 from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from cpg_ros.common.files import resource_folder
 from cpg_ros.motion.description import load_urdf
 from cpg_ros.ros.launch_arguments import value
 from launch import LaunchDescription
@@ -39,9 +40,9 @@ from launch_ros.parameter_descriptions import ParameterValue
 
 SHARE = Path(__file__).resolve().parent.parent
 ARGUMENTS = {
-    'urdf': (str(SHARE / 'urdf' / 'quadruped.urdf'), 'URDF of the robot'),
+    'urdf': (str(resource_folder('urdf') / 'quadruped.urdf'), 'URDF of the robot'),
     'rviz': ('true', 'start rviz2; false for robot_state_publisher only'),
-    'rviz_config': (str(SHARE / 'rviz' / 'cpg.rviz'), 'configuration of rviz2'),
+    'rviz_config': (str(resource_folder('rviz') / 'cpg.rviz'), 'configuration of rviz2'),
 }
 
 

@@ -74,7 +74,7 @@ def resource_folder(kind: str) -> Path:
     """Return a folder of files that the package ships: in the sources, or in share/cpg_ros.
 
     Args:
-        kind: ``config``, ``urdf`` or ``models``.
+        kind: ``config``, ``urdf``, ``rviz`` or ``models``.
 
     Raises:
         FileNotFoundError: the installation is incomplete.

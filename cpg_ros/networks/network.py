@@ -26,11 +26,14 @@ from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.networks import presets as preset_files
-from cpg_ros.networks.definition import leg_count, NetworkDefinition
+from cpg_ros.networks.definition import leg_count, NetworkDefinition, Range
 from cpg_ros.networks.equations import Field, values_of
 from cpg_ros.networks.leg_numbers import unpickle
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+
+#: What a file of one's own network imports from here.
+__all__ = ['Network', 'Preset', 'Range', 'known']
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
 Preset: TypeAlias = preset_files.Preset['Network']

@@ -63,14 +63,14 @@ def written(tmp_path_factory):
 
 
 def test_it_finds_the_walk(found):
-    args = found.best
+    best = found.best
     assert len(found.tried) <= 24 * 4
-    assert args.errors.max() <= 1.0
-    assert args.leading < 1.0
-    assert args.preset.network.as_dict().items() >= FIXED.items()
-    assert args.orbit.residual < 1e-8
+    assert best.errors.max() <= 1.0
+    assert best.leading < 1.0
+    assert best.preset.network.as_dict().items() >= FIXED.items()
+    assert best.orbit.residual < 1e-8
     # The walk of Table 5: 0 1/2 1/2 0, exactly.
-    x = polish.orbit_signals(args.orbit, 64)[:, :4]
+    x = polish.orbit_signals(best.orbit, 64)[:, :4]
     assert x[:, 3] == pytest.approx(x[:, 0], abs=1e-12)
     assert x[:, 1] == pytest.approx(np.roll(x[:, 0], 32), abs=1e-9)
     assert x[:, 2] == pytest.approx(x[:, 1], abs=1e-12)
@@ -206,7 +206,7 @@ def test_nothing_is_left_half_written(found, tmp_path):
     target.write_text('before')
     with pytest.raises(AttributeError):
         # The header is written before this is missed.
-        write_front(target, replace(found, args=None))
+        write_front(target, replace(found, best=None))
     assert target.read_text() == 'before'
     assert [file.name for file in tmp_path.iterdir()] == ['front.csv']
 

@@ -304,4 +304,4 @@ def test_the_rooms_that_take_an_executor_do_not_know_dask():
     root = Path(cpg_ros.__file__).parent
     naming = [file.relative_to(root).parts[0] for file in root.rglob('*.py')
               if 'from distributed' in file.read_text()]
-    assert set(naming) == {'fleet'}
+    assert set(naming) == {'common'}

@@ -42,7 +42,8 @@ from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
-NAMES = tuple(network.name for network in shipped())
+NAMES = tuple(network.name for network in shipped()
+              if network.name not in ('delayed', 'quadruped', 'biped'))
 ALL = [(network, gait) for network in NAMES for gait in PRESETS[network]]
 HEXAPODS = [(f'{network}6', gait) for network in NAMES for gait in ('tripod', 'ripple', 'wave')]
 LEGS = ('lh', 'rh', 'lf', 'rf')

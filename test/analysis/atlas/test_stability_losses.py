@@ -43,7 +43,8 @@ def curve():
 
 def test_a_gait_is_lost_as_the_closed_form_says(curve):
     network = find_network(FILE)
-    assert curve[1].kind == 'torus' and str(curve[1]) == 'torus of hop (soft and hard)'
+    assert curve[1].kind == 'torus'
+    assert str(curve[1]) == 'torus of hop (supercritical and subcritical)'
     losses = curve[1].losses
     assert len(losses) == 5
     for loss in losses:

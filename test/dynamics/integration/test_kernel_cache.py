@@ -107,8 +107,8 @@ def test_the_first_start_of_another_network_leaves_what_is_compiled(copied):
 
 
 ONE = """
-from cpg_ros.dynamics.integration.compilation import entry
-@entry
+from cpg_ros.dynamics.integration.compilation import jit_entry
+@jit_entry
 def doubled(x):
     return 2.0 * x
 assert doubled(1.0) == 2.0

@@ -30,8 +30,8 @@ from cpg_ros.simulation.tuning.feedback import Benefit, judge_feedback
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(feedback, 'PUSHES', 8)
-    monkeypatch.setattr(feedback, 'IMPULSES', (0.6,))
+    monkeypatch.setattr(feedback, 'BENEFIT_PUSHES', 8)
+    monkeypatch.setattr(feedback, 'BENEFIT_IMPULSES', (0.6,))
     monkeypatch.setattr(feedback, 'WALKED', 3.0)
 
 
@@ -62,13 +62,13 @@ def test_one_survivor_more_does_not_say_that_it_helps(survived, without, lost, h
 
 def test_it_is_judged_on_late_and_noisy_sensors(quick, monkeypatch):
     seen = []
-    run = feedback.ClosedLoop.run
+    run = feedback.ClosedLoopBatch.run
 
     def record(self, *arguments, noise=None, **options):
         seen.append(noise)
         return run(self, *arguments, noise=noise, **options)
 
-    monkeypatch.setattr(feedback.ClosedLoop, 'run', record)
+    monkeypatch.setattr(feedback.ClosedLoopBatch, 'run', record)
     monkeypatch.setattr(feedback, 'WALKED', 0.5)
     monkeypatch.setattr(feedback, 'WATCHED', 0.5)
     judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)

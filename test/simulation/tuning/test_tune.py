@@ -75,7 +75,8 @@ def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
 
 @pytest.fixture
 def hardly_pushed(monkeypatch):
-    for name, value in (('PUSHES', 1), ('UNDISTURBED', 1), ('WALKED', 0.5), ('WATCHED', 0.5)):
+    for name, value in (('BENEFIT_PUSHES', 1), ('UNDISTURBED', 1), ('WALKED', 0.5),
+                        ('WATCHED', 0.5)):
         monkeypatch.setattr(feedback, name, value)
 
 
