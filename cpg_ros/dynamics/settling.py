@@ -126,14 +126,16 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
         under = run(between)[:, cell] < middle
         low, high = np.where(under, between, low), np.where(under, high, between)
     states = run(high)
-    size = np.ptp(run.x[half:], axis=0).max()
-    gaps = np.abs(states[:-1] - states[-1]).max(axis=1) / size
+    # Each variable has a unit of its own.
+    size = np.ptp(run.x[half:], axis=0).reshape(-1, cells).max(axis=1).repeat(cells)
+    states = states / np.where(size > 0.0, size, 1.0)
+    gaps = np.abs(states[:-1] - states[-1]).max(axis=1)
     if gaps.min() > RETURNED:
         return None
     back = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
     period = float(high[-1] - high[back])
     same = states[::back - len(gaps)]
-    drift = float(np.abs(same - same[0]).max() / size) if len(same) > 2 else np.inf
+    drift = float(np.abs(same - same[0]).max()) if len(same) > 2 else np.inf
     cycles = min(AVERAGED, int(high[-1] / period))
     times = high[-1] + period * (np.arange(cycles * POINTS) / POINTS - cycles)
     signals = run(times).reshape(cycles, POINTS, -1).mean(axis=0)

@@ -169,7 +169,9 @@ class FeedbackTrial:
                  ) -> np.ndarray:
         found = np.zeros(len(scenarios), dtype=bool)
         for k, delay in enumerate(DELAYS):
-            some = slice(k, None, len(DELAYS))
+            some = slice(k, len(scenarios), len(DELAYS))
+            if not scenarios[some]:
+                continue
             found[some] = self.loop.run(scenarios[some], duration, gains,
                                         noise=replace(SENSORS, delay=delay)).upright
         return found
