@@ -110,7 +110,7 @@ def main() -> int:
                             standing=True)
     deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
     diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf,
-                              '~/enable')
+                              lambda: '', lambda: '')
     node.create_service(SetBool, '~/enable', lambda request, response: response)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

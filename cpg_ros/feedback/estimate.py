@@ -363,6 +363,8 @@ class Odometry:
         last speed are standard deviations: the error grows with the time, its variance with the
         square of that.
         """
+        if not self._started:
+            return
         before = self._unseen
         self._unseen += dt
         added = (UNSEEN**2 + self.twist[0]**2 + self.twist[1]**2) * (self._unseen**2 - before**2)

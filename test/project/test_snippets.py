@@ -80,6 +80,8 @@ def test_blocks_that_need_ros_say_so_and_name_what_is_there(page):
     assert set(re.findall(r'ros2 run cpg_ros (\w+)', text)) <= points
     for launch, words in re.findall(r'ros2 launch cpg_ros (\w+\.launch\.py)([^`\n]*)', text):
         source = (ROOT / 'launch' / launch).read_text()
+        if 'GENERATOR' in source:
+            source += (ROOT / 'cpg_ros' / 'ros' / 'launch_arguments.py').read_text()
         known = {node.value for node in ast.walk(ast.parse(source))
                  if isinstance(node, ast.Constant)}
         assert set(re.findall(r'([\w.]+):=', words)) <= known, launch
