@@ -78,7 +78,8 @@ class BalancedPattern(Pattern):
         falls: how often it fell.
         ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
         failed: whether an input is out.
-        doubts: input -> how it contradicts the others, until the pattern is enabled anew.
+        doubts: input -> how it contradicts the others, until the pattern is enabled
+            anew, or the robot falls.
         refused: whether messages arrive, but none of an input has been valid yet.
         crouching: whether it holds the crouch or is on its way into it.
 
@@ -331,3 +332,6 @@ class BalancedPattern(Pattern):
         self.crouching = False
         self.falls += 1
         self.fallen = True
+        # A fall contradicts everything: inputs are judged anew once the robot is on its feet.
+        self.doubts.clear()
+        self._contrary = 0.0
