@@ -163,8 +163,9 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
 #: Length of an orientation, from 1; rad/s; m/s^2 within TELLING, in s.
 UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
 #: How far orientation and the sum of angular velocities may part, rad, within a time in s, and
-#: the longest gap between messages over which they are compared, s.
-APART, FORGET, GAP = 0.15, 0.2, 0.05
+#: the longest gap between messages over which they are compared, s; and how far they part from one
+#: message to the next where the base has been put elsewhere, rad.
+APART, FORGET, GAP, LEAP = 0.15, 0.2, 0.05, 0.3
 #: Orientation and angular velocity contradict each other where this share of their motion differs,
 #: until it is below the second one, averaged over a time in s, and where they move, rad.
 DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
@@ -204,7 +205,13 @@ def _contradicts(up, turning, memory):
     # What stands still in the world turns the other way in the base's frame.
     turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
               up[0] * turning[1] - up[1] * turning[0])
-    known, parted, moved = memory[17] > 0.0 and dt < GAP, 0.0, 0.0
+    known, parted, moved, leap = memory[17] > 0.0 and dt < GAP, 0.0, 0.0, 0.0
+    for k in range(3):
+        leap += (up[k] - memory[3 + k] - dt * turned[k])**2
+    # A base that is put elsewhere says nothing about the IMU: compare anew from here on.
+    leaps = known and leap > LEAP**2
+    if leaps:
+        known, memory[12], memory[13], memory[19] = False, 0.0, 0.0, 0.0
     stays = 1.0 - min(dt / FORGET, 1.0)
     for k in range(3):
         stated = stays * memory[6 + k] + up[k] - memory[3 + k]
@@ -221,7 +228,7 @@ def _contradicts(up, turning, memory):
             memory[19] = 1.0
         elif memory[12] < AGREE * memory[13]:
             memory[19] = 0.0
-    return memory[19] > 0.0 or math.sqrt(parted) > APART
+    return leaps or memory[19] > 0.0 or math.sqrt(parted) > APART
 
 
 @jit

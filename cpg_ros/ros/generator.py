@@ -458,8 +458,12 @@ class Generator(StartedNode):
         return response
 
     def _commanded(self) -> np.ndarray | None:
-        """Return the angles that were sent last, rad, or None while none are sent."""
-        return None if self.ticker.waiting or self._sent is None else self._sent.copy()
+        """Return the angles that joints should be at, rad, or None while there are none."""
+        # What balances a biped sends torques as angles, q + tau / kp.
+        torques = isinstance(self.pattern, BalancedPattern) and self.pattern.balancing
+        if self.ticker.waiting or self._sent is None or torques:
+            return None
+        return self._sent.copy()
 
     def _lag(self, reason: str) -> None:
         """Switch the feedback off while a joint does not follow: it would correct by it."""

@@ -106,7 +106,12 @@ def test_it_walks_by_cmd_vel_survives_a_push_falls_and_is_reset(stage):
     stage.body.wait_for('the robot has fallen')
     stage.watcher.call(Trigger, '/robot_sim/reset', Trigger.Request())
     stage.body.wait_for('standing at the origin')
+    stage.drive(0.3)
+    stage.pass_time(4.0)
+    assert stage.pass_time(0.6) == pytest.approx(0.3, abs=0.06)
     assert len(re.findall('the robot has fallen', stage.body.log)) == 1
+    # Joints that lay on the ground follow again.
+    until(lambda: stage.watcher.diagnostics[-1].message == 'running', 'all joints to follow')
     # What is held is measured, too.
     assert 'waist_joint' in stage.watcher.names
 

@@ -303,7 +303,7 @@ class BalanceLoop(SensorLoop):
         if not self.wanted:
             pattern.balance = None
             return
-        inputs.update(now, pattern.enabled and pattern.balancing)
+        inputs.update(now, pattern.enabled)
         found, self.waiting = inputs.faults(now)
         pattern.failed = bool(found)
         found += [f'{inputs.feet if one == FEET else inputs.monitors[one].name}: {why}'
