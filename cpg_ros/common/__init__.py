@@ -17,5 +17,5 @@
 Imports nothing of the package; knows nothing of ROS.
 """
 
-__all__ = ['cache_folder', 'command_line', 'errors', 'files', 'jobs', 'report_page', 'workers',
-           'yaml_reader']
+__all__ = ['c_library', 'cache_folder', 'command_line', 'errors', 'files', 'jobs', 'report_page',
+           'workers', 'yaml_reader']

@@ -23,15 +23,10 @@ from collections.abc import Iterator, Sequence
 import ctypes
 from functools import cache
 import hashlib
-import os
-from pathlib import Path
 import platform
-import shutil
-import subprocess
-import tempfile
 
-from cpg_ros.common.cache_folder import writing
-from cpg_ros.common.errors import CpgError, InputError, needed
+from cpg_ros.common.c_library import load
+from cpg_ros.common.errors import InputError, needed
 from cpg_ros.dynamics.integration import kernel
 from cpg_ros.dynamics.integration.c_text import FOLDER, part
 from cpg_ros.dynamics.integration.compilation import COMPILED
@@ -41,30 +36,9 @@ from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
 import numpy as np
 
-OPTIONS = ('-std=c99', '-O2', '-shared', '-fPIC')
-COMPILERS = ('cc', 'gcc', 'clang')
 MOST_NODES = 2**15 - 1
 #: By which kernels are made: numba where it is installed, else C.
 KERNELS = ('auto', 'numba', 'c')
-
-
-class NoCompiler(CpgError):
-    """The system has no C compiler that works."""
-
-
-def compiler() -> str:
-    """Return the C compiler: that of the environment's ``CC``, or one of the usual names.
-
-    Raises:
-        NoCompiler: there is none.
-
-    """
-    wanted = (os.environ['CC'],) if os.environ.get('CC') else COMPILERS
-    for name in wanted:
-        if shutil.which(name) is not None:
-            return name
-    raise NoCompiler(f'no C compiler ({", ".join(wanted)}) is installed, by which kernels are '
-                     'made where numba is missing: apt install gcc')
 
 
 def _sources(network: type[Network]) -> dict[str, str]:
@@ -82,27 +56,6 @@ def _sources(network: type[Network]) -> dict[str, str]:
             'cpg.c': ''.join([common, field.text, *rest])}
 
 
-def _compiled(network: type[Network], library: Path) -> None:
-    """Write a network's library.
-
-    Raises:
-        NoCompiler: there is no compiler, or it fails.
-
-    """
-    name = compiler()
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        for file, text in _sources(network).items():
-            (Path(folder) / file).write_text(text)
-        done = subprocess.run([name, *OPTIONS, 'cpg.c', '-lm', '-o', 'cpg.so'], cwd=folder,
-                              capture_output=True, text=True)
-        if done.returncode:
-            line = next((line for line in done.stderr.splitlines() if 'error' in line),
-                        f'it ended with {done.returncode}')
-            raise NoCompiler(f"the C compiler '{name}' cannot make the kernels of the network "
-                             f"'{network.name}': {line}")
-        os.replace(Path(folder) / 'cpg.so', library)
-
-
 @cache
 def _version() -> str:
     """Return a word that changes whenever something does that the C is written by."""
@@ -114,18 +67,8 @@ def _version() -> str:
 
 
 def _library(network: type[Network]) -> ctypes.CDLL:
-    folder = generated.folder(equations_of(network).key)
-    if folder is not None:
-        library = folder / f'kernel-{_version()}.so'
-        if not library.exists():
-            with writing():
-                _compiled(network, library)
-        if library.exists():
-            return ctypes.CDLL(str(library))
-    with tempfile.TemporaryDirectory() as place:
-        library = Path(place) / 'kernel.so'
-        _compiled(network, library)
-        return ctypes.CDLL(str(library))
+    return load(generated.folder(equations_of(network).key), f'kernel-{_version()}',
+                lambda: _sources(network), f"the kernels of the network '{network.name}'")
 
 
 def _track_of(components: int) -> type[ctypes.Structure]:

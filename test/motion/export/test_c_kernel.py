@@ -18,9 +18,10 @@ import subprocess
 import sys
 
 from c_export import needs_gcc
+from cpg_ros.common.c_library import NoCompiler
 from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.integration import kernel
-from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose, NoCompiler
+from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.solve_orbit import solve_orbit

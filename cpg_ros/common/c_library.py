@@ -1,0 +1,90 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""C that the system's compiler makes a library of where it is first used, kept in the cache."""
+
+from collections.abc import Callable, Mapping
+import ctypes
+import os
+from pathlib import Path
+import shutil
+import subprocess
+import tempfile
+
+from cpg_ros.common.cache_folder import writing
+from cpg_ros.common.errors import CpgError
+
+OPTIONS = ('-std=c99', '-O2', '-shared', '-fPIC')
+COMPILERS = ('cc', 'gcc', 'clang')
+
+
+class NoCompiler(CpgError):
+    """The system has no C compiler that works."""
+
+
+def compiler() -> str:
+    """Return the C compiler: that of the environment's ``CC``, or one of the usual names.
+
+    Raises:
+        NoCompiler: there is none.
+
+    """
+    wanted = (os.environ['CC'],) if os.environ.get('CC') else COMPILERS
+    for name in wanted:
+        if shutil.which(name) is not None:
+            return name
+    raise NoCompiler(f'no C compiler ({", ".join(wanted)}) is installed: apt install gcc')
+
+
+def _compile(sources: Mapping[str, str], library: Path, what: str) -> None:
+    """Write a library; arguments and errors as of load."""
+    name = compiler()
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        for file, text in sources.items():
+            (Path(folder) / file).write_text(text)
+        files = [file for file in sources if file.endswith('.c')]
+        done = subprocess.run([name, *OPTIONS, *files, '-lm', '-o', 'library.so'], cwd=folder,
+                              capture_output=True, text=True)
+        if done.returncode:
+            line = next((line for line in done.stderr.splitlines() if 'error' in line),
+                        f'it ended with {done.returncode}')
+            raise NoCompiler(f"the C compiler '{name}' cannot make {what}: {line}")
+        os.replace(Path(folder) / 'library.so', library)
+
+
+def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str
+         ) -> ctypes.CDLL:
+    """Load a library, and compile it first if the cache does not have it.
+
+    Args:
+        folder: of the cache, see cache_folder; None if nothing can be kept.
+        name: of the library, with a word that changes whenever its sources do.
+        sources: returns its files, name -> text.
+        what: it is, for the error.
+
+    Raises:
+        NoCompiler: it is not in the cache, and there is no compiler, or it fails.
+
+    """
+    if folder is not None:
+        library = folder / f'{name}.so'
+        if not library.exists():
+            with writing():
+                _compile(sources(), library, what)
+        if library.exists():
+            return ctypes.CDLL(str(library))
+    with tempfile.TemporaryDirectory() as place:
+        library = Path(place) / f'{name}.so'
+        _compile(sources(), library, what)
+        return ctypes.CDLL(str(library))
