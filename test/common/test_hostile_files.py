@@ -43,12 +43,12 @@ def panel_mesh(path):
 
 
 def panel_urdf(path):
-    from cpg_ros.ros.panel.shape_source import from_file
+    from cpg_ros.ros.panel.shape import from_file
     return from_file(path, str)
 
 
 def panel_description(path):
-    from cpg_ros.ros.panel.shape_source import from_text
+    from cpg_ros.ros.panel.shape import from_text
     return from_text(read_bytes(path, CpgError).decode(errors='surrogateescape'), 'it', str)
 
 

@@ -34,8 +34,13 @@ from cpg_ros.analysis.atlas.fold_curves import (
     fold_curves,
 )
 from cpg_ros.analysis.atlas.grid import GaitMap, refine, uncrossed_edges
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, curves_from, hopf_curves, hopf_starts
-from cpg_ros.analysis.atlas.hopf_degeneracies import with_degeneracies
+from cpg_ros.analysis.atlas.hopf_curves import (
+    Boundary,
+    curves_from,
+    hopf_curves,
+    hopf_starts,
+    with_degeneracies,
+)
 from cpg_ros.analysis.atlas.map import AtlasFolder, draw_map
 from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow

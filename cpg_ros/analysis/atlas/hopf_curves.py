@@ -12,31 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Curves of Hopf points in two parameters.
+"""Curves of Hopf points in two parameters, and the codimension-two points on them.
 
 The critical root is an unknown beside both parameters: ``det Delta(i omega; p1, p2) = 0`` is two
 real equations in three unknowns, whose curve is followed by pseudo-arclength (Keller 1977; as
 AUTO-07p and DDE-BIFTOOL do). For the delayed network Delta = i omega - A - B exp(-i omega tau).
+
+Between two points of a curve at which a test function has different signs its zero is bracketed,
+each place corrected onto the curve: the first Lyapunov coefficient of the gait's own class at a
+Bautin point, the real part of another root at a Hopf-Hopf or zero-Hopf point (Kuznetsov, *Elements
+of Applied Bifurcation Theory*, sections 8.3 to 8.6). A curve also ends inside the plane, where its
+pair meets in 0 (Bogdanov-Takens), or where the equilibrium folds (zero-Hopf).
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from itertools import chain
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import chain, pairwise
+import math
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import (
-    continue_along_tangents,
-    derivatives,
-    newton,
-    offsets,
-)
+from cpg_ros.dynamics.arclength import continue_along_tangents, derivatives, newton, offsets
 from cpg_ros.dynamics.characteristic import characteristic_matrix
-from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.hopf import hopf_points
-from cpg_ros.dynamics.isotypic import block_at, blocks
+from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
+from cpg_ros.dynamics.hopf import hopf_points, HopfPoint, ON_AXIS, SPARE, tracked_roots
+from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+from scipy.optimize import brentq
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
@@ -281,3 +286,277 @@ def _on(curve: np.ndarray, start: np.ndarray) -> bool:
     gap = np.abs(offsets(curve, start))
     gap[:, 2] /= max(1.0, abs(start[2]))
     return bool((gap.max(axis=1) < SAME).any())
+
+
+# Where a curve of Hopf points ends inside the plane: Bogdanov-Takens and zero-Hopf points.
+
+#: How far from a curve's last point, in fractions of the ranges, its end is looked for.
+REACH = 0.03
+#: Steps of Newton's method at the end of a curve, and the largest residual there.
+END_NEWTON, LEFT = 30, 1e-9
+#: Imaginary part of the root at which the derivative of a real determinant is taken.
+SLIGHT = 1e-6
+
+Equations = Callable[[np.ndarray], np.ndarray]
+
+
+class _End:
+    """Equations in (state, p1, p2, ...), the parameters in fractions of their ranges."""
+
+    def __init__(self, chart: ParameterPlane, symmetry: Symmetry, fraction: np.ndarray) -> None:
+        self.chart, self.symmetry = chart, symmetry
+        network = chart.at_fractions(fraction[:2])
+        self.rest = equilibrium(network)
+        self.moves = not odd(network) and network.at_rest() is None
+        self.together = next(one for one in classes(network)
+                             if all(shift == 0 for _, shift in one.shifts))
+        self.free = len(self.rest) if self.moves else 0
+
+    def _split(self, unknowns: np.ndarray) -> tuple[np.ndarray, Expansion]:
+        """Return the rates of the state, where it moves, and the expansion about it."""
+        fraction = unknowns[self.free:self.free + 2]
+        network = self.chart.at_fractions(fraction)
+        if not self.moves:
+            return np.zeros(0), Expansion(network, equilibrium(network))
+        state = unknowns[:self.free]
+        return Quotient(network).together(state)[0], Expansion(network, state)
+
+    def takens(self, unknowns: np.ndarray) -> np.ndarray:
+        """Equations of a Bogdanov-Takens point in (state, p1, p2)."""
+        rates, expansion = self._split(unknowns)
+        block = block_of(expansion, self.symmetry)
+        return np.array([*rates, _determinant(block, 0.0).real,
+                         _determinant(block, 1j * SLIGHT).imag / SLIGHT])
+
+    def zero_hopf(self, unknowns: np.ndarray) -> np.ndarray:
+        """Equations of a zero-Hopf point in (state, p1, p2, omega)."""
+        rates, expansion = self._split(unknowns)
+        pair = _determinant(block_of(expansion, self.symmetry), 1j * unknowns[-1])
+        fold = _determinant(block_of(expansion, self.together), 0.0)
+        return np.array([*rates, pair.real, pair.imag, fold.real])
+
+
+def _determinant(block: Block, root: complex) -> complex:
+    return complex(np.linalg.det(characteristic_matrix(root, block.now, block.past,
+                                                       block.network.delay)[0]))
+
+
+def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
+    """Apply Newton's method; return the solution and its largest residual, or None."""
+    try:
+        found = newton(equations, start, steps=END_NEWTON, tolerance=EXACT, difference=DIFFERENCE,
+                       longest=1.0)
+        left = math.inf if found is None else float(np.abs(equations(found)).max())
+    except (np.linalg.LinAlgError, CpgError, ArithmeticError):
+        return None
+    return None if found is None or not left < LEFT else (found, left)
+
+
+def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
+               ) -> Iterator[CodimensionTwo]:
+    """Yield the Bogdanov-Takens and zero-Hopf points in which a curve of Hopf points ends.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        mode: the class of the critical root.
+        fractions: points of the curve, (p1, p2, omega), the parameters in fractions, shape (n, 3).
+
+    """
+    if len(fractions) < 3:
+        return
+    for last, before in ((fractions[0], fractions[1]), (fractions[-1], fractions[-2])):
+        network = chart.at_fractions(last[:2])
+        block = block_at(network, equilibrium(network), mode)
+        end = _End(chart, block.symmetry, last)
+        start = np.concatenate([end.rest[:end.free], last])
+        ahead = last[2] - before[2]
+        if block.real and ahead < 0.0:
+            found = _solved(end.takens, start[:-1])
+            if found and _here(found[0][end.free:], last):
+                yield CodimensionTwo('Bogdanov-Takens', gait,
+                                     chart.values_at(found[0][end.free:]), found[1], 0.0)
+                continue
+        if end.moves:
+            found = _solved(end.zero_hopf, start)
+            if found and _here(found[0][end.free:-1], last) and found[0][-1] > 0.5 * last[2]:
+                folds = block_of(Expansion(network, end.rest), end.together).gait
+                yield CodimensionTwo('zero-Hopf', gait, chart.values_at(found[0][end.free:-1]),
+                                     found[1], float(found[0][-1]), (folds,), 0.0)
+
+
+def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
+    """Whether a solution lies in the plane, close to the end of the curve."""
+    return bool((fraction >= -1e-9).all() and (fraction <= 1.0 + 1e-9).all()
+                and np.abs(fraction - last[:2]).max() < REACH)
+
+
+#: Fraction of the way between two points of a curve to which a zero is bracketed.
+BRACKET = 1e-14
+#: At a pole a test function changes its sign, too; at a zero it is this small against both sides.
+VANISHED = 1e-5
+#: A Lyapunov coefficient this small against the curve's largest one is 0 but for rounding.
+ROUNDING = 1e-9
+#: Two points this close in fractions of the ranges, with frequencies this close, are one.
+SAME_POINT = 1e-7
+#: A root's imaginary part this small against omega is that of a real one.
+REAL = 1e-6
+
+Test = Callable[[np.ndarray], float]
+
+
+class _Curve:
+    """A curve of Hopf points of one class, solved at each place once."""
+
+    def __init__(self, condition: HopfCondition, fractions: np.ndarray) -> None:
+        self.condition, self.fractions = condition, fractions
+        self.chart = condition.chart
+        self._known: dict[bytes, tuple[HopfPoint, tuple[Block, ...]]] = {}
+
+    def at(self, fraction: np.ndarray) -> tuple[HopfPoint, tuple[Block, ...]]:
+        """Return the Hopf point at (p1, p2, omega), and the blocks of all classes."""
+        key = fraction.tobytes()
+        if key not in self._known:
+            network, line = self.chart.at_fractions(fraction[:2]), self.chart.second.line
+            rest = equilibrium(network)
+            split = blocks(network, rest)
+            block = next(block for block in split if block.mode == self.condition.mode)
+            self._known[key] = HopfPoint(network, line, line.value(network), block,
+                                         float(fraction[2]), rest), split
+        return self._known[key]
+
+    def between(self, one: np.ndarray, other: np.ndarray, way: float) -> np.ndarray:
+        """Return the curve's point at a fraction of the way between two of its points.
+
+        Raises:
+            ArithmeticError: Newton's method has lost it.
+
+        """
+        tangent = (other - one) / np.linalg.norm(other - one)
+        found = self.condition.corrected(one + way * (other - one), tangent)
+        if found is None:
+            raise ArithmeticError('the curve is lost')
+        return found
+
+    def zeros(self, test: Test, small: float) -> Iterator[np.ndarray]:
+        """Yield the places at which a test function changes its sign through 0.
+
+        Args:
+            test: of a place.
+            small: values that are 0 but for rounding: such a point is passed over, so that its
+                neighbours bracket what lies there.
+
+        """
+        values = [(fraction, test(fraction)) for fraction in self.fractions]
+        clear = [(fraction, value) for fraction, value in values if abs(value) > small]
+        for (one, left), (other, right) in pairwise(clear):
+            if not left * right < 0.0:
+                continue
+            try:
+                way = brentq(lambda s, one=one, other=other: test(self.between(one, other, s)),
+                             0.0, 1.0, xtol=BRACKET, rtol=1e-14)
+                place = self.between(one, other, way)
+            except (ArithmeticError, ValueError, CpgError):
+                continue
+            if abs(test(place)) < VANISHED * min(abs(left), abs(right)):
+                yield place
+
+
+def with_degeneracies(job: tuple[ParameterPlane, Boundary]) -> Boundary:
+    """Return a curve of Hopf points with the points at which a second condition holds."""
+    chart, curve = job
+    return replace(curve, codimension_two=hopf_degeneracies(chart, curve))
+
+
+def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[CodimensionTwo, ...]:
+    """Find the codimension-two points on a curve of Hopf points, in the order of the curve.
+
+    Two zeros of one test function between neighbouring points of the curve are not seen. A
+    first Lyapunov coefficient that is 0 all along, as where the rates are linear about the
+    equilibrium, has none. What happens where the frequency of a class that turns (walk, jump)
+    passes through 0 is not looked at.
+
+    Args:
+        chart: the plane.
+        curve: of Hopf points, as ``hopf_curves`` returns it.
+
+    """
+    fractions = np.column_stack([curve.fractions(chart), curve.points[:, 2]])
+    found: list[CodimensionTwo] = []
+    for k, gait in enumerate(curve.gaits):
+        condition = condition_of(chart, gait, fractions[len(fractions) // 2])
+        whole = _Curve(condition, fractions)
+        found += _bautin(whole, gait)
+        if k == 0:
+            # The classes of a curve have the same roots.
+            found += _other_roots(whole, gait)
+            found += curve_ends(chart, gait, condition.mode, fractions)
+    return tuple(sorted(found, key=lambda one: _along(chart, fractions, one.values)))
+
+
+def _along(chart: ParameterPlane, fractions: np.ndarray, values: tuple[float, float]) -> int:
+    fraction = (np.array(values) - chart.low) / chart.size
+    return int(np.abs(fractions[:, :2] - fraction).max(axis=1).argmin())
+
+
+def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
+    @cache
+    def known(key: bytes) -> float:
+        try:
+            return curve.at(np.frombuffer(key))[0].lyapunov
+        except (np.linalg.LinAlgError, CpgError):
+            return math.nan  # At a pole; it is passed over.
+
+    def test(fraction: np.ndarray) -> float:
+        return known(fraction.tobytes())
+
+    small = ROUNDING * float(np.nanmax([0.0,
+                                        *(abs(test(fraction)) for fraction in curve.fractions)]))
+    for place in curve.zeros(test, small):
+        yield CodimensionTwo('Bautin', gait, curve.chart.values_at(place[:2]), test(place),
+                             float(place[2]))
+
+
+def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
+    """Return where other roots of any class cross: pairs, or a real one."""
+    found: list[CodimensionTwo] = []
+    small = ON_AXIS * max(1.0, float(curve.fractions[:, 2].max()))
+    points = [curve.at(fraction) for fraction in curve.fractions]
+    for which in range(len(points[0][1])):
+        count = tracked_roots([split[which] for _, split in points], SPARE + 2)
+
+        def others(fraction: np.ndarray, which: int = which, count: int = count) -> np.ndarray:
+            point, split = curve.at(fraction)
+            return point.but_critical(split[which], split[which].roots(count))
+
+        for rank in range(min(len(others(fraction)) for fraction in curve.fractions)):
+            def test(fraction: np.ndarray, rank: int = rank, others: Callable = others) -> float:
+                return float(others(fraction)[rank].real)
+
+            for place in curve.zeros(test, small):
+                block, root = curve.at(place)[1][which], complex(others(place)[rank])
+                # Of a pair in two conjugate classes that with positive imaginary part counts.
+                if root.imag > -REAL * place[2] or block.real:
+                    _enter(found, _crossing(curve, gait, place, block, root), curve.chart)
+    return found
+
+
+def _crossing(curve: _Curve, gait: str, place: np.ndarray, block: Block, root: complex
+              ) -> CodimensionTwo:
+    kind, omega = 'Hopf-Hopf', abs(root.imag)
+    if omega < REAL * place[2]:
+        kind, omega = 'zero-Hopf', 0.0
+    return CodimensionTwo(kind, gait, curve.chart.values_at(place[:2]), root.real,
+                          float(place[2]), (block.gait,), omega)
+
+
+def _enter(found: list[CodimensionTwo], new: CodimensionTwo, chart: ParameterPlane) -> None:
+    """Enter a point, unless it is known: then only what it adds to that one's classes."""
+    for k, one in enumerate(found):
+        gap = np.abs(np.subtract(one.values, new.values) / chart.size).max()
+        if (one.kind == new.kind and gap < SAME_POINT
+                and np.isclose(one.other_omega, new.other_omega, rtol=SAME_POINT,
+                               atol=SAME_POINT)):
+            found[k] = replace(one, other=tuple(dict.fromkeys((*one.other, *new.other))))
+            return
+    found.append(new)

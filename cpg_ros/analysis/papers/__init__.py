@@ -15,4 +15,4 @@
 """Published quantities of the papers, each beside the value computed here."""
 
 __all__ = ['buono_gaits', 'buono_hopf', 'buono_linear', 'liu_zhang', 'oscillators', 'rashidi',
-           'reproduce', 'reproduction', 'row']
+           'reproduce', 'row']

@@ -22,5 +22,5 @@ from cpg_ros.common.errors import needed
 # One line where the extra is missing, before a module imports it.
 needed('websockets', part='websockets.asyncio')
 
-__all__ = ['bridge_views', 'pages', 'panel_node', 'robot_view', 'shape', 'shape_source', 'teleop',
+__all__ = ['pages', 'panel_node', 'robot_view', 'shape', 'teleop',
            'web_server']

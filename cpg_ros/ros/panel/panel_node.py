@@ -45,9 +45,8 @@ from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
 from cpg_ros.ros.node.polled import best_effort, PolledSubscription
 from cpg_ros.ros.panel import pages as requests
-from cpg_ros.ros.panel.bridge_views import BridgeViews, STOPS
 from cpg_ros.ros.panel.pages import MOST, Page, Pages, Request, RequestError, SLOW
-from cpg_ros.ros.panel.robot_view import RobotView
+from cpg_ros.ros.panel.robot_view import BridgeViews, RobotView, STOPS
 from cpg_ros.ros.panel.teleop import LeaseError
 from cpg_ros.ros.panel.web_server import AccessControl, token_for, WebServer
 from diagnostic_msgs.msg import DiagnosticArray

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One generator and its robot, as pages show them."""
+"""A generator with its robot, and the bridges on the graph, as pages show them."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 import math
 import re
 import time
@@ -32,10 +32,10 @@ from cpg_ros.ros.node.client import (
 )
 from cpg_ros.ros.node.parameters import choices, presets_among
 from cpg_ros.ros.node.polled import best_effort, latched, PolledSubscription
-from cpg_ros.ros.panel import shape_source
+from cpg_ros.ros.panel import shape
 from cpg_ros.ros.panel.pages import RequestError
 from cpg_ros.ros.panel.teleop import Teleop
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Wrench
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent, ParameterType
@@ -43,7 +43,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 
 # The parameters of a node as controls of a page, made from its own descriptors.
 
@@ -210,7 +210,7 @@ class RobotView:
         """Start reading parameters and shape, at first and when their sources have changed."""
         sources = (self.graph.beside(self.name, self.graph.simulations),
                    *sorted(name for name, _ in self.graph.topics
-                           if name in shape_source.descriptions(self._space)))
+                           if name in shape.descriptions(self._space)))
         if self._stale or sources != self._sources:
             self._stale, self._sources = False, sources
             if self._readied is not None:
@@ -222,11 +222,11 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.known.values())})
-            known = await shape_source.ask(
+            known = await shape.ask(
                 self._watch, self._services, self.graph, self.name,
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
-            shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
+            drawn = await asyncio.to_thread(shape.find, known, doubts.append)
             doubts = list(dict.fromkeys(doubts))[:5]
             for doubt in doubts:
                 self._node.get_logger().warning(doubt)
@@ -234,7 +234,7 @@ class RobotView:
             named = ' '.join((known.robot, known.model, known.description))
             doubts = [FOLDER.sub(lambda found: found[0] * (found[0] in named), doubt)
                       for doubt in doubts]
-            self._keep({**shape.message(), 'doubts': doubts})
+            self._keep({**drawn.message(), 'doubts': doubts})
         except CallError as error:
             self._report(str(error))
             self._stale = True
@@ -378,3 +378,107 @@ class RobotView:
 def _short(values: Any) -> list[float | None]:
     """Return rounded values, None for those that are not finite."""
     return [round(value, DIGITS) if math.isfinite(value) else None for value in values]
+
+
+#: Action of a page -> service of a bridge.
+STOPS = {'sit': 'stop', 'damp': 'damp'}
+#: A bridge publishes its status once a second; after this time without one it is stale, s.
+STALE = 3.0
+#: Longest text of a bridge that is shown, characters.
+LONGEST = 200
+
+
+class BridgeViews:
+    """State, health, battery and temperature of each bridge.
+
+    Attributes:
+        message: for pages.
+
+    """
+
+    def __init__(self, watch: Node, services: ServiceClients) -> None:
+        """View no bridge yet.
+
+        Args:
+            watch: that subscribes, and is not spun.
+            services: clients of other nodes.
+
+        """
+        self._watch, self._services = watch, services
+        self._health: PolledSubscription | None = None
+        self._states: dict[str, PolledSubscription] = {}
+        self._shown: dict[str, dict[str, Any]] = {}
+        self._when: dict[str, float] = {}
+        self.message: dict[str, Any] = {}
+        self._update()
+
+    def update(self, names: Iterable[str], wanted: bool) -> None:
+        """Subscribe to these bridges, or to none if no page is open."""
+        names = set(names)
+        for name in set(self._shown) - names:
+            del self._shown[name], self._when[name]
+            self._services.forget(name)
+        for name in names - set(self._shown):
+            self._shown[name] = {'state': '', 'level': '', 'text': '', 'battery': None,
+                                 'hottest': None}
+            self._when[name] = time.monotonic()
+            # A client that the bridge does not know yet would delay a stop.
+            for service in STOPS.values():
+                self._services.client(Trigger, f'{name}/{service}')
+        followed = names if wanted else set()
+        for name in set(self._states) - followed:
+            self._states.pop(name).close()
+        for name in followed - set(self._states):
+            self._states[name] = PolledSubscription(self._watch, String, f'{name}/state',
+                                                    latched(), overridable=False)
+        if followed and self._health is None:
+            self._health = PolledSubscription(self._watch, DiagnosticArray, '/diagnostics',
+                                              best_effort(20), overridable=False)
+        elif not followed and self._health is not None:
+            self._health.close()
+            self._health = None
+
+    def news(self) -> dict[str, Any] | None:
+        """Return the message for pages if it has changed, otherwise None."""
+        for name, topic in self._states.items():
+            if (state := topic.newest()) is not None:
+                self._shown[name]['state'] = state.data[:LONGEST]
+        now = time.monotonic()
+        for message, _ in self._health.receive() if self._health is not None else ():
+            for status in message.status:
+                if (name := status.name.partition(': ')[0]) in self._shown:
+                    self._when[name] = now
+                    self._shown[name].update(_read(status))
+        for name, when in self._when.items():
+            if now > when + STALE:
+                self._shown[name].update(level='stale', text=f'no status for {STALE:g} s')
+        return self._update()
+
+    def _update(self) -> dict[str, Any] | None:
+        message = {'type': 'bridges', 'bridges': {name: dict(self._shown[name])
+                                                  for name in sorted(self._shown)}}
+        if message == self.message:
+            return None
+        self.message = message
+        return message
+
+
+def _read(status: DiagnosticStatus) -> dict[str, Any]:
+    """Return what pages show of a bridge's status."""
+    found: dict[str, Any] = {'level': level(status),
+                             'text': status.message[:LONGEST], 'battery': None, 'hottest': None}
+    heat: list[tuple[float, str]] = []
+    for pair in status.values:
+        try:
+            value = float(pair.value)
+        except ValueError:
+            continue
+        if not math.isfinite(value):
+            continue
+        if pair.key == 'battery [%]':
+            found['battery'] = value
+        elif pair.key.endswith('[deg C]'):
+            heat.append((value, pair.key.removesuffix('[deg C]').strip()[:LONGEST]))
+    if heat:
+        found['hottest'] = max(heat)
+    return found

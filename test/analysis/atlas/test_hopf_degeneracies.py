@@ -23,10 +23,11 @@ from cpg_ros.analysis.atlas.hopf_curves import (
     ChartLine,
     curves_from,
     hopf_curves,
+    hopf_degeneracies,
     hopf_starts,
     HopfStart,
+    with_degeneracies,
 )
-from cpg_ros.analysis.atlas.hopf_degeneracies import hopf_degeneracies, with_degeneracies
 from cpg_ros.networks.registry import find_network, PRESETS
 from depth import in_depth
 import numpy as np

@@ -30,7 +30,7 @@ from cpg_ros.analysis.papers import (
     rashidi,
     reproduce,
 )
-from cpg_ros.analysis.papers.reproduction import ERRATA, PAPERS
+from cpg_ros.analysis.papers.reproduce import ERRATA, PAPERS
 from cpg_ros.analysis.papers.row import Citation
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.hopf import first_hopf
@@ -60,7 +60,7 @@ def report(tmp_path_factory):
 def only(monkeypatch, name, *sections):
     """Let a paper consist of some sections, and be the only one."""
     paper = PAPERS[name]
-    monkeypatch.setattr('cpg_ros.analysis.papers.reproduction.PAPERS',
+    monkeypatch.setattr('cpg_ros.analysis.papers.reproduce.PAPERS',
                         {name: replace(paper, sections=sections or paper.sections)})
 
 

@@ -16,8 +16,8 @@
 
 import re
 
+from cpg_ros.ros.bridges.unitree.bridge import harmful
 from cpg_ros.ros.bridges.unitree.messages import BUTTONS, crc32, LowCmd, LowState
-from cpg_ros.ros.bridges.unitree.participants import harmful
 import numpy as np
 import pytest
 from stand_in import C_STRUCT, check_sum, COMMAND, mpeg2, STATE

@@ -24,10 +24,7 @@ pytest.importorskip('websockets')
 from cpg_ros.common.files import resource_folder  # noqa: E402, I100
 from cpg_ros.motion.meshes import MeshError, read_mesh  # noqa: E402
 from cpg_ros.motion.robot_file import load_robot  # noqa: E402
-from cpg_ros.ros.panel import shape as solids  # noqa: E402
-from cpg_ros.ros.panel import shape as stick_figure
-from cpg_ros.ros.panel import shape_source  # noqa: E402
-from cpg_ros.ros.panel import shape_source as urdf_shape
+from cpg_ros.ros.panel import shape as shapes  # noqa: E402
 
 
 def worlds(shape, angles):
@@ -52,7 +49,7 @@ def test_links_are_where_mujoco_has_them(robot, model):
     mujoco = pytest.importorskip('mujoco')
     robot_file = load_robot(robot)
     said = []
-    shape = shape_source.find(shape_source.RobotInfo(robot=robot, model=model), said.append)
+    shape = shapes.find(shapes.RobotInfo(robot=robot, model=model), said.append)
     assert not said
     from cpg_ros.simulation.robot_model import load
     physics = load(model or str(resource_folder('urdf') / 'quadruped.urdf'), robot_file)
@@ -79,14 +76,14 @@ def volume(triangles):
 
 
 def test_solids():
-    for made, low, high in ((solids.cylinder(0.5, 1.0), [-0.5, -0.5, -1], [0.5, 0.5, 1]),
-                            (solids.capsule(0.5, 1.0), [-0.5, -0.5, -1.5], [0.5, 0.5, 1.5]),
-                            (solids.box(np.array([1.0, 2.0, 3.0])), [-1, -2, -3], [1, 2, 3])):
+    for made, low, high in ((shapes.cylinder(0.5, 1.0), [-0.5, -0.5, -1], [0.5, 0.5, 1]),
+                            (shapes.capsule(0.5, 1.0), [-0.5, -0.5, -1.5], [0.5, 0.5, 1.5]),
+                            (shapes.box(np.array([1.0, 2.0, 3.0])), [-1, -2, -3], [1, 2, 3])):
         np.testing.assert_allclose(made.min((0, 1)), low, atol=1e-9)
         np.testing.assert_allclose(made.max((0, 1)), high, atol=1e-9)
     # A 16-sided prism: its area is n/2 sin(2 pi / n) r^2.
-    assert volume(solids.cylinder(1.0, 0.5)) == pytest.approx(8 * np.sin(np.pi / 8), rel=1e-9)
-    stick = solids.along(np.array([1.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.0]), 0.1)
+    assert volume(shapes.cylinder(1.0, 0.5)) == pytest.approx(8 * np.sin(np.pi / 8), rel=1e-9)
+    stick = shapes.along(np.array([1.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.0]), 0.1)
     np.testing.assert_allclose(stick.min((0, 1)), [0.9, -0.1, -0.1], atol=0.01)
     np.testing.assert_allclose(stick.max((0, 1)), [1.1, 2.1, 0.1], atol=0.01)
 
@@ -133,7 +130,7 @@ def test_meshes_that_cannot_be_read(tmp_path, name, data, said):
 
 def test_vertices_that_lie_close_together_become_one():
     fine = np.concatenate([TETRAHEDRON, TETRAHEDRON * 1e-3])
-    left = solids.coarse(fine, 0.01)
+    left = shapes.coarse(fine, 0.01)
     assert len(left) == 4 and volume(left) == pytest.approx(1 / 6, rel=0.02)
 
 
@@ -148,7 +145,7 @@ def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):
     path = tmp_path / 'one.urdf'
     path.write_text(URDF.format(mesh='part.stl'))
     said = []
-    shape = urdf_shape.from_file(path, said.append)
+    shape = shapes.from_file(path, said.append)
     assert len(said) == 1 and 'neither an installed package nor a folder above' in said[0]
     (drawn,) = shape.links[0].vertices
     assert volume(drawn) == pytest.approx(1 / 48)
@@ -179,7 +176,7 @@ def test_collada_is_drawn(tmp_path, text):
     (tmp_path / 'part.dae').write_text(text)
     path = tmp_path / 'one.urdf'
     path.write_text(URDF.format(mesh='part.dae'))
-    shape = urdf_shape.from_file(path, str)
+    shape = shapes.from_file(path, str)
     (drawn,) = shape.links[0].vertices
     np.testing.assert_allclose(drawn.min((0, 1)), [0, 0, 0.015])
     if 'polygons' not in text:
@@ -213,10 +210,10 @@ def test_the_panel_and_robot_sim_find_the_same_meshes(tmp_path, monkeypatch, pla
     said = []
     model = load(str(path), ROBOT, visual=True, say=said.append)
     assert model.nmesh == 1 and not said
-    shape = urdf_shape.from_file(path, said.append)
+    shape = shapes.from_file(path, said.append)
     assert not said and any(len(part) == 4 for link in shape.links for part in link.vertices)
     # Anybody on the graph may name files of installed packages only.
-    urdf_shape.from_text(path.read_text(), 'robot_description', said.append)
+    shapes.from_text(path.read_text(), 'robot_description', said.append)
     assert len(said) == 1 and 'installed packages only' in said[0]
 
 
@@ -250,24 +247,24 @@ def installed(tmp_path, monkeypatch):
 def test_a_description_draws_meshes_of_installed_packages_only(installed, name, drawn):
     said = []
     text = URDF.format(mesh=name.format(shared=installed))
-    shape = urdf_shape.from_text(text, 'robot_description', said.append)
+    shape = shapes.from_text(text, 'robot_description', said.append)
     assert len(said) == 2 - drawn and bool(shape.links[0].vertices) is drawn
 
 
 def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
     (tmp_path / 'bad.urdf').write_text('<sdf/>')
     said = []
-    shape = shape_source.find(shape_source.RobotInfo(urdf=str(tmp_path / 'bad.urdf'),
+    shape = shapes.find(shapes.RobotInfo(urdf=str(tmp_path / 'bad.urdf'),
                                                      robot='goat'),
                               said.append)
     assert 'this is not a URDF' in said[0] and shape.source == "stick figure of 'goat'"
     text = (resource_folder('urdf') / 'quadruped.urdf').read_text()
-    shape = shape_source.find(shape_source.RobotInfo(description=text, robot='goat'), said.append)
+    shape = shapes.find(shapes.RobotInfo(description=text, robot='goat'), said.append)
     assert shape.source == 'robot_description' and shape.feet == {}
 
 
 def test_a_stick_figure_of_what_topics_alone_tell():
-    shape = shape_source.find(shape_source.RobotInfo(
+    shape = shapes.find(shapes.RobotInfo(
         robot='/another/machine.yaml', legs={'lh': ['a', 'b', 'c'], 'rf': ['d', 'e']}), str)
     standing = worlds(shape, {})
     heights = []
@@ -276,6 +273,6 @@ def test_a_stick_figure_of_what_topics_alone_tell():
         foot = standing[link] @ [*place, 1.0]
         assert np.sign(foot[:2]).tolist() == [ahead, left]
         heights.append(foot[2])
-    np.testing.assert_allclose(heights, -stick_figure.LEG)
+    np.testing.assert_allclose(heights, -shapes.LEG)
     message = shape.message()
     assert message['type'] == 'shape' and len(message['links']) == 6

@@ -15,26 +15,133 @@
 """The node ``unitree_bridge``: drives a Unitree robot by what a generator publishes."""
 
 from collections.abc import Callable, Mapping
+from importlib import import_module
 import json
+from pathlib import Path
+import re
+import socket
+import struct
 import sys
 import time
 from typing import Any
 
+from cpg_ros.common.errors import MissingLibraryError
 from cpg_ros.motion.robot import Robot
 from cpg_ros.ros.bridges.bridge import BridgeNode, StartRefused, Wait
 from cpg_ros.ros.bridges.robot_state import bridge_specs, BridgeSettings
-from cpg_ros.ros.bridges.unitree.interfaces import message, Unitree
-from cpg_ros.ros.bridges.unitree.messages import BUTTONS, FootForces, LowState
+from cpg_ros.ros.bridges.unitree.messages import BUTTONS, FootForces, LowCmd, LowState
 from cpg_ros.ros.bridges.unitree.models import JOINTS, MODELS, PARTS, settings_of
-from cpg_ros.ros.bridges.unitree.participants import Announcements
+from cpg_ros.ros.bridges.watchdog_link import RobotInterface
 from cpg_ros.ros.generator_io import joint_state, labelled
 from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import run
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 from cpg_ros.ros.node.polled import OVERRIDABLE, PolledSubscription
+import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import BatteryState, Imu
+
+
+def message(name: str) -> type:
+    """Return a message type, such as ``unitree_go/LowCmd``.
+
+    Raises:
+        MissingLibraryError: its package is not there; says how to get it.
+
+    """
+    package, kind = name.split('/')
+    try:
+        return getattr(import_module(f'{package}.msg'), kind)
+    except ImportError as error:
+        wheels = Path(rclpy.__file__).is_relative_to(sys.prefix)
+        raise MissingLibraryError(
+            f'the messages of {package} are missing ({error}): ' + (
+                "'make messages' builds them" if wheels else
+                'build unitree_go and unitree_api of '
+                'https://github.com/unitreerobotics/unitree_ros2 with colcon, and source that '
+                'workspace')) from error
+
+
+class Unitree(RobotInterface):
+    """Low-level commands and states of the robots that use ``unitree_go``."""
+
+    maker = 'unitree'
+    command_topic, state_topic = '/lowcmd', '/lowstate'
+    raw_states = True
+
+    @staticmethod
+    def command_type() -> type:
+        """Return ``LowCmd``; errors as of ``message``."""
+        return message('unitree_go/LowCmd')
+
+    @staticmethod
+    def state_type() -> type:
+        """Return ``LowState``; errors as of ``message``."""
+        return message('unitree_go/LowState')
+
+    @staticmethod
+    def make_command() -> LowCmd:
+        """Return a command in which no joint is driven."""
+        return LowCmd()
+
+
+#: Vendor of RTPS packets that is Eclipse cyclonedds.
+_VENDOR = b'\x01\x10'
+#: Host, version and system: a string that a zero ends.
+_VERSION = re.compile(rb'([\x20-\x7e]+)/(\d+)\.(\d+)\.\d+/\w+/\w+\0')
+_GROUP = '239.255.0.1'
+#: First version that the firmware does not bear.
+HARMFUL = 11
+
+
+def harmful(packet: bytes) -> str:
+    """Return which participant an announcement is from that would crash the robot's, or ''."""
+    if packet[:4] != b'RTPS' or packet[6:8] != _VENDOR:
+        return ''
+    for host, major, minor in _VERSION.findall(packet):
+        if int(major) >= HARMFUL:
+            return f'cyclonedds {int(major)}.{int(minor)} on {host.decode()}'
+    return ''
+
+
+class Announcements:
+    """Receives the announcements of a domain; none where the socket cannot be opened."""
+
+    def __init__(self, domain: int) -> None:
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._socket.bind(('', 7400 + 250 * domain))
+            for _, interface in socket.if_nameindex():
+                self._join(interface)
+        except OSError:
+            self._socket.close()
+
+    def _join(self, interface: str) -> None:
+        index = socket.if_nametoindex(interface)
+        group = struct.pack('4s4si', socket.inet_aton(_GROUP), bytes(4), index)
+        try:
+            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
+        except OSError:
+            # An interface without multicast has no announcements.
+            return
+
+    def check(self) -> str:
+        """Return which harmful participant has announced itself since the last call, or ''."""
+        found = ''
+        while self._socket.fileno() >= 0:
+            try:
+                found = harmful(self._socket.recv(65536)) or found
+            except BlockingIOError:
+                break
+        return found
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
 
 # The parameters of ``unitree_bridge``.
 
