@@ -21,12 +21,17 @@ from typing import Any
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.fitting.gaits.leg_names import legs_of
-from cpg_ros.fitting.gaits.stride import find_stride, Stride
+from cpg_ros.fitting.gaits.leg_phases import PhaseScatter
+from cpg_ros.fitting.gaits.stride import FEW_CYCLES, find_stride, NoSteadyGait, Stride
 from cpg_ros.fitting.inversion.fit import Estimate, Fit
 from cpg_ros.fitting.inversion.fit_data import cells_of, MeanCycle
 from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY, GaitReadout
-from cpg_ros.fitting.recordings.recording import Recording
+from cpg_ros.fitting.recordings.recording import (
+    recognise_stride,
+    Recording,
+    repeat_stride,
+)
 from cpg_ros.motion.plan import refusal
 from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.network import Network, Preset
@@ -285,8 +290,19 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
     cells = {name: cell for name, cell in cells.items() if name in recording.joints}
     gains = None if robot is None else {
         joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
-    return cells, find_stride(recording.select(tuple(cells)), legs, kind,
-                              None if robot is None else cells, gains, recording.loads)
+    stride = find_stride(recording.select(tuple(cells)), legs, kind,
+                         None if robot is None else cells, gains, recording.loads)
+    if not recording.cycle:
+        return cells, stride
+    # Copies of one stride do not tell how strides scatter.
+    unknown = PhaseScatter(np.nan, np.nan, np.nan, 1)
+    return cells, replace(
+        stride, cycles=1, frequency=1.0 / recording.cycle,
+        # A cut is right to half a sample on either side.
+        frequency_error=float(np.median(np.diff(recording.times))) / (6**0.5 * recording.cycle**2),
+        confidence=FEW_CYCLES * stride.confidence,
+        scatter={leg: unknown if k else one
+                 for k, (leg, one) in enumerate(stride.scatter.items())})
 
 
 def _none_of(kind: type[Network], stride: Stride) -> str:
@@ -336,6 +352,8 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
             gait of the network's, or no orbit (NoOrbit).
 
     """
+    if np.isnan(recording.cycle):
+        recording = repeat_stride(recording)
     legs, read = leg_joints(recording, robot)
     network_given = bool(network)
     if not network:
@@ -344,7 +362,18 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    cells, stride = stride_of(recording, legs, kind, robot)
+    guessed = []
+    try:
+        cells, stride = stride_of(recording, legs, kind, robot)
+    except NoSteadyGait:
+        recognised = recognise_stride(recording)
+        if recognised is None:
+            raise
+        recording = recognised
+        cells, stride = stride_of(recording, legs, kind, robot)
+        stride = replace(stride, confidence=0.5 * stride.confidence)
+        guessed = [f'taken for exactly one stride, of {recording.cycle:.4g} s, as it ends where '
+                   'it begins: say so (--cycle), or record several strides']
     between = ''
     if not (gait or stride.gait or network_given or kind.offsets):
         between = _none_of(kind, stride)
@@ -353,7 +382,7 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
             kind = as_they_are
             cells, stride = stride_of(recording, legs, kind, robot)
             between += f'; they are fitted as they are, by the network {kind.name}'
-    warnings = [*([between] if between else []), *stride.issues]
+    warnings = [*guessed, *([between] if between else []), *stride.issues]
     if not gait:
         gait = stride.gait or kind.unnamed
         if not gait:

@@ -125,7 +125,8 @@ def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], str
         fore = _extremes(times, phases, x, sense * c[joint], 1.0)
         hind = None if why else _extremes(times, phases, x, sense * c[joint], -1.0)
         rows = _strides(fore, hind)
-        begins, periods, back = rows.T
+        # Copies of one stride are one stride.
+        begins, periods, back = rows[:1 if stride.cycles == 1 else None].T
         found.append(LegStrides(leg, joint, begins, periods, back, span, why))
     return found
 

@@ -46,6 +46,7 @@ from cpg_ros.fitting.recordings.tables import (
     opened,
     POSITION,
     preamble,
+    SHARE,
     split,
     TIME,
     TIMES,
@@ -72,7 +73,9 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
 
     The file may be packed by gzip or have OpenSim's preamble (.mot, .sto), a second header row of
     units, decimal commas where commas do not part the columns, and delimiters at the ends of its
-    lines. A single time far ahead of both neighbours is left out.
+    lines. A single time far ahead of both neighbours is left out. Instead of a time there
+    may be a column such as `Gait cycle [%]`; the duration of the stride is then to be given (see
+    `repeat_stride`).
 
     Args:
         path: the file.
@@ -105,6 +108,7 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
                                [column.joint for column in table.columns])
     notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
     return replace(recording, notes=(*notes, *recording.notes),
+                   cycle=np.nan if table.shares else 0.0,
                    loads=table.loads.taken(recording.start, recording.times[-1]))
 
 
@@ -187,6 +191,11 @@ class _Table:
                 unit = unit or match[2]
             if match and (unit is None or unit in TIMES):
                 found.append((k, header, unit))
+        shares = [k for k, header in enumerate(headers)
+                  if SHARE.fullmatch(split(header)[0]) and split(header)[1] in (None, '%')]
+        self.shares = not found and len(shares) == 1
+        if self.shares:
+            return Column(shares[0], headers[shares[0]], '', 0.01)
         if len(found) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '

@@ -35,6 +35,7 @@ from cpg_ros.fitting.recordings.recording import (
     Recording,
     RecordingError,
     RecordingFormat,
+    repeat_stride,
 )
 
 #: Name -> format. One more is a file like those of these, and its name here.
@@ -70,7 +71,8 @@ def format_of(path: Path) -> RecordingFormat:
 
 
 def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Sequence[str] = (),
-                   progress: bool = True, **options: Any) -> Recording:
+                   progress: bool = True, cycle: float | None = None, **options: Any
+                   ) -> Recording:
     """Read a recording of any format.
 
     Args:
@@ -79,6 +81,8 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
         robot_joints: joints of a robot, of which those that are there are taken where ``joints``
             names none and the format may hold others.
         progress: show a progress bar.
+        cycle: duration of the stride, s, of which exactly one was recorded; 0 if the times tell
+            it, None for any other recording.
         options: as of the format's reader, such as `read_bag` or `read_csv`; those that are None
             or empty count as not given.
 
@@ -99,7 +103,8 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
             raise InputError(f'{path}: option {name}: {why}')
     if robot_joints and 'joints' not in given and 'some' in args.features:
         given |= {'joints': robot_joints, 'some': True}
-    return args.read(path, progress=progress, **given)
+    recording = args.read(path, progress=progress, **given)
+    return recording if cycle is None else repeat_stride(recording, cycle)
 
 
 # The options that choose recordings and how to read them, for all formats.
@@ -117,6 +122,9 @@ def add_reading_options(parser: Parser) -> None:
         parser.add_argument(f'--{option.name}', metavar=option.metavar, help=option.help,
                             choices=option.choices or None, nargs='+' if option.several else None,
                             default=[] if option.several else None)
+    parser.add_argument('--cycle', type=float, nargs='?', const=0.0, metavar='SECONDS',
+                        help='the recording is exactly one stride, of this duration (default: '
+                        'as its times say)')
     parser.add_argument('--kp', type=float, metavar='KP', help='fit the commands of the joints in '
                         'the bag instead of their measured positions: position + (effort + kd '
                         'velocity) / kp, with the proportional gain of their controllers, N m/rad')
@@ -156,4 +164,5 @@ def reading_arguments(args: Namespace) -> dict[str, Any]:
     values = {option.name: getattr(args, option.name) for option in reading_options()}
     return {**{name: tuple(value) if isinstance(value, list) else value
                for name, value in values.items()},
+            'cycle': args.cycle,
             'servo': None if args.kp is None else Servo(args.kp, args.kd or 0.0)}

@@ -19,6 +19,7 @@ Bags, tables and live topics all deliver chunks of samples; `merged` makes one r
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+import math
 from pathlib import Path
 
 from cpg_ros.common.errors import CpgError, ShortRepr
@@ -78,6 +79,8 @@ class Recording(ShortRepr):
         start: stamp at times = 0, s.
         notes: what was repaired or left out, one line each.
         loads: on the feet, where they were recorded, too.
+        cycle: duration of a stride, s, of which the recording is copies; nan where its times are
+            shares of one stride of unknown duration; 0 for all other recordings.
 
     Raises:
         RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
@@ -92,6 +95,7 @@ class Recording(ShortRepr):
     start: float = 0.0
     notes: tuple[str, ...] = ()
     loads: FootLoads | None = None
+    cycle: float = 0.0
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '
@@ -331,6 +335,86 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
             notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
                          f'{JITTER:.0%} of the usual {usual:.4g} s')
     return notes
+
+
+# Recordings of exactly one stride, as gait laboratories cut them.
+
+#: Copies that a stride is repeated to.
+COPIES = 6
+#: Largest gap between the end of a stride and its begin, over the range of the joint: as declared,
+#: and as recognised.
+GAP_DECLARED, GAP_RECOGNISED = 0.3, 0.1
+#: Durations of strides that are recognised, s; least speed at their seam, over the mean one, as a
+#: motion from rest to rest closes, too; least share of odd harmonics, as two strides have none.
+DURATIONS, SEAM_SPEED, ODD_SHARE = (0.1, 3.0), 0.3, 0.2
+
+
+def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
+    """Return copies of a recording of exactly one stride, one after the other.
+
+    Args:
+        recording: of one stride; its last sample may be the first one of the next stride.
+        duration: of the stride, s; 0 if the recording's times tell.
+
+    Raises:
+        RecordingError: the duration is unknown or impossible, or a joint does not end where it
+            begins.
+
+    """
+    length, step = float(recording.times[-1]), float(np.median(np.diff(recording.times)))
+    if not duration and math.isnan(recording.cycle):
+        raise RecordingError(f'{recording.source}: its times are shares of a stride: give the '
+                             'duration of the stride in s (--cycle)')
+    if not 0.0 <= duration < math.inf:
+        raise RecordingError(f'{recording.source}: a stride cannot last {duration:g} s')
+    gaps, closed = _seam(recording)
+    worst = int(np.argmax(gaps))
+    if gaps[worst] > GAP_DECLARED:
+        raise RecordingError(f'{recording.source}: not one stride: '
+                             f'{joint_list(recording.joints[worst:worst + 1])} ends '
+                             f'{gaps[worst]:.0%} of its range from where it begins')
+    count = len(recording.times) - closed
+    own = length if closed else length + step
+    scale = duration / own if duration else 1.0
+    starts = own * np.arange(COPIES)[:, None]
+    loads = recording.loads
+    if loads is not None:
+        held = loads.times < own
+        loads = FootLoads(loads.legs, scale * (starts + loads.times[held]).ravel(),
+                          np.tile(loads.loads[held], (COPIES, 1)))
+    return replace(
+        recording, times=scale * (starts + recording.times[:count]).ravel(), loads=loads,
+        positions=np.tile(recording.positions[:count], (COPIES, 1)), cycle=scale * own,
+        notes=(*recording.notes, f'one stride, of {scale * own:.4g} s, which is repeated: it '
+               'does not tell how strides differ'))
+
+
+def recognise_stride(recording: Recording) -> Recording | None:
+    """Return copies of a recording if it is exactly one stride by all appearances, or None."""
+    x = recording.positions
+    if recording.cycle or len(x) < 16 or not np.isfinite(x).all():
+        return None
+    gaps, closed = _seam(recording)
+    one = x[:len(x) - closed] / np.maximum(np.ptp(x, axis=0), 1e-9)
+    speeds = np.abs(one - np.roll(one, 1, axis=0)).mean(axis=1)
+    power = np.sum(np.abs(np.fft.rfft(one - one.mean(axis=0), axis=0))**2, axis=1)
+    if (gaps.max() > GAP_RECOGNISED or speeds[[0, 1, -1]].mean() < SEAM_SPEED * speeds.mean()
+            or power[1::2].sum() < ODD_SHARE * power.sum()
+            or not DURATIONS[0] <= recording.times[-1] <= DURATIONS[1]):
+        return None
+    return repeat_stride(recording)
+
+
+def _seam(recording: Recording) -> tuple[np.ndarray, bool]:
+    """Return each joint's gap at the seam over its range, and whether the first sample returns."""
+    x = recording.positions
+    spans = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
+    # A joint that hardly moves has no gap.
+    spans = np.maximum(spans, 0.05 * spans.max())
+    again, following = (np.nan_to_num(np.abs(end - x[0]) / spans)
+                        for end in (x[-1], 2.0 * x[-1] - x[-2]))
+    closed = bool(again.sum() <= following.sum())
+    return (again if closed else following), closed
 
 
 # The declaration of a format of recordings; each format is one file that ends in one of these.

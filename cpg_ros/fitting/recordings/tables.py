@@ -49,6 +49,8 @@ TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
 #: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
 BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
 TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp)(?:[_ ]([a-z]+))?$', re.I)
+#: Where a stride is 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
+SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
 #: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
 #: '/joint_states/lf_knee/position'.
 POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
