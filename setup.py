@@ -109,6 +109,5 @@ setup(
         'tune = cpg_ros.ros.cli.executables:tune',
         'calibrate = cpg_ros.ros.cli.executables:calibrate',
         'atlas = cpg_ros.ros.cli.executables:atlas',
-        'record_dataset = cpg_ros.ros.cli.executables:record_dataset',
         'export = cpg_ros.ros.cli.executables:export']},
 )

@@ -30,7 +30,7 @@ import pytest
 
 NODES = ('generator', 'robot_sim', 'inversion', 'panel')
 TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune', 'calibrate', 'atlas',
-         'record_dataset', 'export')
+         'export')
 
 
 def run(executable, *words):

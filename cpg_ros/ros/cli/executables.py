@@ -40,7 +40,6 @@ EXECUTABLES = {'generator': 'ros.generator', 'robot_sim': 'ros.robot_sim',
                'optimize': 'analysis.optimize', 'reproduce': 'analysis.papers.reproduce',
                'tune': 'simulation.tuning.tune', 'calibrate': 'simulation.robot_setup.calibrate',
                'atlas': 'analysis.atlas.atlas',
-               'record_dataset': 'simulation.tuning.record_dataset',
                'export': 'motion.export.export'}
 #: What does with kernels in plain Python, and steps in C; for the others that is far too slow.
 WITHOUT_NUMBA = ('generator', 'export', 'unitree_bridge', 'check_robot')

@@ -12,6 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Search for gaits and gains of a simulated robot, and labelled recordings of it."""
+"""Search for gaits and gains of a simulated robot."""
 
-__all__ = ['biped', 'feedback', 'foot_path', 'gait_design', 'gaits', 'record_dataset', 'tune']
+__all__ = ['biped', 'feedback', 'foot_path', 'gait_design', 'gaits', 'tune']

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``record_dataset``: a labelled set of bags of simulated walks."""
+"""A labelled set of bags of simulated walks: python benchmarks/record_dataset.py --out FOLDER."""
 
 import argparse
 from collections.abc import Iterator, Sequence
@@ -24,6 +24,7 @@ import sys
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import common  # noqa: F401, so that cpg_ros is found
 from cpg_ros.common.command_line import Parser, progress_bar, run, say, table
 from cpg_ros.common.errors import InputError, needed, ShortRepr
 from cpg_ros.feedback.estimate import SensorData
@@ -221,8 +222,9 @@ data card. The same seed makes the same set. Nothing of it is of a person or an 
 you like (CC0)."""
 EPILOG = """\
 examples:
-  record_dataset --out walks
-  record_dataset --robot my_robot.yaml --model my_robot.urdf --gaits trot --out my_walks
+  python benchmarks/record_dataset.py --out walks
+  python benchmarks/record_dataset.py --robot my_robot.yaml --model my_robot.urdf --gaits trot \\
+      --out my_walks
 
 exit codes: 0 written, 2 invalid arguments or an unusable file, 130 stopped (nothing written)."""
 CARD = """# Simulated walks of {robots}
