@@ -25,7 +25,12 @@ from cpg_ros.common import files
 from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.c3d_process import read_apart, UnreadableC3D
-from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
+from cpg_ros.fitting.recordings.markers import (
+    joint_recording,
+    marker_names,
+    Markers,
+    SEGMENTS,
+)
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     JOINTS,
@@ -70,7 +75,7 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
 def c3d_markers(path: str | Path) -> Markers:
     """Read the points of a C3D file; one with a negative residual was not seen.
 
-    Names lose what stands before a colon, the subject.
+    Names are those of `marker_names`.
 
     Raises:
         RecordingError: the file is damaged, or has no points.
@@ -96,21 +101,25 @@ def _contents(path: Path) -> tuple[Markers, list[str], str]:
     if not count or not frames:
         raise RecordingError(f'{path}: {pluralize(count, "point")} in '
                              f'{pluralize(frames, "frame")}')
-    names = labels[:count]
-    if len(names) != count:
-        raise RecordingError(f'{path}: {len(names)} labels for {pluralize(count, "point")}')
+    labels = labels[:count]
+    if len(labels) != count:
+        raise RecordingError(f'{path}: {len(labels)} labels for {pluralize(count, "point")}')
     places = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
     notes = ([f'{pluralize(frames, "frame")}, where the header states {stated}: it may be cut']
              if frames < stated else [])
-    found = Markers(tuple(names), stamps_of_frames(np.arange(frames), rate, path), places, path,
-                    notes=tuple(notes))
-    return found, [name for name in names if name in angles], ''.join(units[:1]).strip()
+    names, doubles = marker_names(labels, places)
+    found = Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
+                    notes=(*notes, *doubles))
+    known = {name.rpartition(':')[2] for name in angles}
+    return found, [name for name, label in zip(names, labels, strict=True)
+                   if label in angles or label.rpartition(':')[2] in known
+                   ], ''.join(units[:1]).strip()
 
 
 def _names(point: Mapping[str, Any], key: str) -> list[str]:
     """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
     keys = sorted((one for one in point if one.startswith(key)), key=lambda one: (len(one), one))
-    return [str(name).rpartition(':')[2].strip() for one in keys for name in point[one]]
+    return [str(name).strip() for one in keys for name in point[one]]
 
 
 def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]

@@ -19,7 +19,7 @@ import csv
 from dataclasses import replace
 from fnmatch import fnmatchcase
 import io
-from itertools import chain, islice
+from itertools import chain, islice, takewhile
 from pathlib import Path
 
 from cpg_ros.common.command_line import printable, progress_bar
@@ -35,24 +35,34 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingFormat,
     require,
     UNIT,
+    UNNAMED,
 )
 from cpg_ros.fitting.recordings.tables import (
     ANGLES,
     Column,
     decimal_commas,
+    EMPTY,
     load_columns,
     LoadColumns,
+    MOST_LINES,
+    NAMED,
+    NANOSECONDS,
     number_in,
     opened,
     POSITION,
+    PREAMBLE,
     preamble,
+    RECEIPT,
+    SECONDS,
     SHARE,
     split,
     TIME,
     TIMES,
     TRUTH,
     units_of,
+    VALUE,
 )
+from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 DELIMITERS = ',;\t'
@@ -120,20 +130,35 @@ class _Table:
         self.path = path
         self.line, self.read = 1, 0
         self.notes: list[str] = []
+        #: Cells that are the same in all rows.
+        self.fixed: dict[int, str] = {}
         line = file.readline()
         while line and not line.strip():
             line, self.line = file.readline(), self.line + 1
         if not line:
             raise RecordingError(f'{path}: the file is empty')
         self._printable(line, self.line)
-        if not any(map(line.count, DELIMITERS)) and (found := preamble(line, file)) is not None:
+        head = [line, *islice(file, PREAMBLE)]
+        rest = iter(head[1:])
+        if not any(map(line.strip(EMPTY).count, DELIMITERS)) and (
+                found := preamble(line, rest)) is not None:
             line, self.line, declared = found[0], self.line + found[1], found[2]
             if unit and declared and unit != declared:
                 raise RecordingError(f'{path}: its preamble says {declared}, not {unit}')
             unit = unit or declared
+        else:
+            before = _lines_before_header(head)
+            line, rest = head[before], iter(head[before + 1:])
+            if before:
+                self.line += before
+                self.notes.append(f'{pluralize(before, "line")} before the header, passed over')
+        self.lines = chain(rest, file)
         self.delimiter = max(DELIMITERS, key=line.count)
         headers = [header.strip() for header in self._cells(line.lstrip('#'), self.line)]
-        while len(headers) > 2 and not headers[-1]:
+        if echoed := self._echoed(headers):
+            headers, self.lines = echoed, chain([line], self.lines)
+            self.line -= 1
+        while len(headers) > 2 and not headers[-1] and not echoed:
             headers.pop()
         if len(headers) < 2:
             raise RecordingError(f'{path}, line {self.line}: one column only, '
@@ -142,16 +167,7 @@ class _Table:
         if all(number_in(header) is not None for header in headers if header):
             raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
                                  'name the columns')
-        self.width, self.ended = len(headers), False
-        first = file.readline()
-        if (named := self._units(headers, first)) != headers:
-            headers, first = named, file.readline()
-            self.line += 1
-            self.notes.append(f'line {self.line} is taken for the units of the columns')
-        self.commas = decimal_commas(first, self.delimiter)
-        if self.commas:
-            self.notes.append('commas are taken for decimal points')
-        self.lines = chain([first] if first else [], file)
+        headers = self._begin(headers)
         self.time = self._time(headers, time)
         self.loads = LoadColumns(load_columns(headers))
         if self.loads.columns:
@@ -159,6 +175,83 @@ class _Table:
                               + abbreviate([one.header for one in self.loads.columns]))
         self.columns = self._joints(headers, unit, joints)
         self.last = -np.inf
+
+    def _begin(self, headers: list[str]) -> list[str]:
+        """Look at the first line below the header; return the header as it is to be read."""
+        self.width, self.ended = len(headers), False
+        first = next(self.lines, '')
+        if (named := self._units(headers, first)) != headers:
+            headers, first = named, next(self.lines, '')
+            self.line += 1
+            self.notes.append(f'line {self.line} is taken for the units of the columns')
+        self.commas = decimal_commas(first, self.delimiter)
+        if self.commas:
+            self.notes.append('commas are taken for decimal points')
+        self.lines = chain([first] if first else [], self.lines)
+        if first.strip() and '\0' not in first and (places := _tidy(
+                headers, self._cells(first, self.line + 1))):
+            headers = self._widened(headers, *places)
+            self.width = len(headers)
+        return headers
+
+    def _echoed(self, cells: list[str]) -> list[str]:
+        """Return headers for the output of ``ros2 topic echo --csv``, [] for any other line.
+
+        Its lines are the seconds and nanoseconds of the stamp, the frame, the names, positions,
+        velocities and efforts.
+        """
+        if len(cells) < 5 or not (cells[0].isdecimal() and cells[1].isdecimal()
+                                  and len(cells[1]) < 10):
+            return []
+        names = list(takewhile(lambda cell: number_in(cell) is None, cells[3:]))
+        rest = cells[3 + len(names) + len(names):]
+        if not names or len(cells) < 3 + 2 * len(names):
+            return []
+        self.fixed = dict(enumerate(names, 3))
+        self.notes.append('taken for the output of ros2 topic echo --csv')
+        return ['sec', 'nanosec', '', *[''] * len(names), *names, *[''] * len(rest)]
+
+    def _widened(self, headers: list[str], name: int, value: int) -> list[str]:
+        """Turn a table with a line for each value into one with a column for each joint.
+
+        Args:
+            headers: of the columns.
+            name: the column of the joints' names.
+            value: that of their angles.
+
+        Returns:
+            The headers of the new table, whose lines replace those of the file.
+
+        """
+        time = self._time(headers, None).index
+        rows: dict[str, dict[str, str]] = {}
+        joints: dict[str, None] = {}
+        for number, line in enumerate(self.lines, self.line + 1):
+            self.read += len(line)
+            if number > MOST_LINES:
+                raise RecordingError(f'{self.path}: more than {MOST_LINES} lines: divide it into '
+                                     'parts')
+            if not line.strip():
+                continue
+            self._printable(line, number)
+            cells = self._cells(line, number)
+            if len(cells) < self.width:
+                raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
+                                     f'the header has {self.width}')
+            when, joint = cells[time].strip(), cells[name].strip()
+            for cell in (when, cells[value]):
+                if number_in(cell) is None:
+                    raise RecordingError(f'{self.path}, line {number}: {cell.strip()[:40]!r} is '
+                                         'not a number')
+            joints.setdefault(joint)
+            rows.setdefault(when, {}).setdefault(joint, cells[value].strip())
+        unit = split(headers[value])[1]
+        self.notes.append(f'a line for each value: {headers[value]!r} by {headers[name]!r}')
+        times = sorted(rows, key=lambda when: number_in(when) or 0.0)
+        self.lines = chain(self.delimiter.join((when, *(rows[when].get(joint, '')
+                                                        for joint in joints))) + '\n'
+                           for when in times)
+        return [headers[time], *(f'{joint} [{unit}]' if unit else joint for joint in joints)]
 
     def _cells(self, line: str, number: int) -> list[str]:
         try:
@@ -182,7 +275,8 @@ class _Table:
             raise RecordingError(f'{self.path}, line {number}: not a text file (a byte 0)')
 
     def _time(self, headers: list[str], option: str | None) -> Column:
-        """Find the time column."""
+        """Find the time column, or that of the seconds beside one of nanoseconds."""
+        self.rest, self.shares = -1, False
         found = []
         for k, header in enumerate(headers):
             name, unit = split(header)
@@ -191,11 +285,20 @@ class _Table:
                 unit = unit or match[2]
             if match and (unit is None or unit in TIMES):
                 found.append((k, header, unit))
-        shares = [k for k, header in enumerate(headers)
-                  if SHARE.fullmatch(split(header)[0]) and split(header)[1] in (None, '%')]
+        names = [split(header)[0] for header in headers]
+        if len(found) != 1:
+            pair = [[k for k, name in enumerate(names) if kind.match(name)]
+                    for kind in (SECONDS, NANOSECONDS)]
+            if len(pair[0]) == len(pair[1]) == 1:
+                self.rest = pair[1][0]
+                return Column(pair[0][0], headers[pair[0][0]], '', 1.0)
+        shares = [k for k, name in enumerate(names)
+                  if SHARE.match(name) and split(headers[k])[1] in (None, '%')]
         self.shares = not found and len(shares) == 1
         if self.shares:
             return Column(shares[0], headers[shares[0]], '', 0.01)
+        found = found or [(k, name, None) for k, name in enumerate(names)
+                          if RECEIPT.match(name)][:1]
         if len(found) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '
@@ -220,8 +323,11 @@ class _Table:
         loads = {column.index for column in self.loads.columns}
         for k, header in enumerate(headers):
             name, unit = split(header)
-            if k == self.time.index or k in loads or not name:
+            if k in (self.time.index, self.rest) or k in loads or not name or any(
+                    kind.match(name) for kind in (RECEIPT, SECONDS, NANOSECONDS)):
                 continue
+            if UNNAMED.match(header):
+                name, unit = header.rpartition('.')[2], None
             if unit is None or unit.lower() in ANGLES:
                 columns.append(Column(k, header, name,
                                        self._scale(header, unit, option, ANGLES)))
@@ -264,10 +370,13 @@ class _Table:
             if self.commas:
                 lines = [line.replace(',', '.') for line in lines]
             numbers = self._numbers(lines)
-            seconds = numbers[:, self.time.index] * self.time.scale
+            seconds = whole = numbers[:, self.time.index] * self.time.scale
+            rest = numbers[:, self.rest] if self.rest >= 0 else np.zeros(len(seconds))
+            seconds = whole + 1e-9 * rest
             self._check(seconds, lines)
             self.loads.add(seconds, numbers)
-            yield (np.rint(seconds * 1e9).astype(np.int64), names,
+            # In two parts, as floats do not hold a date to the nanosecond.
+            yield (np.rint(whole * 1e9).astype(np.int64) + rest.astype(np.int64), names,
                    numbers[:, places] * scales)
             self.line += len(lines)
 
@@ -283,6 +392,8 @@ class _Table:
         loads = {column.index for column in self.loads.columns}
         needed = {column.index: column.header
                   for column in (self.time, *self.columns, *self.loads.columns)}
+        if self.rest >= 0:
+            needed[self.rest] = 'nanoseconds'
         rows = []
         for number, line in enumerate(lines, self.line + 1):
             if not line.strip():
@@ -295,6 +406,10 @@ class _Table:
             if len(cells) != self.width:
                 raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
                                      f'the header has {self.width}')
+            for k, text in self.fixed.items():
+                if cells[k] != text:
+                    raise RecordingError(f'{self.path}, line {number}: joint {cells[k][:40]!r}, '
+                                         f'where the first line has {text!r}')
             row = np.full(self.width, np.nan)
             for k, header in needed.items():
                 value = number_in(cells[k])
@@ -328,6 +443,26 @@ class _Table:
                                  f'{value:.9g} s')
         if len(seconds):
             self.last = float(seconds[-1])
+
+
+def _lines_before_header(head: Sequence[str]) -> int:
+    """Return how many lines come before the one that has the time among its columns."""
+    for k, line in enumerate(head):
+        cells = [split(cell.strip())[0] for cell in line.lstrip('#').strip().split(
+            max(DELIMITERS, key=line.count))]
+        if len(cells) > 1 and any(kind.match(cell) for kind in (TIME, RECEIPT, SECONDS, SHARE)
+                                  for cell in cells):
+            return k
+    return 0
+
+
+def _tidy(headers: Sequence[str], cells: Sequence[str]) -> tuple[int, int] | None:
+    """Return the columns of names and of values of a table with a line for each value, or None."""
+    names = [k for k, header in enumerate(headers) if NAMED.match(header)]
+    values = [k for k, header in enumerate(headers) if VALUE.match(split(header)[0])]
+    if len(names) != 1 or len(values) != 1 or len(cells) < len(headers):
+        return None
+    return None if number_in(cells[names[0]]) is not None else (names[0], values[0])
 
 
 CSV = RecordingFormat(

@@ -31,11 +31,13 @@ from cpg_ros.fitting.recordings.opensim_reader import MOT, TRC
 from cpg_ros.fitting.recordings.pose_reader import POSE
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    name_positions,
     Option,
     Recording,
     RecordingError,
     RecordingFormat,
     repeat_stride,
+    UNNAMED,
 )
 
 #: Name -> format. One more is a file like those of these, and its name here.
@@ -104,6 +106,8 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     if robot_joints and 'joints' not in given and 'some' in args.features:
         given |= {'joints': robot_joints, 'some': True}
     recording = args.read(path, progress=progress, **given)
+    if robot_joints and all(map(UNNAMED.match, recording.joints)):
+        recording = name_positions(recording, robot_joints)
     return recording if cycle is None else repeat_stride(recording, cycle)
 
 

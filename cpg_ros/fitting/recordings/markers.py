@@ -20,7 +20,7 @@ laboratory's axes stand.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
 from typing import Any
@@ -83,11 +83,31 @@ class JointAngle:
 
 @dataclass(frozen=True)
 class Segments:
-    """Segments, the joints between them, and the likelihood below which a marker is not seen."""
+    """Segments and the joints between them.
+
+    Attributes:
+        segments: name -> segment.
+        joints: name -> angle.
+        likely: likelihood below which a marker is not seen.
+        alternatives: marker -> other names for it, or for what may stand in its place.
+
+    """
 
     segments: Mapping[str, Segment]
     joints: Mapping[str, JointAngle]
     likely: float = LIKELY
+    alternatives: Mapping[str, Sequence[str]] = field(default_factory=dict)
+
+    def named_as(self, there: Sequence[str]) -> 'Segments':
+        """Return the same with those alternatives for markers that are there."""
+        names = {name: next((one for one in others if one in there), name)
+                 for name, others in self.alternatives.items() if name not in there}
+
+        def ends(markers: tuple[str, ...]) -> tuple[str, ...]:
+            return tuple(dict.fromkeys(names.get(one, one) for one in markers))
+
+        return replace(self, segments={name: Segment(ends(one.begin), ends(one.end))
+                                       for name, one in self.segments.items()})
 
     def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
         """Return the markers that a joint's angle is made of, each once.
@@ -150,6 +170,8 @@ def load_segments(name: str | Path) -> Segments:
           leftward: [pelvis_right, pelvis_left]
         joints:
           knee: {between: [thigh, shank], axis: leftward, neutral: 0.0}
+        alternatives:               # optional: other names for a marker, the first that is there
+          hip: [greater_trochanter]
 
     In three dimensions, a joint with an axis is the angle that its two segments have as seen along
     the axis, positive by the right hand; one without is the angle between them, which is never
@@ -170,7 +192,8 @@ def load_segments(name: str | Path) -> Segments:
     if not path.exists():
         raise RecordingError(f'{path}: there is no such file of segments; shipped are '
                              f'{abbreviate(shipped())}')
-    tree = reader.keys(reader.tree(), 'file', {'segments', 'joints'}, {'least_likelihood'})
+    tree = reader.keys(reader.tree(), 'file', {'segments', 'joints'},
+                       {'least_likelihood', 'alternatives'})
     for key in ('segments', 'joints'):
         if not isinstance(tree[key], Mapping) or not tree[key]:
             raise reader.fail(key, 'must be a mapping with at least one entry')
@@ -178,8 +201,13 @@ def load_segments(name: str | Path) -> Segments:
                 for key, value in tree['segments'].items()}
     joints = {key: reader.joint(value, f'joints.{key}', segments)
               for key, value in tree['joints'].items()}
+    others = tree.get('alternatives') or {}
+    if not isinstance(others, Mapping):
+        raise reader.fail('alternatives', 'must be a mapping')
+    alternatives = {name: [reader.text(one, f'alternatives.{name}[{k}]') for k, one in enumerate(
+        reader.items(value, f'alternatives.{name}'))] for name, value in others.items()}
     return Segments(segments, joints, reader.number(
-        tree.get('least_likelihood', LIKELY), 'least_likelihood', within(0.0, 1.0)))
+        tree.get('least_likelihood', LIKELY), 'least_likelihood', within(0.0, 1.0)), alternatives)
 
 
 #: A segment that, as seen along the axis, has less than this share of its length has no direction.
@@ -202,9 +230,6 @@ class Markers(ShortRepr):
             that is not known; None where all are certain.
         notes: what was repaired or left out, one line each.
 
-    Raises:
-        RecordingError: a name that is there twice.
-
     """
 
     names: tuple[str, ...]
@@ -214,14 +239,38 @@ class Markers(ShortRepr):
     likelihoods: np.ndarray | None = None
     notes: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        again = [name for k, name in enumerate(self.names) if name in self.names[:k]]
-        if again:
-            raise RecordingError(f'{self.source}: two markers are called {again[0]!r}')
-
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.names)} markers in {self.points.shape[-1]} '
                 f'dimensions, {pluralize(len(self.stamps), "sample")}')
+
+
+def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, ...], list[str]]:
+    """Return names of markers that are there once each, and notes.
+
+    The subject before a colon is left out, unless names are then there twice. Of equal labels the
+    one with most points keeps the name, and the others are numbered: 'LKNE#2'.
+
+    Args:
+        labels: as in the file.
+        points: shape (n, markers, 2 or 3), nan where not seen.
+
+    """
+    short = [label.rpartition(':')[2].strip() for label in labels]
+    subjects: dict[str, set[str]] = {}
+    for label, name in zip(labels, short, strict=True):
+        subjects.setdefault(name, set()).add(label)
+    names = [name if len(subjects[name]) == 1 else label
+             for label, name in zip(labels, short, strict=True)]
+    seen = np.isfinite(points).all(axis=2).sum(axis=0)
+    notes = []
+    for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+        places = sorted((k for k, one in enumerate(names) if one == name), key=lambda k: -seen[k])
+        for number, k in enumerate(places[1:], 2):
+            names[k] = f'{name}#{number}'
+        notes.append(f'{len(places)} markers are called {name!r}: the one seen in '
+                     f'{pluralize(int(seen[places[0]]), "sample")} is taken, the other in '
+                     f'{seen[places[1]]}')
+    return tuple(names), notes
 
 
 def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None) -> np.ndarray:
@@ -278,6 +327,7 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
                              f'(segments), or a shipped one: {abbreviate(shipped())}')
     if not isinstance(segments, Segments):
         segments = load_segments(segments)
+    segments = segments.named_as(markers.names)
     notes = list(markers.notes)
     wanted = matching(joints, list(segments.joints), f'{source}, segments')
     solid = markers.points.shape[2] == 3

@@ -24,7 +24,12 @@ from pathlib import Path
 import re
 
 from cpg_ros.fitting.recordings.csv_reader import read_csv
-from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
+from cpg_ros.fitting.recordings.markers import (
+    joint_recording,
+    marker_names,
+    Markers,
+    SEGMENTS,
+)
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     JOINTS,
@@ -85,12 +90,12 @@ def trc_markers(path: str | Path) -> Markers:
     if len(cells) < 3 or cells[0].lower() != 'frame#' or not cells[1].lower().startswith('time'):
         raise RecordingError(f"{path}, line 4: the columns have to be 'Frame#', 'Time' and the "
                              f'markers, with tabs between, not {abbreviate(cells)}')
-    names = tuple(cell.rpartition(':')[2] for cell in cells[2:] if cell)
+    labels = [cell for cell in cells[2:] if cell]
     stated = facts.get('NumMarkers')
-    if stated != str(len(names)):
-        raise RecordingError(f'{path}, line 4: {pluralize(len(names), "marker")}, where '
-                             f'NumMarkers is {stated or "missing"}')
-    rows, notes = number_rows(rest, '\t', 2 + 3 * len(names), path, 6)
+    rows, notes = number_rows(rest, '\t', 2 + 3 * len(labels), path, 6)
+    if stated != str(len(labels)):
+        notes.append(f'{pluralize(len(labels), "marker")}, where NumMarkers is '
+                     f'{stated or "missing"}')
     if not len(rows):
         raise RecordingError(f'{path}: no rows')
     if facts.get('NumFrames') != str(len(rows)):
@@ -104,8 +109,9 @@ def trc_markers(path: str | Path) -> Markers:
     points = rows[:, 2:].reshape(len(rows), -1, 3)
     unseen = (points == 0.0).all(axis=2)
     points[unseen] = np.nan
+    names, doubles = marker_names(labels, points)
     return Markers(names, np.rint(seconds * 1e9).astype(np.int64), points, path,
-                   notes=tuple(notes))
+                   notes=(*notes, *doubles))
 
 
 TRC = RecordingFormat(
@@ -141,8 +147,10 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     """
     path = Path(path)
     declared, columns, rows = _header(path)
+    # Speeds of states are called like their coordinate, with '_u' behind.
+    speeds = {f'{column}_u' for column in columns}
     angles = {column: _joint(column) for column in columns
-              if not NO_ANGLE.search(_joint(column)) and (
+              if column not in speeds and not NO_ANGLE.search(_joint(column)) and (
                   not (state := STATE.match(column)) or state[2] == 'value')}
     if not angles:
         raise RecordingError(f'{path}: no column of joint angles; there are '

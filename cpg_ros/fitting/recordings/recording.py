@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
+import re
 
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.fitting.recordings.thinned import (
@@ -335,6 +336,25 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
             notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
                          f'{JITTER:.0%} of the usual {usual:.4g} s')
     return notes
+
+
+#: Positions without names, by their place in the message: 'position[3]'.
+UNNAMED = re.compile(r'^(?:.*[./])?positions?\[(\d+)\]$')
+
+
+def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recording:
+    """Name positions that have none by the order of a robot file.
+
+    Raises:
+        RecordingError: there are more or fewer than the robot has joints.
+
+    """
+    if len(recording.joints) != len(robot_joints):
+        raise RecordingError(f'{recording.source}: {pluralize(len(recording.joints), "position")} '
+                             f'without names, where the robot file has {len(robot_joints)} joints')
+    return replace(recording, joints=tuple(robot_joints), notes=(
+        *recording.notes, 'the positions have no names: they are taken in the order of the '
+        'robot file'))
 
 
 # Recordings of exactly one stride, as gait laboratories cut them.

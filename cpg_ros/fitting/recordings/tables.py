@@ -14,6 +14,7 @@
 
 """The text of tables as programs write it: packed, with a preamble, with a row of units."""
 
+import codecs
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -48,7 +49,15 @@ TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
          'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
 #: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
 BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
-TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp)(?:[_ ]([a-z]+))?$', re.I)
+TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|temps|tiempo|tempo'
+                  r'|elapsed[_ ]time)(?:[_ ]([a-z]+))?$', re.I)
+#: Times by another clock, taken where there is no other; and halves of a stamp in integers.
+RECEIPT = re.compile(r'^(receive|recv|log|publish)[_ ]?time$', re.I)
+SECONDS = re.compile(r'^(.*[./_])?(secs?)$', re.I)
+NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
+#: In a table with a line for each value: columns of names, and of values.
+NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
+VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
 #: Where a stride is 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
 SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
 #: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
@@ -276,6 +285,10 @@ LARGEST, LONGEST = 4_000_000_000, 1 << 17
 MOST_LINES = 2_000_000
 #: What a file packed by gzip begins with.
 GZIP = b'\x1f\x8b'
+#: What a file in UTF-16 begins with, as some spreadsheets write it.
+UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
+#: What may end a line, such as the delimiters that spreadsheets fill it up with.
+EMPTY = ',;\t \r\n'
 #: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
 END, PREAMBLE = 'endheader', 100
 #: What a row of units has in its cells, beside numbers that would make it one of samples.
@@ -340,10 +353,11 @@ def opened(path: Path) -> Iterator[io.TextIOBase]:
     """
     try:
         with files.opened(path, RecordingError, largest=LARGEST) as file:
-            packed = file.read(2) == GZIP
+            start = file.read(2)
             file.seek(0)
-            unpacked = _Unpacked(file, path) if packed else file
-            with _Lines(cast(IO[bytes], unpacked), encoding='utf-8-sig', newline='') as text:
+            unpacked = _Unpacked(file, path) if start == GZIP else file
+            with _Lines(cast(IO[bytes], unpacked), newline='',
+                        encoding='utf-16' if start in UTF_16 else 'utf-8-sig') as text:
                 text.path = path
                 yield text
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
@@ -367,7 +381,7 @@ def remaining_lines(text: io.TextIOBase, path: Path) -> list[str]:
     return lines
 
 
-def preamble(first: str, text: io.TextIOBase
+def preamble(first: str, text: Iterator[str]
              ) -> tuple[str, int, str | None, int | None] | None:
     """Pass over the preamble of OpenSim's files.
 
@@ -381,15 +395,15 @@ def preamble(first: str, text: io.TextIOBase
 
     """
     lines = [first]
-    while lines[-1].strip().lower() != END:
-        lines.append(text.readline())
+    while lines[-1].strip(EMPTY).lower() != END:
+        lines.append(next(text, ''))
         if not lines[-1] or len(lines) > PREAMBLE:
             return None
-    values = {name.strip().lower(): value.strip().lower()
+    values = {name.strip().lower(): value.strip(EMPTY).lower()
               for name, mark, value in (line.partition('=') for line in lines) if mark}
     units = {'yes': 'deg', 'no': 'rad'}
     rows = values.get('nrows', values.get('datarows', ''))
-    return (text.readline(), len(lines), units.get(values.get('indegrees', '')),
+    return (next(text, ''), len(lines), units.get(values.get('indegrees', '')),
             int(rows) if rows.isdecimal() and len(rows) < 12 else None)
 
 

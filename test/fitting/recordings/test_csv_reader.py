@@ -15,6 +15,7 @@
 """CSV files, against numbers that were printed into them."""
 
 from cpg_ros.fitting.recordings.csv_reader import read_csv
+from cpg_ros.fitting.recordings.formats import read_recording
 from cpg_ros.fitting.recordings.recording import RecordingError
 from depth import examples
 from hypothesis import given
@@ -128,6 +129,73 @@ def test_tables_of_plotjuggler(write):
     recording = read_csv(path)
     assert recording.joints == ('lf_hip', 'rf_hip')
     assert recording.positions.tolist() == [[0.1, 0.2], [0.3, 0.4]]
+
+
+TIMES = 1_700_000_000_123_456_789 + 4_000_000 * np.arange(30)
+ANGLES = np.sin(0.2 * np.arange(30)[:, None] + np.arange(2))
+
+
+def rows(line):
+    """Return lines of a table: of each, its number, the stamp in ns and the angles as text."""
+    return ''.join(line(k, int(when), *(f'{x:.6f}' for x in row)) + '\n'
+                   for k, (when, row) in enumerate(zip(TIMES, ANGLES, strict=True)))
+
+
+def stamp(when):
+    return f'{when // 10**9},{when % 10**9}'
+
+
+@pytest.mark.parametrize('text', [
+    # ros2 topic echo --csv has no header.
+    rows(lambda k, t, a, b: f'{stamp(t)},,lf_hip,rf_hip,{a},{b},0.5,0.5,'),
+    ',header.stamp.sec,header.stamp.nanosec,lf_hip,rf_hip\n'
+    + rows(lambda k, t, a, b: f'{k},{stamp(t)},{a},{b}'),
+    # The message's stamp counts, not when it was received.
+    'receive_time,log_time,header.stamp.sec,header.stamp.nsec,lf_hip,rf_hip\n'
+    + rows(lambda k, t, a, b: f'{t / 1e9 + 0.01 * (k % 3)},7,{stamp(t)},{a},{b}'),
+], ids=['echo', 'pandas', 'foxglove'])
+def test_stamps_in_whole_seconds_and_nanoseconds(write, text):
+    recording = read_csv(write(text))
+    assert recording.joints == ('lf_hip', 'rf_hip')
+    assert recording.times.tolist() == ((TIMES - TIMES[0]) / 1e9).tolist()
+    assert recording.positions == pytest.approx(ANGLES, abs=1e-6)
+
+
+TABLE = 'time,lf_hip,rf_hip\n' + rows(lambda k, t, a, b: f'{0.004 * k:.3f},{a},{b}')
+
+
+@pytest.mark.parametrize('text', [
+    'Exported by Nexus\nSubject,Anna\nrate [Hz],250\n\n' + TABLE,
+    TABLE.encode('utf-16'),
+    TABLE.replace('time', 'Zeit').replace(',', ';').replace('.', ','),
+    # What Foxglove's plots and data frames have: a line for each value.
+    'elapsed time,receive time,topic,value\n' + rows(
+        lambda k, t, a, b: f'{0.004 * k:.3f},7,lf_hip,{a}\n{0.004 * k:.3f},7,rf_hip,{b}'),
+    'time,joint,position\n' + rows(lambda k, t, a, b: f'{0.004 * k:.3f},lf_hip,{a}')
+    + rows(lambda k, t, a, b: f'{0.004 * k:.3f},rf_hip,{b}'),
+    '__time,/joint_states/lf_hip/position,/imu/x,/joint_states/rf_hip/position\n' + rows(
+        lambda k, t, a, b: f'{0.004 * k:.3f},{a},,{b}\n{0.004 * k + 0.001:.3f},,5,'),
+], ids=['preamble', 'utf-16', 'german', 'foxglove plot', 'tidy', 'plotjuggler'])
+def test_tables_as_programs_write_them(write, text):
+    recording = read_csv(write(text))
+    assert recording.joints == ('lf_hip', 'rf_hip')
+    assert recording.times == pytest.approx(0.004 * np.arange(30))
+    assert recording.positions == pytest.approx(ANGLES, abs=1e-6)
+
+
+def test_positions_without_names_are_those_of_a_robot_file(write):
+    path = write('t,position[0],position[1],velocity[0]\n' + rows(
+        lambda k, t, a, b: f'{0.004 * k:.3f},{a},{b},0'))
+    recording = read_recording(path, robot_joints=['lf_hip', 'rf_hip'])
+    assert recording.joints == ('lf_hip', 'rf_hip')
+    assert 'in the order of the robot file' in recording.notes[-1]
+    with pytest.raises(RecordingError, match='2 positions without names, where the robot file'):
+        read_recording(path, robot_joints=['lf_hip', 'rf_hip', 'lh_hip'])
+
+
+def test_names_that_change_in_an_echo_are_refused_by_line(write):
+    text = rows(lambda k, t, a, b: f'{stamp(t)},,{"lf,rf" if k < 9 else "rf,lf"},{a},{b}')
+    assert refused(write(text)) == ", line 10: joint 'rf', where the first line has 'lf'"
 
 
 def test_other_units_are_no_joints(write):

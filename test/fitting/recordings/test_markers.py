@@ -161,8 +161,6 @@ def test_joints_without_markers_are_left_out_with_a_note_or_refused_if_asked_for
         joint_recording(markers(np.full_like(points, np.nan), names), HUMAN)
     with pytest.raises(RecordingError, match='no joint angles: give a file of segments'):
         joint_recording(markers(points, names), None)
-    with pytest.raises(RecordingError, match="two markers are called 'a'"):
-        markers(points, ['a'] * len(names))
 
 
 def test_a_file_of_markers_is_inverted_like_the_angles_it_has(tmp_path, capsys):

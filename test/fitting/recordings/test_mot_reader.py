@@ -88,3 +88,16 @@ def test_what_is_wrong_is_said(tmp_path, text, words):
 def test_a_declared_unit_is_not_overruled():
     with pytest.raises(RecordingError, match='its preamble says deg, not rad'):
         read_mot(RUNNING, unit='rad', progress=False)
+
+
+def test_delimiters_at_the_ends_of_all_lines_and_speeds_beside_states(tmp_path):
+    path = tmp_path / 'states.sto'
+    text = ('walk\nversion=1\nnRows=2\ninDegrees=yes\nendheader\ntime\tknee_r\tknee_r_u\n'
+            '0\t10\t7\n1\t20\t8\n')
+    path.write_text(text)
+    plain = read_mot(path, progress=False)
+    assert plain.joints == ('knee_r',) and plain.positions[1] == pytest.approx(np.radians(20.0))
+    path.write_text(text.replace('\n', '\t\t\n'))
+    filled = read_mot(path, progress=False)
+    assert filled.joints == ('knee_r',)
+    assert filled.positions.tolist() == plain.positions.tolist()

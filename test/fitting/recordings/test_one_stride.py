@@ -41,7 +41,7 @@ def table(path, cycles, time='time', scale=1.0, count=101, noise=0.0):
 
 def test_a_declared_stride_has_the_duration_that_the_file_has(tmp_path):
     path = table(tmp_path / 'one.csv', 1.0, scale=0.92)
-    found = fit_recording(read_recording(path, cycle=0.0), order=1)
+    found = fit_recording(read_recording(path, cycle=0.0), order=1, free=['current'])
     assert found.stride.frequency == pytest.approx(1.0 / 0.92, rel=1e-9)
     assert found.stride.cycles == 1 and found.fit.gait == 'walk'
     assert found.stride.phases['right'] == pytest.approx(0.5, abs=1e-3)
@@ -63,7 +63,7 @@ def test_a_normalised_table_needs_the_duration(tmp_path, time):
 
 def test_one_stride_is_recognised_with_a_warning(tmp_path):
     path = table(tmp_path / 'one.csv', 1.0, noise=0.01)
-    found = fit_recording(read_recording(path), order=1)
+    found = fit_recording(read_recording(path), order=1, free=['current'])
     assert found.stride.frequency == pytest.approx(1.0, rel=0.02)
     assert found.confidence <= 0.5 and '--cycle' in found.warnings[0]
 

@@ -22,7 +22,8 @@ GOOD = 'segments: {a: [x, y], b: [[y, z], w]}\njoints: {knee: {between: [a, b]}}
 
 
 def test_shipped_files_are_read():
-    assert shipped() == ['dog_skeleton', 'human_plug_in_gait', 'mouse_side_view']
+    assert shipped() == ['dog_skeleton', 'human_key_points', 'human_plug_in_gait',
+                         'mouse_side_view', 'quadruped_side_view']
     for name in shipped():
         assert len(load_segments(name).joints) >= 6
     mouse = load_segments('mouse_side_view')
@@ -52,6 +53,7 @@ def test_a_file_of_ones_own(tmp_path):
     (GOOD.replace('[a, b]', '[a, b], axis: q'), r"joints\.knee: there is no segment 'q'"),
     (GOOD.replace('[a, b]', '[a, b], neutral: 90'), r'neutral: 90 rad is more than half a turn'),
     (GOOD.replace('[a, b]', '[a, b], neutral: .nan'), r'neutral: must be finite'),
+    (GOOD + 'alternatives: {x: q}', r'alternatives\.x: must be a list'),
     (GOOD + 'least_likelihood: 60', r'least_likelihood: 60 is not from 0 to 1'),
     ('segments: [a', r'line \d'),
 ])
@@ -64,5 +66,5 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, text, words):
 
 
 def test_a_name_that_is_no_file():
-    with pytest.raises(RecordingError, match="shipped are 'dog_skeleton', 'human_plug_in"):
+    with pytest.raises(RecordingError, match="shipped are 'dog_skeleton', 'human_key_p"):
         load_segments('horse')

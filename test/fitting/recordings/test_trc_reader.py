@@ -14,7 +14,7 @@
 
 """TRC files: markers come back, gaps are gaps, and what is wrong is named."""
 
-from cpg_ros.fitting.recordings.opensim_reader import trc_markers
+from cpg_ros.fitting.recordings.opensim_reader import read_trc, trc_markers
 from cpg_ros.fitting.recordings.recording import RecordingError
 import numpy as np
 import pytest
@@ -51,8 +51,8 @@ def test_a_cut_file_is_read_to_its_last_whole_row(tmp_path):
 
 @pytest.mark.parametrize(('change', 'words'), [
     (lambda text: '', "no TRC file: it does not begin with 'PathFileType'"),
-    (lambda text: text[:200], r'line 4: \d+ markers?, where NumMarkers is 12'),
-    (lambda text: text.replace('RTOE', ''), '11 markers, where NumMarkers is 12'),
+    (lambda text: text[:200], 'no rows'),
+    (lambda text: text.replace('RTOE', ''), 'columns, where there should be 35'),
     (lambda text: text.replace('Frame#', 'Frames'), "line 4: the columns have to be 'Frame#'"),
     (lambda text: text.replace('\t0.050000', '\t?'), r"line 12: '\?' is not a number"),
     (lambda text: text.replace('\t0.050000', '\tnan'), '1 row without a time in s, such as f'),
@@ -63,3 +63,40 @@ def test_a_cut_file_is_read_to_its_last_whole_row(tmp_path):
 def test_what_is_wrong_is_said(tmp_path, change, words):
     with pytest.raises(RecordingError, match=words):
         read(tmp_path, change(trc(TIME, POINTS)))
+
+
+def test_a_wrong_number_of_markers_and_delimiters_at_the_ends_of_lines(tmp_path):
+    text = trc(TIME, POINTS)
+    wrong = read(tmp_path, text.replace('\t12\t', '\t11\t', 1))
+    assert wrong.names == LABELS and '12 markers, where NumMarkers is 11' in wrong.notes
+    filled = read(tmp_path, text.replace('\n', '\t\t\t\n'))
+    np.testing.assert_allclose(filled.points, wrong.points)
+
+
+def test_of_equal_labels_the_one_with_data_is_taken(tmp_path):
+    points = np.concatenate([POINTS[:, :1] * 0.0, POINTS], axis=1)
+    found = read(tmp_path, trc(TIME, points, [LABELS[0], *LABELS]))
+    assert found.names == (f'{LABELS[0]}#2', *LABELS)
+    np.testing.assert_allclose(found.points[:, 1:], 1000.0 * POINTS, atol=1e-6)
+    assert f"2 markers are called '{LABELS[0]}': the one seen in 30 samples" in found.notes[0]
+
+
+def test_subjects_are_kept_where_names_would_be_there_twice(tmp_path):
+    two = np.concatenate([POINTS, POINTS + 1.0], axis=1)
+    found = read(tmp_path, trc(TIME, two, [f'{who}:{name}' for who in ('Anna', 'Bert')
+                                           for name in LABELS]))
+    assert found.names[0] == f'Anna:{LABELS[0]}' and found.names[12] == f'Bert:{LABELS[0]}'
+
+
+def test_a_sacral_marker_stands_for_those_at_the_back_of_the_pelvis(tmp_path):
+    back = [LABELS.index('LPSI'), LABELS.index('RPSI')]
+    kept = [k for k in range(12) if k not in back]
+    points = np.concatenate([POINTS[:, kept], POINTS[:, back].mean(axis=1, keepdims=True)], axis=1)
+    path = tmp_path / 'walk.trc'
+    path.write_text(trc(TIME, points, [*(LABELS[k] for k in kept), 'SACR']))
+    recording = read_trc(path, 'human_plug_in_gait')
+    assert recording.joints == ('left_hip', 'left_knee', 'left_ankle',
+                                'right_hip', 'right_knee', 'right_ankle')
+    moved = recording.positions - recording.positions.mean(axis=0)
+    expected = angles(TIME) - angles(TIME).mean(axis=0)
+    assert np.abs(moved - expected).max() < 0.1
