@@ -74,9 +74,18 @@ def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]
         what: it is, for the error.
 
     Raises:
-        NoCompiler: it is not in the cache, and there is no compiler, or it fails.
+        NoCompiler: it is not in the cache, and there is no compiler, or it fails; or it cannot
+            be loaded.
 
     """
+    try:
+        return _load(folder, name, sources, what)
+    except OSError as error:
+        raise NoCompiler(f'{what} cannot be loaded: {error}') from error
+
+
+def _load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str
+          ) -> ctypes.CDLL:
     if folder is not None:
         library = folder / f'{name}.so'
         if not library.exists():

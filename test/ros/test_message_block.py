@@ -14,11 +14,15 @@
 
 """What is published as bytes is, byte for byte, what rclpy makes of the same message."""
 
+from contextlib import nullcontext
+import ctypes
 from types import SimpleNamespace
 
 from builtin_interfaces.msg import Duration, Time
+from c_export import needs_gcc
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.generator_io import Outputs
+from cpg_ros.ros.node import native
 from cpg_ros.ros.node.message_block import MessageBlock, Template
 from cpg_ros.ros.robot_sim import Measurements
 from depth import examples
@@ -34,23 +38,60 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiAr
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+LIBRARY = native.library
 ROBOTS = [load_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
 SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'uint16': 2, 'int32': 4, 'uint32': 4, 'double': 8}
 
 
-class Graph:
-    """Stands in for a node: keeps what was published last, by topic."""
+class Handle(nullcontext):
+    """Stands in for rclpy's handle of a publisher."""
 
-    def __init__(self):
-        self.sent, self.kinds = {}, {}
+    pointer = 0
+
+
+class Graph:
+    """Stands in for a node and its middleware: keeps what was published last, by topic.
+
+    Attributes:
+        refused: number of a publisher whose messages the middleware does not take.
+
+    """
+
+    def __init__(self, monkeypatch, in_c):
+        self.sent, self.kinds, self.refused = {}, {}, None
+        self._topics = []
+        send = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_size_t,
+                                ctypes.POINTER(native.Serialized), ctypes.c_void_p)(self._send)
+        forget = ctypes.CFUNCTYPE(None)(lambda: None)
+        self._functions = {'rcl_publish_serialized_message': send, 'rcutils_reset_error': forget}
+        monkeypatch.setattr(native, 'address', lambda name: ctypes.cast(
+            self._functions[name], ctypes.c_void_p).value)
+        monkeypatch.setattr(native, 'library', LIBRARY if in_c else lambda: None)
+
+    def _send(self, publisher, message, _):
+        if publisher - 1 == self.refused:
+            return 1
+        self.sent[self._topics[publisher - 1]] = ctypes.string_at(message[0].buffer,
+                                                                  message[0].length)
+        return 0
 
     def resolve_topic_name(self, topic):
         return topic.replace('~', '/cpg_generator')
 
     def create_publisher(self, kind, topic, *_, **__):
         self.kinds[topic] = kind
-        return SimpleNamespace(topic_name=self.resolve_topic_name(topic),
+        self._topics.append(topic)
+        handle = Handle()
+        handle.pointer = len(self._topics)
+        return SimpleNamespace(topic_name=self.resolve_topic_name(topic), handle=handle,
                                publish=lambda raw: self.sent.update({topic: raw}))
+
+
+@pytest.fixture(scope='module', params=['python', pytest.param('c', marks=needs_gcc)])
+def graph(request):
+    """Return what makes a graph, of which messages are published by Python or by C."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield lambda: Graph(patch, request.param == 'c')
 
 
 def written(message, at=0):
@@ -111,8 +152,8 @@ finite = st.floats(allow_nan=False, width=64)
 @given(data=st.data())
 @pytest.mark.parametrize('command', ['none', 'joint_trajectory', 'forward_position'])
 @pytest.mark.parametrize('robot', ROBOTS, ids=lambda robot: robot.name)
-def test_every_output_of_the_generator(robot, command, data):
-    graph = Graph()
+def test_every_output_of_the_generator(robot, command, graph, data):
+    graph = graph()
     outputs = Outputs(graph, robot, 'joint_states', command)
     n = len(robot.joints)
     for _ in range(2):
@@ -149,10 +190,10 @@ def test_every_output_of_the_generator(robot, command, data):
 
 @examples(15)
 @given(values=st.lists(finite, min_size=63, max_size=63))
-def test_what_a_simulated_robot_publishes(values):
+def test_what_a_simulated_robot_publishes(graph, values):
     values, felt = np.split(np.array(values), [53])
     robot = load_robot('unitree_go2')
-    graph = Graph()
+    graph = graph()
     body = SimpleNamespace(robot=robot)
     parts = np.split(values, np.cumsum([12, 12, 12, 4, 3, 4]))
     for name, part in zip(('position', 'velocity', 'torque', 'feet', 'base', 'quaternion',
@@ -190,8 +231,29 @@ def test_what_a_simulated_robot_publishes(values):
     same(graph.sent['foot_contacts'], array_of(label.layout.dim[0].label.split(','), feet))
 
 
-def test_what_is_not_found_in_the_bytes_is_refused():
+def test_what_is_not_found_in_the_bytes_is_refused(graph):
     message = JointState(name=['a'])
     twice = Template(message, numbers=[(message, 'position', np.arange(1))] * 2)
     with pytest.raises(ValueError, match='JointState: cannot be filled in place'):
-        MessageBlock(Graph(), [1], [('a', twice)])
+        MessageBlock(graph(), [1], [('a', twice)])
+
+
+@needs_gcc
+def test_what_the_middleware_refuses_is_published_by_rclpy(monkeypatch):
+    graph = Graph(monkeypatch, in_c=True)
+    messages = [Float64MultiArray() for _ in range(3)]
+    block = MessageBlock(graph, [1], [
+        (topic, Template(message, numbers=[(message, 'data', np.arange(1))]))
+        for topic, message in zip('abc', messages, strict=True)])
+    graph.refused = 1
+    block.publish(0, [np.array([2.5])])
+    assert {topic: deserialize_message(raw, Float64MultiArray).data.tolist()
+            for topic, raw in graph.sent.items()} == {'a': [2.5], 'b': [2.5], 'c': [2.5]}
+
+
+def test_without_a_compiler_python_publishes(start, monkeypatch, tmp_path):
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    monkeypatch.setenv('CC', 'missing-cc')
+    process, watcher = start('-p', 'rate:=200.0')
+    watcher.record(0.5)
+    assert process.log.count('ticks are slower, and less regular: no C compiler (missing-cc)') == 1

@@ -16,6 +16,7 @@
 
 from array import array
 from collections.abc import Sequence
+import ctypes
 from dataclasses import dataclass, field
 from importlib import import_module
 from itertools import pairwise
@@ -24,6 +25,7 @@ from typing import Any
 
 from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
 from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.node import native
 from cpg_ros.ros.node.polled import OVERRIDABLE
 import numpy as np
 from rclpy.node import Node
@@ -172,7 +174,7 @@ class MessageBlock:
         values = self._words[NUMBERS:].view(float)
         self._parts = [values[slice(*edge)] for edge in pairwise(np.cumsum([0, *sizes]))]
         self.topics: list[str] = []
-        self._publish: list[tuple[Any, memoryview]] = []
+        self._publishers: list[tuple[Any, memoryview]] = []
         raws, changing, sources = zip(*(template.serialised() for _, template in templates),
                                     strict=True)
         starts = np.cumsum([0, *(-(-len(raw) // WORD) for raw in raws)])
@@ -188,8 +190,29 @@ class MessageBlock:
             publisher = node.create_publisher(
                 type(template.message), topic, QoSProfile(depth=100),
                 qos_overriding_options=OVERRIDABLE)
-            self._publish.append((publisher.publish, part))
+            self._publishers.append((publisher, part))
             self.topics.append(publisher.topic_name)
+        self._native = self._native_block()
+
+    def _native_block(self) -> tuple[Any, native.Block] | None:
+        """Return what fills and publishes outside the interpreter, and its argument, if any."""
+        library = native.library()
+        if library is None:
+            return None
+        start = at = self._block.ctypes.data
+        self._handles = [publisher.handle for publisher, _ in self._publishers]
+        # Kept as long as the struct that points there.
+        self._messages = (native.Serialized * len(self._handles))()
+        self._pointers = np.array([handle.pointer for handle in self._handles], dtype=np.uint64)
+        for message, (_, part) in zip(self._messages, self._publishers, strict=True):
+            message.buffer, message.length, message.capacity = at, len(part), len(part)
+            at += -(-len(part) // WORD) * WORD
+        return library.publish, native.Block(
+            native.address('rcl_publish_serialized_message'),
+            native.address('rcutils_reset_error'), self._pointers.ctypes.data,
+            ctypes.addressof(self._messages), start, self._words.ctypes.data,
+            self._places.ctypes.data, self._sources.ctypes.data, len(self._handles),
+            len(self._places))
 
     def publish(self, stamp: int, values: Sequence[np.ndarray], duration: int = 0) -> None:
         """Publish all messages.
@@ -202,9 +225,26 @@ class MessageBlock:
         """
         for part, given in zip(self._parts, values, strict=True):
             part[:] = given
-        words = self._words
-        words[0], words[1] = divmod(stamp, 1_000_000_000)
-        words[2], words[3] = divmod(duration, 1_000_000_000)
-        self._block[self._places] = words[self._sources]
-        for publish, message in self._publish:
-            publish(bytes(message))
+        sent = 0
+        if self._native is not None:
+            sent = self._publish_natively(*self._native, stamp, duration)
+        else:
+            words = self._words
+            words[0], words[1] = divmod(stamp, 1_000_000_000)
+            words[2], words[3] = divmod(duration, 1_000_000_000)
+            self._block[self._places] = words[self._sources]
+        # rclpy raises the error of what the middleware refused.
+        for publisher, message in self._publishers[sent:]:
+            publisher.publish(bytes(message))
+
+    def _publish_natively(self, function: Any, block: native.Block, stamp: int, duration: int
+                          ) -> int:
+        """Fill and publish; return how many messages the middleware has taken."""
+        # The node may be destroyed by another thread: its publishers then wait for this.
+        for handle in self._handles:
+            handle.__enter__()
+        try:
+            return function(ctypes.byref(block), stamp, duration)
+        finally:
+            for handle in self._handles:
+                handle.__exit__(None, None, None)

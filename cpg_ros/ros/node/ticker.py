@@ -24,6 +24,7 @@ import time
 from typing import Any
 
 from cpg_ros.common.errors import CpgError
+from cpg_ros.ros.node import native
 from cpg_ros.ros.node.parameters import fixed, Spec
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
@@ -170,6 +171,13 @@ def system_offset() -> int:
     return offset
 
 
+def _wait_until(deadline: int) -> int:
+    """Wait until a deadline by the steady clock, ns; return the time since it, ns."""
+    if (left := deadline - time.monotonic_ns()) > 0:
+        time.sleep(left * 1e-9)
+    return time.monotonic_ns() - deadline
+
+
 class TickThread(threading.Thread):
     """A thread of ticks that counts them, and reports the exception that ends it.
 
@@ -284,14 +292,12 @@ class Ticker(TickThread):
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
                     going: Callable[[], bool]) -> None:
         """Tick by the steady clock while ``going``; the deadline, and its ``stamp``, in ns."""
-        ending = self._ending
+        ending, library = self._ending, native.library()
+        wait_until = _wait_until if library is None else library.wait_until
         while not ending.is_set() and going():
             period = self._period()
             deadline += period
-            behind = time.monotonic_ns() - deadline
-            if behind < 0:
-                time.sleep(-behind * 1e-9)
-                behind = time.monotonic_ns() - deadline
+            behind = wait_until(deadline)
             self._worst = max(self._worst, behind * 1e-9)
             leap, skip = self._stalled(behind, period)
             deadline += leap

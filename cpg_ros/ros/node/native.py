@@ -1,0 +1,70 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a tick does outside the interpreter: ``tick.c``, compiled, and the middleware's functions.
+
+Calls into the library let other threads of Python run.
+"""
+
+import ctypes
+from functools import cache
+import hashlib
+import logging
+from pathlib import Path
+import platform
+
+from cpg_ros.common.c_library import load, NoCompiler
+from cpg_ros.common.cache_folder import cache_folder
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+_LOGGER = logging.getLogger(__name__)
+_SOURCE = Path(__file__).with_name('tick.c')
+
+
+class Serialized(ctypes.Structure):
+    """``rcutils_uint8_array_t``."""
+
+    _fields_ = (('buffer', ctypes.c_void_p), ('length', ctypes.c_size_t),
+                ('capacity', ctypes.c_size_t), ('allocator', 5 * ctypes.c_void_p))
+
+
+class Block(ctypes.Structure):
+    """The struct ``block`` of ``tick.c``."""
+
+    _fields_ = (*((name, ctypes.c_void_p) for name in (
+        'send', 'forget', 'publisher', 'message', 'memory', 'words', 'place', 'source')),
+        ('messages', ctypes.c_int64), ('changes', ctypes.c_int64))
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """Return the library; None, and a warning, where it cannot be compiled or loaded."""
+    text = _SOURCE.read_text()
+    key = hashlib.sha256(f'{platform.machine()}{text}'.encode()).hexdigest()[:14]
+    try:
+        found = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text},
+                     _SOURCE.name)
+    except NoCompiler as error:
+        _LOGGER.warning('ticks are slower, and less regular: %s', error)
+        return None
+    whole = ctypes.c_int64
+    found.publish.argtypes, found.publish.restype = (ctypes.c_void_p, whole, whole), whole
+    found.wait_until.argtypes, found.wait_until.restype = (whole,), whole
+    return found
+
+
+def address(function: str) -> int | None:
+    """Return the address of a function of rcl, to which rclpy's own library is linked."""
+    linked = ctypes.CDLL(rclpy_implementation.__file__)
+    return ctypes.cast(getattr(linked, function), ctypes.c_void_p).value
