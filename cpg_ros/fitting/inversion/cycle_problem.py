@@ -50,6 +50,8 @@ import numpy as np
 SHIFTS = 32
 #: Orbits kept of those solved last.
 KEPT = 64
+#: Harmonics of a waveform that may be other than the model's.
+ERRORS = 4
 
 
 @dataclass(frozen=True)
@@ -185,8 +187,27 @@ class CycleProblem:
         key = np.asarray(values).tobytes()
         if self._placed is None or self._placed[0] != key:
             orbit, seen = self._solve(values)
-            self._placed = key, ReadoutFit(orbit, *self._read(orbit, seen, values))
+            self._placed = key, ReadoutFit(orbit, *self._read(orbit, seen, values, self._members,
+                                                              self._of_duty))
         return self._placed[1]
+
+    def by_waveform(self, values: np.ndarray) -> np.ndarray:
+        """Return the derivative of the residual over its sizes by errors of the waveforms.
+
+        By the cosine and sine terms of the first ``ERRORS`` harmonics of every waveform, relative
+        to half its range, readouts staying the best; shape (residuals, terms).
+        """
+        orbit, seen = self._solve(values)
+        waves, count = len(seen.terms), min(ERRORS, seen.terms.shape[1] - 1) + 1
+        slopes = np.zeros((waves, seen.terms.shape[1], waves, 2, count), dtype=complex)
+        for wave in range(waves):
+            slopes[wave, :count, wave] = np.eye(count)[:, None] * np.array([1.0, -1j])[:, None]
+        slopes = slopes.reshape(*seen.terms.shape, -1)
+        terms = slopes.shape[-1]
+        jacobian = self._read(orbit, Signals(seen.terms, slopes), values, np.eye(terms),
+                              np.zeros(terms))[2][..., :-1]
+        found = (jacobian / self.sizes[:, None]).reshape(-1, terms)
+        return found if self._period is None else np.vstack([found, np.zeros(terms)])
 
     def stance_share(self, values: np.ndarray) -> float:
         """Return the share of the stride that the leg of the first joint stands."""
@@ -200,7 +221,8 @@ class CycleProblem:
         return own_stance(seen, int(orbit.waves[lead]), orbit.network.readout == 'waveform',
                           self.readout.stance)
 
-    def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray
+    def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray,
+                 members: np.ndarray, of_duty: np.ndarray
                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return what the gait's duty makes of the phases of a cell, or None if there is none.
 
@@ -212,23 +234,22 @@ class CycleProblem:
             return None
         return retimed(self.joints.theta + place + values[-1], duty,
                        self._own_stance(orbit, seen, lead), place - float(orbit.phases[lead]),
-                       self._members, self._of_duty)
+                       members, of_duty)
 
-    def _read(self, orbit: Orbit, seen: Signals, values: np.ndarray
-              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _read(self, orbit: Orbit, seen: Signals, values: np.ndarray, members: np.ndarray,
+              of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         m, joints = self.joints.data.shape
         weights = np.empty((self.weights, joints))
-        residual, jacobian = np.empty((m, joints)), np.empty((m, joints, len(self.free) + 1))
+        residual, jacobian = np.empty((m, joints)), np.empty((m, joints, of_duty.size + 1))
         for (cell, lead), columns in self._places.items():
             wave = int(orbit.waves[cell])
             theta, shift = self.joints.theta, float(orbit.phases[cell] + values[-1])
-            mapped = self._retimed(orbit, seen, cell, lead, values)
+            mapped = self._retimed(orbit, seen, cell, lead, values, members, of_duty)
             if mapped is not None:
                 theta, shift = mapped[0], 0.0
             x, y, z = seen.values(theta, shift, wave)
             psi, by_phase = basis(self.order, x, y, z)
-            moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave,
-                                                                   self._members))
+            moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave, members))
             if mapped is not None:
                 moved += by_phase[..., None] * mapped[1][:, None]
                 by_phase *= mapped[2][:, None]
@@ -278,7 +299,8 @@ class CycleProblem:
         values = np.append(values[:-1], 0.0)
         for (cell, lead), columns in self._places.items():
             theta, shift = self.joints.theta, float(orbit.phases[cell])
-            mapped = self._retimed(orbit, seen, cell, lead, values)
+            mapped = self._retimed(orbit, seen, cell, lead, values, self._members,
+                                   self._of_duty)
             if mapped is not None:
                 theta, shift = mapped[0], 0.0
             psi = basis(self.order, *seen.values(theta, shift, int(orbit.waves[cell])))[0]

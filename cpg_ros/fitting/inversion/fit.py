@@ -18,7 +18,8 @@ The residual of a model that is not the truth is no noise: it is larger than the
 of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
 leaves where that is more, and variances are inflated by how far the residual is correlated along
 the cycle. Intervals are quadratic where the cost is, and those of the profile likelihood where it
-is not.
+is not. A residual that noise does not explain widens them: the model's waveforms are taken to be
+off by as much as explains it, and so are the numbers that such waveforms move.
 """
 
 from collections.abc import Callable, Sequence
@@ -34,6 +35,7 @@ from cpg_ros.fitting.inversion.fit_starts import distinct
 from cpg_ros.fitting.inversion.free_parameters import Evaluate, Free, Minimisation
 from cpg_ros.networks.network import Network
 import numpy as np
+from scipy.special import stdtrit
 
 #: Half the width of a 95 % interval, in standard errors.
 QUANTILE = 1.959964
@@ -49,6 +51,9 @@ STEPS, CLOSE = 10, 0.03
 NEGLIGIBLE = 1e-6
 #: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
 TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
+
+#: A residual of this many times its standard errors (RMS) is explained by noise.
+EXPLAINED = 1.2
 
 #: Goes down: problem, start, tolerance, evaluations at most.
 Descend = Callable[[Evaluate, np.ndarray, float, int], Minimisation]
@@ -144,6 +149,50 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class ModelError(ShortRepr):
+    """What errors of the model's waveforms make of the numbers of a fit.
+
+    Attributes:
+        size: RMS of the waveforms' errors, each harmonic over half the waveform's range; 0 where
+            noise explains the residual.
+        errors: standard deviation of each number by these, shape (n,).
+        quantile: half the width of a 95 % interval, in these.
+
+    """
+
+    size: float
+    errors: np.ndarray
+    quantile: float
+
+
+def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndarray,
+                noise: float) -> ModelError:
+    """Estimate the errors of the waveforms, independent and of one size, from the residual.
+
+    Only what the numbers and readouts do not absorb is seen of them; the rest moves the numbers.
+
+    Args:
+        residual: shape (residuals,).
+        jacobian: its derivative by the numbers, shape (residuals, n).
+        by_waveform: its derivative by the waveforms' harmonics, shape (residuals, terms).
+        noise: sum of squares of the residual that noise alone would leave.
+
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    scaled = jacobian / np.where(size > 0.0, size, 1.0)
+    absorbed = np.linalg.pinv(scaled, ZERO) @ by_waveform
+    seen = np.linalg.svd(by_waveform - scaled @ absorbed, compute_uv=False)**2
+    excess = float(residual @ residual) - EXPLAINED**2 * noise
+    if excess <= 0.0 or seen.sum() <= 0.0:
+        return ModelError(0.0, np.zeros(size.size), QUANTILE)
+    waveform = float(np.sqrt(excess / seen.sum()))
+    # Errors of a model favour some harmonics: as of one direction fewer than are seen.
+    freedom = float(seen.sum()**2 / np.sum(seen**2)) - 1.0
+    return ModelError(waveform, waveform * np.linalg.norm(absorbed, axis=1)
+                      / np.where(size > 0.0, size, 1.0), float(stdtrit(max(freedom, 1.0), 0.975)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Optimum(ShortRepr):
     """A least cost, and what intervals about it are made from.
 
@@ -154,6 +203,7 @@ class Optimum(ShortRepr):
         cost: half the sum of squares.
         inflation: factor on variances.
         spread: covariance.
+        model: what errors of the model add to it.
         descend: goes down from values that have an orbit.
         moved: values after a step, along lines that follow the valleys of the cost.
         rephased: values with a better phase, if there is one.
@@ -167,30 +217,38 @@ class Optimum(ShortRepr):
     cost: float
     inflation: float
     spread: Spread
+    model: ModelError
     descend: Descend
     moved: Callable[[np.ndarray, np.ndarray], np.ndarray]
     rephased: Callable[[np.ndarray], np.ndarray]
     elsewhere: Sequence[np.ndarray] = ()
 
     def estimate(self, k: int, profiles: bool = True) -> Estimate:
-        """Estimate number k with its interval, by its profile where the cost is not quadratic."""
+        """Estimate number k with its interval, by its profile where the cost is not quadratic.
+
+        What errors of the model make of the number is added to either side, as independent.
+        """
         value, error = float(self.values[k]), float(self.spread.errors[k])
-        low, high = self.free[k].low, self.free[k].high
+        by_model = float(self.model.errors[k])
+        least, most = self.free[k].low, self.free[k].high
         if not np.isfinite(error):
-            return Estimate(value, error, low, high, False)
-        ends = value - QUANTILE * error, value + QUANTILE * error
-        if profiles and error > 0.0:
-            (low, below), (high, above) = (self._end(k, error, side) for side in (-1.0, 1.0))
-            as_good = [at for at in self.elsewhere if self._rise(at) < QUANTILE]
-            for at in sorted(as_good, key=lambda at: float(at[k]))[:1]:
-                if at[k] < low:
-                    low, below = self._profile(k, 0.5 * abs(at[k] - value), -1.0, at)
-            for at in sorted(as_good, key=lambda at: float(at[k]))[-1:]:
-                if at[k] > high:
-                    high, above = self._profile(k, 0.5 * abs(at[k] - value), 1.0, at)
-            return Estimate(value, error, low, high, below and above)
-        return Estimate(value, error, max(low, ends[0]), min(high, ends[1]),
-                        low <= ends[0] and ends[1] <= high)
+            return Estimate(value, error, least, most, False)
+        beside = self.model.quantile * by_model
+        if not profiles or error <= 0.0 or beside > QUANTILE * error:
+            half = float(np.hypot(QUANTILE * error, beside))
+            return Estimate(value, float(np.hypot(error, by_model)), max(least, value - half),
+                            min(most, value + half), least <= value - half <= value + half <= most)
+        (low, below), (high, above) = (self._end(k, error, side) for side in (-1.0, 1.0))
+        as_good = [at for at in self.elsewhere if self._rise(at) < QUANTILE]
+        for at in sorted(as_good, key=lambda at: float(at[k]))[:1]:
+            if at[k] < low:
+                low, below = self._profile(k, 0.5 * abs(at[k] - value), -1.0, at)
+        for at in sorted(as_good, key=lambda at: float(at[k]))[-1:]:
+            if at[k] > high:
+                high, above = self._profile(k, 0.5 * abs(at[k] - value), 1.0, at)
+        low = max(least, value - float(np.hypot(value - low, beside)))
+        high = min(most, value + float(np.hypot(high - value, beside)))
+        return Estimate(value, float(np.hypot(error, by_model)), low, high, below and above)
 
     def _rise(self, values: np.ndarray, held: int | None = None) -> float:
         """Distance in standard errors that the cost at values stands for.
@@ -351,6 +409,8 @@ class Fit(ShortRepr):
             or what the readout leaves if that is more, rad.
         misfit: joint -> what the readout leaves, over the stated standard error of the mean.
         sharing: instants that share one independent error.
+        model_error: RMS of the waveforms' errors that explain the residual, each harmonic over
+            half the waveform's range; 0 where noise explains it.
         starts: what came of every start.
         warnings: one line each.
 
@@ -376,6 +436,7 @@ class Fit(ShortRepr):
     sizes: dict[str, float]
     misfit: dict[str, float]
     sharing: float
+    model_error: float
     starts: tuple[Minimisation, ...]
     warnings: tuple[str, ...]
 

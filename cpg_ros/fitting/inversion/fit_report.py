@@ -208,7 +208,8 @@ def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
     for name, one in found.fit.parameters.items():
         rows.append((name, f'{one.value:.6g}', f'{one.stderr:.2g}',
                      f'{one.low:.6g} to {one.high:.6g}'
-                     + ('' if one.bounded else ' (not bounded by the data)')))
+                     + ('' if one.bounded else ': cannot tell' if found.fit.model_error else
+                        ' (not bounded by the data)')))
     return rows
 
 

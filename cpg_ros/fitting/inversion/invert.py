@@ -31,6 +31,8 @@ from cpg_ros.fitting.inversion.fit import (
     Estimate,
     Fit,
     mean_share,
+    model_error,
+    ModelError,
     Optimum,
     QUANTILE,
     SHARE,
@@ -66,18 +68,27 @@ TOGETHER, AT_BOUND = 0.95, 1e-5
 
 
 def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
-             best: Minimisation
-             ) -> list[str]:
+             model: ModelError, times: float, best: Minimisation) -> list[str]:
     """List the caveats of a fit.
 
     Args:
         free: the free numbers.
         estimates: of them.
         known: their covariance, and that of the phase.
+        model: what errors of the model add to it.
+        times: the residual over its standard errors.
         best: the start that led to the fit.
 
     """
     found = []
+    if model.size > 0.0:
+        told = [name for name, one in estimates.items() if one.bounded]
+        lost = [name for name in estimates if name not in told]
+        found.append(
+            f'the model is not what was recorded: it leaves {times:.3g} times the noise, as '
+            f'waveforms that are off by {100.0 * model.size:.2g} % would; '
+            + '; '.join((*([f'the intervals of {_listed(told)} include that'] if told else ()),
+                         *([f'{_listed(lost)}: cannot tell'] if lost else ()))))
     for row in known.blind:
         blind = [one.name for one,
                  fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]
@@ -96,7 +107,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
             if abs(one.value - bound) <= room:
                 found.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
                              'one-sided')
-        if np.isfinite(one.stderr) and (not one.bounded or max(
+        if not model.size and np.isfinite(one.stderr) and (not one.bounded or max(
                 one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
             found.append(
                 f'{name} is poorly identifiable: any value from {one.low:.4g} to {one.high:.4g} '
@@ -116,7 +127,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
 
 
 def _listed(names: Sequence[str]) -> str:
-    return ' and '.join([', '.join(names[:-1]), names[-1]])
+    return ' and '.join(filter(None, [', '.join(names[:-1]), names[-1]]))
 
 
 #: Share of a stride that legs stand which stand as long as they swing.
@@ -352,15 +363,19 @@ def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.n
              ) -> Optimum:
     left, slopes = problem(values)
     sharing = correlation_length(problem.best_readouts(values).residual / problem.sizes)
+    noise = (problem.joints.theta.size - problem.weights) * float(np.sum(
+        (problem.joints.stated / problem.sizes)**2))
+    model = model_error(left, slopes, problem.by_waveform(values), noise)
     return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
-                   spread(slopes, sharing), problem.coordinates.descend,
+                   spread(slopes, sharing), model, problem.coordinates.descend,
                    problem.coordinates.moved, problem.rephased, elsewhere)
 
 
 def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
     """Look for other least costs, if that at the values is not the whole story."""
     optimum = _optimum(problem, values)
-    if all(optimum.regular(k) for k in range(len(problem.free))):
+    # Where the model is off, no minimum of its cost is distinguished by that.
+    if optimum.model.size > 0.0 or all(optimum.regular(k) for k in range(len(problem.free))):
         return []
     found = []
     for begin in problem.coordinates.valley(values):
@@ -402,5 +417,6 @@ def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Se
         recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
         cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
         misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
-        starts=tuple(trials),
-        warnings=(*findings(problem.free, estimates, known, best), *warnings))
+        model_error=optimum.model.size, starts=tuple(trials),
+        warnings=(*findings(problem.free, estimates, known, optimum.model,
+                            float(np.sqrt(np.mean(misfit**2))), best), *warnings))

@@ -103,6 +103,61 @@ def test_a_period_is_fitted_where_time_has_a_scale():
     assert bound.parameters['tau'].stderr < 0.5 * free.parameters['tau'].stderr
 
 
+# -- a model that is not the truth ---------------------------------------------------------------
+
+def plain_readout(orbit, cells, weights, theta):
+    """Joints by three harmonics of each cell's waveform as they are: no Lanczos factors."""
+    grid, k = np.arange(1024) / 1024, np.arange(4)[:, None]
+    found = []
+    for cell, row in zip(np.array(cells) - 1, weights, strict=True):
+        terms = np.fft.rfft(orbit.waveform(grid, 0, int(orbit.waves[cell])))[:4, None] / 512.0
+        terms[0] *= 0.5
+
+        def wave(at, power, terms=terms):
+            return np.sum((terms * (1j * k)**power) * np.exp(2j * np.pi * k * at), axis=0).real
+
+        high, low = wave(grid, 0).max(), wave(grid, 0).min()
+        at = theta + orbit.phases[cell]
+        x, y = (2.0 * wave(at, 0) - high - low) / (high - low), 2.0 * wave(at, 1) / (high - low)
+        found.append(row @ np.array([x, y, x * x, x * y, x**3, x * x * y]))
+    return np.array(found)
+
+
+@pytest.mark.parametrize(('name', 'gait'), [('matsuoka', 'trot'), ('quadruped', 'trot'),
+                                            ('biped', 'run'), ('hopf', 'trot')])
+def test_the_error_of_another_readout_is_in_the_intervals(name, gait):
+    preset = PRESETS[name][gait]
+    orbit, legs = solve_preset(preset), tuple(range(1, 5))
+    for seed in (31, 32):
+        rng, weights = np.random.default_rng(seed), weights_of(4, 3, seed)
+        recording, cells = record(orbit, legs, weights, None)
+        mean = plain_readout(orbit, legs, weights, recording.theta + 0.2)
+        noise = 0.002 * np.ptp(mean, axis=1)[:, None] * np.ones_like(mean)
+        recording = replace(recording, mean=mean + noise * rng.standard_normal(mean.shape),
+                            error=noise)
+        fit = invert(recording, cells, preset.network, gait)
+        assert fit.model_error > 0.0
+        assert 'the model is not what was recorded' in ' '.join(fit.warnings)
+        for one, found in fit.parameters.items():
+            assert found.low <= truth_of(preset.network, one) <= found.high
+
+
+def test_readouts_of_another_order_do_not_make_a_sharp_number():
+    for seed in range(4):
+        recording, cells = trot(seed)
+        fit = invert(recording, cells, TROT, 'trot', ('c',), order=2)
+        found = fit.parameters['c']
+        assert fit.model_error > 0.0 and found.low <= TROT.c <= found.high
+
+
+def test_noise_is_no_error_of_the_model():
+    for seed in range(4):
+        recording, cells = trot(seed)
+        fit = invert(recording, cells, TROT, 'trot', ('c',))
+        assert fit.model_error == 0.0
+        assert 'the model' not in ' '.join(fit.warnings)
+
+
 # -- how sure it is ------------------------------------------------------------------------------
 
 def test_intervals_hold_the_truth_and_errors_are_as_said():
