@@ -141,7 +141,7 @@ def _recording(args: Namespace, robot: Robot | None) -> Recording:
     given = chosen_format(args)
     return read_recording(
         getattr(args, given), given,
-        robot_joints=[joint.name for joint in robot.joints] if robot else (),
+        robot_joints=robot.order if robot else (),
         **reading_arguments(args))
 
 

@@ -88,7 +88,7 @@ def read(path: Path, settings: FitSettings) -> Recording:
     kind, robot = format_of(path), settings.robot
     return read_recording(
         path, kind.name, progress=False,
-        robot_joints=[joint.name for joint in robot.joints] if robot else (),
+        robot_joints=robot.order if robot else (),
         **{name: value for name, value in settings.reading.items() if not kind.refusal(name)})
 
 

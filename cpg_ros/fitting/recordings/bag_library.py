@@ -28,6 +28,7 @@ if find_spec('rosbags') is not None or find_spec('rosbag2_py') is None:
         Reader,
         ReaderError,
         SerdeError,
+        unpack_file,
     )
 else:
     from cpg_ros.fitting.recordings.rosbag2_library import (  # type: ignore[assignment]
@@ -35,6 +36,7 @@ else:
         Reader,
         ReaderError,
         SerdeError,
+        unpack_file,
     )
 
-__all__ = ['Reader', 'ReaderError', 'SerdeError', 'deserialize']
+__all__ = ['Reader', 'ReaderError', 'SerdeError', 'deserialize', 'unpack_file']

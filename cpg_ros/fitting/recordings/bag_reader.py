@@ -24,7 +24,7 @@ from pathlib import Path
 import struct
 
 from cpg_ros.common.command_line import printable, progress_bar
-from cpg_ros.fitting.recordings.bag_storage import Bag, files_of_bag, opened, STORAGES
+from cpg_ros.fitting.recordings.bag_storage import Bag, ENDINGS, files_of_bag, opened
 from cpg_ros.fitting.recordings.joint_streams import BATCH, recorded, Servo, Stream
 from cpg_ros.fitting.recordings.recording import (
     FootLoads,
@@ -142,8 +142,9 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
     of such files is read, and a note reports it. A truncated sqlite3 file is an error.
 
     Args:
-        path: the bag's folder, or one of its storage files (.mcap, .db3).
-        topics: which to read; all topics of type sensor_msgs/msg/JointState, if empty.
+        path: the bag's folder, or one of its storage files (.mcap, .db3, or packed: .mcap.zstd).
+        topics: which to read, by their names or namespaces; if empty, all topics of type
+            sensor_msgs/msg/JointState, or else the fastest of type unitree_go/msg/LowState.
         joints: which joints to take, in this order; all of them, if empty.
         progress: show a progress bar.
         some: joints that are not there are passed over, unless none is.
@@ -157,7 +158,7 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
     path = Path(path)
     source = printable(f'{path}, ')
     with opened(path) as bag:
-        streams = {topic: Stream(topic, joints, servo, source)
+        streams = {topic: Stream(topic, joints, servo, source, bag.kind(topic))
                    for topic in bag.choose(topics)}
         loads = _load_stream(bag)
         expected = bag.expected()
@@ -200,7 +201,8 @@ def _with_loads(recording: Recording, stream: LoadStream) -> Recording:
 
 BAG = RecordingFormat(
     name='bag', contents='a rosbag2 bag', help='a rosbag2 bag, sqlite3 or mcap', metavar='DIR',
-    read=read_bag, endings=STORAGES, files_in=files_of_bag, features=('servo', 'some'),
-    options=(Option('topics', 'topics of the bag to read (default: all of type '
-                    'sensor_msgs/msg/JointState)', 'TOPIC', several=True), JOINTS),
+    read=read_bag, endings=ENDINGS, files_in=files_of_bag, features=('servo', 'some'),
+    options=(Option('topics', 'topics of the bag to read, or their namespaces (default: '
+                    "all of type sensor_msgs/msg/JointState, or one of Unitree's LowState)",
+                    'TOPIC', several=True), JOINTS),
     lacks={'unit': 'joint states are in rad', 'time': 'joint states have their stamps'})

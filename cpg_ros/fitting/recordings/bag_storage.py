@@ -19,17 +19,19 @@ Whatever the library raises on a damaged bag ends here, as one line that names t
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, ExitStack
+from contextlib import contextmanager, ExitStack, nullcontext
 import io
 import math
 from pathlib import Path, PosixPath
 import re
+from tempfile import TemporaryDirectory
 from typing import Any, IO
 
 from cpg_ros.common import files as regular_file
-from cpg_ros.fitting.recordings.bag_library import Reader, ReaderError
+from cpg_ros.fitting.recordings.bag_library import Reader, ReaderError, unpack_file
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
-from cpg_ros.fitting.recordings.recording import abbreviate, RecordingError
+from cpg_ros.fitting.recordings.low_state import LOW_STATE
+from cpg_ros.fitting.recordings.recording import abbreviate, RecordingError, refuse_stand_in
 from cpg_ros.fitting.recordings.tables import UnpackedSize
 
 # The complete part of an mcap file whose recorder never finished it.
@@ -106,6 +108,9 @@ class _Ended(io.RawIOBase):
 
 #: Endings of a bag's storage files, and the name of the file that describes them.
 STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
+#: Of those that were packed as a whole, and of all names of bags that are files.
+PACKED = '.zstd'
+ENDINGS = (*STORAGES, *(ending + PACKED for ending in STORAGES), '.bag')
 #: Largest such file, bytes: a thousand topics have one of 2 MB.
 LARGEST_METADATA = 16_000_000
 
@@ -137,19 +142,32 @@ class Bag:
         if not types:
             raise RecordingError(f'{self.path}: an empty bag, without topics')
         fitting = [topic for topic in types if types[topic] == {JOINT_STATE}]
+        motors = [topic for topic in types if types[topic] == {LOW_STATE}]
+        if not topics and not fitting and motors:
+            # Robots publish their state twice, at the full rate and slower.
+            counts = self.expected()
+            return [max(motors, key=lambda topic: counts[topic])]
         if not topics and not fitting:
             there = ', '.join(f'{topic} ({", ".join(sorted(types[topic]))})'
                               for topic in list(types)[:6])
             raise RecordingError(f'{self.path}: no topic of type {JOINT_STATE}; it has {there}')
-        resolved = [topic if topic in types else '/' + topic.lstrip('/') for topic in topics]
+        resolved = []
+        for topic in topics:
+            name = topic if topic in types else '/' + topic.strip('/')
+            resolved += [name] if name in types else [
+                one for one in fitting if one.startswith(f'{name}/')] or [name]
         for topic in resolved:
             if topic not in types:
                 raise RecordingError(f'{self.path}: no topic {topic!r}; '
                                      f'there are {abbreviate(list(types), 20)}')
-            if topic not in fitting:
+            if topic not in (*fitting, *motors):
                 raise RecordingError(f'{self.path}, {topic}: {" and ".join(sorted(types[topic]))}'
                                      f', where {JOINT_STATE} is needed')
         return list(dict.fromkeys(resolved)) or fitting
+
+    def kind(self, topic: str) -> str:
+        """Return the type of a topic."""
+        return next(one.msgtype for one in self.connections if one.topic == topic)
 
     def expected(self) -> Counter[str]:
         """Return the number of messages of each topic in the bag's metadata."""
@@ -188,6 +206,25 @@ def opened(path: Path) -> Iterator[Bag]:
         RecordingError: it is not there or damaged.
 
     """
+    packed = path.name.endswith(ENDINGS[2:4]) and path.is_file()
+    with TemporaryDirectory() if packed else nullcontext() as folder:
+        inner = path
+        if folder is not None:
+            _check(path)
+            inner = Path(folder) / path.stem
+            try:
+                unpack_file(path, inner)
+            except RecordingError as error:
+                raise RecordingError(f'{path}: {error}') from error
+            except Exception as error:
+                raise RecordingError(f'{path}: {line(error)}') from error
+        with _opened(inner) as bag:
+            bag.path = path
+            yield bag
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Bag]:
     try:
         files = _files(path)
         size = 0
@@ -198,11 +235,16 @@ def opened(path: Path) -> Iterator[Bag]:
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
         whole = path.is_file() or (path / METADATA).exists()
+        renamed = _renamed(path, files) if path.is_dir() and whole else ''
     except OSError as error:
         raise RecordingError(f'{error.filename or path}: {error.strerror}') from error
     cut = bool(notes)
     if not whole:
         notes.append(f'{path}: metadata.yaml is missing; its storage files are read as they are')
+    if renamed:
+        whole = False
+        notes.append(f'{path / METADATA} names {renamed}, which is not there; its storage files '
+                     'are read as they are')
     with ExitStack() as stack:
         readers = []
         for one in [path] if whole else files:
@@ -217,11 +259,22 @@ def opened(path: Path) -> Iterator[Bag]:
         yield Bag(path, readers, cut, notes, size)
 
 
+def _renamed(path: Path, files: list[Path]) -> str:
+    """Return the names in metadata.yaml of storage files that all have other names now, or ''."""
+    text = (path / METADATA).read_text(errors='replace')[:LARGEST_METADATA]
+    part = re.search(r'^  relative_file_paths:\n((?: +- .*\n)+)', text, re.M)
+    names = [] if part is None else [one.strip(' -"\'') for one in part[1].splitlines()]
+    there = {file.name for file in files}
+    known = len(names) == len(files) > 0 and not any(
+        name.endswith(PACKED) or Path(name).name in there for name in names)
+    return abbreviate(names, 3) if known else ''
+
+
 def _check(file: Path) -> None:
     """Reject pipes and devices, which would block the library."""
     largest = LARGEST_METADATA if file.name == METADATA else math.inf
-    with regular_file.opened(file, RecordingError, largest=largest):
-        pass
+    with regular_file.opened(file, RecordingError, largest=largest) as data:
+        refuse_stand_in(file, data.read(64))
 
 
 def _files(path: Path) -> list[Path]:
@@ -230,6 +283,7 @@ def _files(path: Path) -> list[Path]:
         raise RecordingError(f'{path}: no such bag')
     if not path.is_dir():
         if path.suffix not in STORAGES:
+            _check(path)
             raise RecordingError(f'{path}: neither a folder nor a file with the ending '
                                  f'{" or ".join(STORAGES)}')
         return [path]

@@ -16,6 +16,8 @@
 
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ from cpg_ros.fitting.recordings.recording import (
     Recording,
     RecordingError,
     RecordingFormat,
+    refuse_stand_in,
     repeat_stride,
     UNNAMED,
 )
@@ -97,6 +100,9 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     if format_name and format_name not in FORMATS:
         raise InputError(f'no format {format_name!r} of recordings; there are '
                          f'{abbreviate(list(FORMATS))}')
+    # What cannot be opened its reader reports.
+    with suppress(OSError), path.open('rb') if path.is_file() else BytesIO() as file:
+        refuse_stand_in(path, file.read(64))
     args = FORMATS[format_name] if format_name else format_of(path)
     given = {name: value for name, value in options.items() if value is not None and value != ()
              and value != []}

@@ -14,7 +14,7 @@
 
 """Joint states topic by topic, from serialised messages to one recording."""
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
@@ -28,6 +28,7 @@ from cpg_ros.fitting.recordings.cdr import (
     SerializedBlock,
     UndecodableError,
 )
+from cpg_ros.fitting.recordings.low_state import decode_low_states, LOW_STATE
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     Chunk,
@@ -102,12 +103,18 @@ class Stream:
         joints: that are wanted; all of them, if empty.
         servo: of the joints, if their commands are wanted instead of what they did.
         source: what to put before the topic's name in messages.
+        kind: type of the messages, JointState or Unitree's LowState.
 
     """
 
     def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None,
-                 source: str = '') -> None:
-        self.topic, self.servo, self.source = topic, servo, source
+                 source: str = '', kind: str = JOINT_STATE) -> None:
+        self.topic, self.servo, self.source, self.kind = topic, servo, source, kind
+        #: The joints that are asked for, in the order of positions that have no names.
+        self.order = tuple(joints)
+        #: What stands before the names that are asked for; where the names are missing; the
+        #: first message that has not a position for each name.
+        self.prefix, self.unnamed, self.first_odd = '', False, ''
         self.wanted = set(joints)
         self.taken: set[str] = set()
         #: What is not decoded yet, and the times of receipt in ns.
@@ -157,21 +164,28 @@ class Stream:
         """
         received = np.array(self.received, np.int64)
         try:
-            for block in in_order(decode(self.messages, self.servo is not None)):
+            efforts = self.servo is not None
+            blocks = (decode_low_states(self.messages, self.order, efforts)
+                      if self.kind == LOW_STATE else in_order(decode(self.messages, efforts)))
+            for block in blocks:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
                 f'{self.source}{self.topic}: message {self.count + error.index + 1} is not '
-                f'a {JOINT_STATE}: {line(error)}') from error
+                f'a {self.kind}: {line(error)}') from error
         self.count += len(self.messages)
         self.messages, self.received, self._bytes = [], [], 0
 
     def _keep(self, block: SerializedBlock, received: np.ndarray) -> None:
-        stamps, names, positions = block.stamps, block.names, block.positions
+        stamps, positions = block.stamps, block.positions
+        names = self._named(block.names, positions.shape[1])
         if not positions.shape[1]:
             self.mute += len(stamps)
         elif positions.shape[1] != len(names):
             self.odd += len(stamps)
+            self.first_odd = self.first_odd or (
+                f', such as message {self.count + int(block.rows[0]) + 1}: '
+                f'{positions.shape[1]} positions for {len(names)} names')
         elif self.servo and not (positions.shape == block.efforts.shape and (
                 not self.servo.kd or positions.shape == block.velocities.shape)):
             self.slack += len(stamps)
@@ -190,6 +204,23 @@ class Stream:
             self._size += len(stamps)
             if self._size >= LONG:
                 self._thin()
+
+    def _named(self, names: tuple[str, ...], count: int) -> tuple[str, ...]:
+        """Return the names of positions as they are asked for."""
+        if count and not names:
+            self.unnamed = True
+            return self.order if len(self.order) == count else tuple(
+                f'position[{k}]' for k in range(count))
+        if not self.wanted or not self.wanted.isdisjoint(names):
+            return names
+        found = Counter(name[:-len(one)] for name in names for one in self.wanted
+                        if name.endswith(one))
+        (prefix, most), *others = [*found.most_common(2), ('', 0)]
+        # As many under another prefix are those of another robot.
+        if most < 2 or others[0][1] == most:
+            return names
+        self.prefix = prefix
+        return tuple(name.removeprefix(prefix) for name in names)
 
     def _thin(self) -> None:
         """Downsample the samples at hand, with both clocks side by side."""
@@ -210,10 +241,16 @@ class Stream:
     def notes(self, headers: bool) -> list[str]:
         """List what is left out, one line each."""
         counts = ((self.mute, 'without positions'),
-                  (self.odd, 'with more or fewer positions than names'),
+                  (self.odd, 'with more or fewer positions than names' + self.first_odd),
                   (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
                   (self.unstamped if headers and self.dated else 0, 'without a stamp'))
-        return [*(f'{self.topic}: {count} of {self.count} messages {what}, left out'
+        named = [f'{self.topic}: the names without {self.prefix!r} before them'] * bool(
+            self.prefix) + [
+                f'{self.topic}: no names; ' + (
+                    'the positions are taken in the order of the joints asked for or of the robot '
+                    'file' if self.order else 'a robot file or --joints gives their order')
+                ] * self.unnamed
+        return [*named, *(f'{self.topic}: {count} of {self.count} messages {what}, left out'
                   for count, what in counts if count),
                 *(f'{self.topic}: {samples.note}' for samples in self._thinned.values()
                   if samples.note)]
@@ -261,6 +298,20 @@ def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
     return notes
 
 
+def _refuse_two_robots(streams: Sequence[Stream], wanted: Sequence[str], source: str) -> None:
+    """Reject topics of two namespaces that have the same joints."""
+    seen: dict[tuple[str, frozenset[str]], str] = {}
+    for stream in streams:
+        namespace, _, name = stream.topic.rpartition('/')
+        joints = frozenset(stream.joints).intersection(wanted)
+        if not joints or not namespace:
+            continue
+        other = seen.setdefault((name, joints), stream.topic)
+        if other != stream.topic:
+            raise RecordingError(f'{source}: {other} and {stream.topic} have the same joints: '
+                                 'choose a topic or a namespace (--topics)')
+
+
 def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
     """Reject joints whose servo cannot be inverted."""
     if joints:
@@ -301,6 +352,7 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
     found = [name for name in joints if name in there]
     joints = found if some and found else joints
     require(joints, there, whole)
+    _refuse_two_robots(streams, joints or there, whole)
     notes = [*notes, *_once_each(list(streams), joints or there)]
     read = [stream for stream in streams if stream.taken]
     whole = f'{source}{", ".join(stream.topic for stream in read)}'

@@ -142,6 +142,25 @@ class Recording(ShortRepr):
                        start=self.start + first, loads=loads)
 
 
+def refuse_stand_in(path: Path, head: bytes) -> None:
+    """Reject what only stands for a recording, or is one of another system.
+
+    Args:
+        path: of the file.
+        head: its first 64 bytes.
+
+    Raises:
+        RecordingError: it is a pointer of Git LFS, or a bag of ROS 1.
+
+    """
+    if head.startswith(b'version https://git-lfs'):
+        raise RecordingError(f'{path}: a pointer of Git LFS, not the file itself: fetch it with '
+                             '"git lfs pull"')
+    if head.startswith(b'#ROSBAG V'):
+        raise RecordingError(f'{path}: a bag of ROS 1: convert it with "rosbags-convert --src '
+                             f'{path.name} --dst {path.stem}"')
+
+
 def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
     """Check that joints are there, and that none is named twice.
 

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cpg_ros.common.errors import needed
 from rclpy.serialization import deserialize_message
 import rosbag2_py
 from sensor_msgs.msg import JointState
@@ -44,6 +45,11 @@ class Connection:
     topic: str
     msgtype: str
     msgcount: int
+
+
+def unpack_file(path: Path, into: Path) -> None:
+    """Refuse a storage file that was packed as a whole: without its folder ROS reads none."""
+    needed('rosbags')
 
 
 def deserialize(message: bytes) -> Any:

@@ -15,6 +15,8 @@
 """What is used of the library `rosbags`, which unpacks no more than recordings have."""
 
 import os
+from pathlib import Path
+import shutil
 from types import SimpleNamespace
 from typing import Any, BinaryIO
 
@@ -23,7 +25,7 @@ from rosbags.rosbag2 import Reader, reader, ReaderError, storage_mcap
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-__all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize']
+__all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize', 'unpack_file']
 
 #: The layout of a JointState is the same in all ROS 2 distributions.
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -66,6 +68,12 @@ def _unpack(data: bytes) -> bytes:
             raise ZSTD.ZstdError('what was packed by zstd is cut')
         data = frame.unused_data
     return b''.join(parts)
+
+
+def unpack_file(path: Path, into: Path) -> None:
+    """Unpack a storage file that was packed as a whole."""
+    with path.open('rb') as packed, _UnpackedFile(packed, 'rb') as data, into.open('wb') as out:
+        shutil.copyfileobj(data, out)
 
 
 for module in (reader, storage_mcap):

@@ -238,7 +238,8 @@ def test_single_messages_without_stamp_or_positions_are_left_out_and_counted(tmp
     assert np.array_equal(recording.positions, np.delete(angles, [7, 9, 12], axis=0))
     assert recording.notes[:3] == (
         '/joint_states: 1 of 30 messages without positions, left out',
-        '/joint_states: 1 of 30 messages with more or fewer positions than names, left out',
+        '/joint_states: 1 of 30 messages with more or fewer positions than names, such as '
+        'message 13: 5 positions for 12 names, left out',
         '/joint_states: 1 of 30 messages without a stamp, left out')
     assert recording.notes[3].startswith('3 dropouts, about 3 samples of 30')
 

@@ -248,6 +248,8 @@ def test_what_is_no_bag(tmp_path):
     (tmp_path / 'folder').mkdir()
     assert 'neither metadata.yaml nor a storage file' in refused(tmp_path / 'folder')
     (tmp_path / 'walk.bag').write_text('#ROSBAG V2.0')
+    assert 'a bag of ROS 1' in refused(tmp_path / 'walk.bag')
+    (tmp_path / 'walk.bag').write_text('no bag')
     assert 'neither a folder nor a file with the ending' in refused(tmp_path / 'walk.bag')
     for name in ('text.mcap', 'text.db3'):
         (tmp_path / name).write_text('time,knee\n0,1\n')
