@@ -60,13 +60,13 @@ def colours(network: type[Network]) -> dict[str, str]:
     """Return a colour for each of a network's gaits, no two of one colour."""
     hues = (to_hex(tuple(hsv_to_rgb((0.618 * n % 1.0, 0.7, 0.8)))) for n in count())
     spare = chain(FURTHER, hues)
-    found: dict[str, str] = {}
+    by_gait: dict[str, str] = {}
     for gait in sorted(network.gaits(), key=lambda one: one not in COLOURS):
         colour = COLOURS.get(gait, '')
-        while not colour or colour in found.values():
+        while not colour or colour in by_gait.values():
             colour = next(spare)
-        found[gait] = colour
-    return found
+        by_gait[gait] = colour
+    return by_gait
 
 
 def _colour(analysis: Analysis, gait: str) -> str:
@@ -101,12 +101,12 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
 def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch]) -> None:
     shown: set[str] = set()
     met: dict[str, str] = {}
-    for one in judged:
-        gait, branch, colour = one.gait, one.branch, _colour(analysis, one.gait)
-        _draw_branch(axes, branch, one.kinds, colour)
+    for member in judged:
+        gait, branch, colour = member.gait, member.branch, _colour(analysis, member.gait)
+        _draw_branch(axes, branch, member.kinds, colour)
         shown.add(gait)
-        soft = {loss.point for loss in one.losses if loss.form.soft}
-        for point in one.crossings:
+        soft = {loss.point for loss in member.losses if loss.form.soft}
+        for point in member.crossings:
             axes.plot(point.value, point.point.amplitude, marker=CROSSINGS[point.kind],
                       markersize=6, color=colour,
                       markerfacecolor=colour if point in soft else axes.get_facecolor())
@@ -257,8 +257,8 @@ def phase_picture(report: PhaseReport, suffix: str) -> bytes:
     for row, gait in zip(axes, report.responses, strict=True):
         for variable, one in enumerate(row):
             _draw(one, report, gait, variable)
-    for one in axes[-1]:
-        one.set_xlabel('phase of the cell [cycles], cell 1 peaks at 0')
+    for axis in axes[-1]:
+        axis.set_xlabel('phase of the cell [cycles], cell 1 peaks at 0')
     figure.suptitle(f'Phase response of {network.name}', fontsize=11)
     return written(figure, suffix)
 

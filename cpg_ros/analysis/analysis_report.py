@@ -206,7 +206,7 @@ class Analysis(ShortRepr):
         rows: list[tuple[str, ...]] = [(
             'gait', 'period', 'amplitude', *names, 'in class', 'transverse', 'stable',
             'gain needed', 'default', 'stable then')]
-        for verdict in (one for whole in self.existing for one in whole.orbits):
+        for verdict in (orbit for whole in self.existing for orbit in whole.orbits):
             assert verdict.orbit is not None
             rows.append((
                 verdict.gait, f'{verdict.orbit.period:.6f}', f'{verdict.amplitude:.6f}',
@@ -222,10 +222,10 @@ class Analysis(ShortRepr):
                 f'  {line}' for line in table(rows, '<>>' + '>' * len(names) + '>>>>>>')]
         if not self.existing:
             lines = ['No gait at these parameters.']
-        lines += [f'  {one.gait}: the multiplier along the orbit comes out as '
-                  f'{abs(one.multipliers.trivial):.6g} instead of 1; the others are no better'
-                  for whole in self.existing for one in whole.orbits
-                  if one.multipliers.error > UNSURE]
+        lines += [f'  {orbit.gait}: the multiplier along the orbit comes out as '
+                  f'{abs(orbit.multipliers.trivial):.6g} instead of 1; the others are no better'
+                  for whole in self.existing for orbit in whole.orbits
+                  if orbit.multipliers.error > UNSURE]
         missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
         return lines + [f'  no {verdict.gait}: {self._reason(verdict)}' for verdict in missing]
 
@@ -243,9 +243,9 @@ class Analysis(ShortRepr):
             return f'This set gives no gait{nearest}.'
         by_itself, locked, never, text = [], [], [], []
         for verdict in self.existing:
-            if stable := [one for one in verdict.orbits if one.stable]:
+            if stable := [orbit for orbit in verdict.orbits if orbit.stable]:
                 by_itself.append(verdict.gait + _which(verdict, stable[0]))
-            elif held := [one for one in verdict.orbits if one.stable_with_default_gain]:
+            elif held := [orbit for orbit in verdict.orbits if orbit.stable_with_default_gain]:
                 locked.append(verdict.gait + _which(verdict, held[0]))
             else:
                 count = len(verdict.orbits)
@@ -280,8 +280,8 @@ class Analysis(ShortRepr):
         unstable = sum(len(block.right_of(0.0)) for block in parts)
         block = max(parts, key=lambda one: one.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
-        place = '' if odd(self.network) else f' at {_state(self.network, rest)}'
-        return [f'Equilibrium{place}: {count} with positive real part; the rightmost is '
+        where = '' if odd(self.network) else f' at {_state(self.network, rest)}'
+        return [f'Equilibrium{where}: {count} with positive real part; the rightmost is '
                 f'{_root(block.leading)} per model time, of mode '
                 f'({", ".join(map(str, block.mode))}).']
 

@@ -116,8 +116,8 @@ def _analysed(args: Namespace) -> Analysis:
         with suppress(NoOrbit):
             near = solve_preset(preset)
     with progress_bar('gaits', len(network.gaits())) as bar:
-        found = verdicts(network, bar, near, args.all_orbits)
-    return Analysis(network, found, along, span, longest)
+        gaits = verdicts(network, bar, near, args.all_orbits)
+    return Analysis(network, gaits, along, span, longest)
 
 
 def _analyze(args: Namespace) -> int:
@@ -128,19 +128,19 @@ def _analyze(args: Namespace) -> int:
             # matplotlib takes half a second, and only pictures need it.
             from cpg_ros.analysis.analysis_plot import check_suffix
             check_suffix(option, path.suffix)
-    found = _analysed(args)
-    answer, text = found.as_dict() if args.json else {}, [] if args.json else [found.text()]
+    analysis = _analysed(args)
+    answer, text = analysis.as_dict() if args.json else {}, [] if args.json else [analysis.text()]
     if args.plot is not None:
         from cpg_ros.analysis.analysis_plot import picture
         from cpg_ros.analysis.branch_report import judged_branches
-        judged = judged_branches(found)
-        write_atomically(args.plot, picture(found, judged, args.plot.suffix))
-        losses = [loss for one in judged for loss in one.losses]
+        judged = judged_branches(analysis)
+        write_atomically(args.plot, picture(analysis, judged, args.plot.suffix))
+        losses = [loss for branch in judged for loss in branch.losses]
         answer['stability_losses'] = [loss.as_dict() for loss in losses]
-        text += ['', *(loss.text(str(found.along)) for loss in losses)] if losses else []
+        text += ['', *(loss.text(str(analysis.along)) for loss in losses)] if losses else []
     if args.prc is not None:
         from cpg_ros.analysis.phase_report import PhaseReport
-        response = PhaseReport.of(found)
+        response = PhaseReport.of(analysis)
         if curves is not None:
             from cpg_ros.analysis import analysis_plot
             write_atomically(curves, analysis_plot.phase_picture(response, curves.suffix))
@@ -149,7 +149,7 @@ def _analyze(args: Namespace) -> int:
     if args.basin is not None:
         # What it needs takes a while to load.
         from cpg_ros.analysis import basin
-        basins = basin.basins(found, args.basin, args.seed or 0)
+        basins = basin.basins(analysis, args.basin, args.seed or 0)
         answer['basins'] = basin.as_dict(basins)
         text += ['', basin.text(basins)]
     say(as_json(answer) if args.json else '\n'.join(text))

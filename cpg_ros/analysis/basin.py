@@ -52,7 +52,7 @@ REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Basin(ShortRepr):
-    """What a network does from random states.
+    """Outcomes of simulations from random states.
 
     Attributes:
         orbit: of the gait.
@@ -85,8 +85,8 @@ class Basin(ShortRepr):
     @property
     def interval(self) -> tuple[float, float]:
         """Ends of Wilson's 95 % interval of the share."""
-        found = binomtest(self.returned, self.states).proportion_ci(0.95, 'wilson')
-        return float(found.low), float(found.high)
+        bounds = binomtest(self.returned, self.states).proportion_ci(0.95, 'wilson')
+        return float(bounds.low), float(bounds.high)
 
 
 def random_states(orbit: Orbit, count: int, seed: int) -> np.ndarray:
@@ -185,32 +185,33 @@ def _named(cycle: LimitCycle, network: Network) -> str:
 
 def basins(analysis: 'Analysis', count: int, seed: int) -> dict[str, Basin]:
     """Find the basin of each gait that attracts by itself, or else with the default gain."""
-    gains = {one.gait: 0.0 if one.stable else one.default_gain for one in analysis.existing
-             if one.stable or one.stable_with_default_gain}
-    found: dict[str, Basin] = {}
+    gains = {verdict.gait: 0.0 if verdict.stable else verdict.default_gain
+             for verdict in analysis.existing
+             if verdict.stable or verdict.stable_with_default_gain}
+    by_gait: dict[str, Basin] = {}
     with progress_bar('random states', len(gains) * count) as bar:
         for gait, gain in gains.items():
-            orbit, before = analysis.gaits[gait].orbit, len(found) * count
+            orbit, before = analysis.gaits[gait].orbit, len(by_gait) * count
             assert orbit is not None
 
             def done(states: int, before: int = before) -> None:
                 bar(before + states)
 
-            found[gait] = basin(orbit, count, seed, gain, done)
-    return found
+            by_gait[gait] = basin(orbit, count, seed, gain, done)
+    return by_gait
 
 
-def text(found: dict[str, Basin]) -> str:
+def text(by_gait: dict[str, Basin]) -> str:
     """Return a table of the basins."""
-    if not found:
+    if not by_gait:
         return 'Basins: no gait attracts.'
     rows: list[tuple[str, ...]] = [('gait', 'gain', 'return', 'share', '95 % interval', 'others')]
-    for gait, one in found.items():
-        low, high = one.interval
-        others = ', '.join(f'{name} {number}' for name, number in one.others.items())
-        rows.append((gait, f'{one.gain:.4f}', str(one.returned), f'{one.fraction:.1%}',
+    for gait, basin in by_gait.items():
+        low, high = basin.interval
+        others = ', '.join(f'{name} {number}' for name, number in basin.others.items())
+        rows.append((gait, f'{basin.gain:.4f}', str(basin.returned), f'{basin.fraction:.1%}',
                      f'{low:.1%} to {high:.1%}', others or '-'))
-    first = next(iter(found.values()))
+    first = next(iter(by_gait.values()))
     return '\n'.join([
         f'Basins: of {first.states} random states each (seed {first.seed}; every variable of '
         'every cell evenly over twice its range on',
@@ -220,8 +221,9 @@ def text(found: dict[str, Basin]) -> str:
         *(f'  {line}' for line in table(rows, '<>>>><'))])
 
 
-def as_dict(found: dict[str, Basin]) -> dict[str, Any]:
+def as_dict(by_gait: dict[str, Basin]) -> dict[str, Any]:
     """Return the basins in plain types, gait -> basin."""
-    return {gait: {'symmetry_gain': one.gain, 'states': one.states, 'seed': one.seed,
-                   'returned': one.returned, 'share': one.fraction, 'interval': list(one.interval),
-                   'others': dict(one.others)} for gait, one in found.items()}
+    return {gait: {'symmetry_gain': basin.gain, 'states': basin.states, 'seed': basin.seed,
+                   'returned': basin.returned, 'share': basin.fraction,
+                   'interval': list(basin.interval), 'others': dict(basin.others)}
+            for gait, basin in by_gait.items()}

@@ -87,27 +87,27 @@ class JudgedBranch:
 
 def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
     """Follow the gaits of an analysis, and judge what is met on the way."""
-    found = [JudgedBranch(gait, branch) for gait, branch in _branches(analysis)]
+    judged = [JudgedBranch(gait, branch) for gait, branch in _branches(analysis)]
     done = 0
     with progress_bar('stability along the branches',
-                      sum(len(one.branch.points) for one in found)) as bar:
-        for one in found:
+                      sum(len(entry.branch.points) for entry in judged)) as bar:
+        for entry in judged:
             spectra: list[Multipliers] = []
-            for place in one.branch.points:
-                spectra.append(multipliers(place.orbit))
-                one.kinds.append(0 if spectra[-1].attracts else
-                                 1 if spectra[-1].leading_within < ATTRACTS else 2)
+            for member in entry.branch.points:
+                spectra.append(multipliers(member.orbit))
+                entry.kinds.append(0 if spectra[-1].attracts else
+                                   1 if spectra[-1].leading_within < ATTRACTS else 2)
                 done += 1
                 bar(done)
-            one.crossings = bifurcations(one.branch, spectra)
-    lost = [(one, point) for one in found for point in one.crossings
+            entry.crossings = bifurcations(entry.branch, spectra)
+    lost = [(entry, point) for entry in judged for point in entry.crossings
             if loses_stability(point.point.orbit)]
     with progress_bar('normal forms where gaits lose stability', len(lost)) as bar:
-        for done, (one, point) in enumerate(lost, 1):
-            one.losses.append(StabilityLoss(one.gait, point, orbit_normal_form(
+        for done, (entry, point) in enumerate(lost, 1):
+            entry.losses.append(StabilityLoss(entry.gait, point, orbit_normal_form(
                 point.point.orbit, point.multiplier, point.part)))
             bar(done)
-    return found
+    return judged
 
 
 def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
@@ -117,17 +117,18 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
     """
     low, high = _span(analysis)
     value = analysis.along.value(analysis.network)
-    found: list[tuple[str, Branch]] = []
+    branches: list[tuple[str, Branch]] = []
     for point in on_line(analysis)[:BRANCHES]:
-        found.extend((point.gait, branch) for branch in _born(point, analysis))
+        branches.extend((point.gait, branch) for branch in _born(point, analysis))
     for verdict in analysis.existing:
         orbit = verdict.orbit
         if low <= value <= high and orbit is not None and not any(
-                gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
-            found.append((verdict.gait,
-                          continue_orbit(orbit, analysis.along, low, high, most=POINTS,
-                                         longest_step=LONGEST, longest=SLOWEST)))
-    return found
+                gait == verdict.gait and _holds(branch, value, orbit)
+                for gait, branch in branches):
+            branches.append((verdict.gait,
+                             continue_orbit(orbit, analysis.along, low, high, most=POINTS,
+                                            longest_step=LONGEST, longest=SLOWEST)))
+    return branches
 
 
 def _span(analysis: Analysis) -> tuple[float, float]:

@@ -35,7 +35,7 @@ EPOCH, MIGRANTS = 3, 0.1
 
 @dataclass(frozen=True)
 class SearchSetup:
-    """What all islands search, as the arguments of search_space, which can be pickled."""
+    """The space that all islands search, as arguments of search_space, which can be pickled."""
 
     network: str
     gait: str
@@ -149,33 +149,33 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
     """
     tried: dict[Network, Score] = {}
     starts: list[np.ndarray | None] = [None] * islands
-    known: list[tuple[Score, ...]] = [()] * islands
+    scores: list[tuple[Score, ...]] = [()] * islands
     for epoch, begun in enumerate(range(0, generations, EPOCH)):
         count = min(EPOCH, generations - begun)
         # The generation that an epoch begins with is the last one of that before.
         epochs = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
-                        starts[island], known[island]) for island in range(islands)]
-        found = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
-        for one in found:
-            for score in one.tried:
+                        starts[island], scores[island]) for island in range(islands)]
+        results = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
+        for result in results:
+            for score in result.tried:
                 if score.network not in tried or score.exact > tried[score.network].exact:
                     tried[score.network] = score
-        starts, known = migrate(found)
+        starts, scores = migrate(results)
         progress(begun + count)
     return tuple(tried.values())
 
 
-def migrate(found: Sequence[EpochResult]
+def migrate(results: Sequence[EpochResult]
             ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
     """The best of each island in the place of the worst of the next one."""
-    many = max(1, round(MIGRANTS * len(found[0].values)))
+    many = max(1, round(MIGRANTS * len(results[0].values)))
     starts: list[np.ndarray | None] = []
-    known = []
-    for island, own in enumerate(found):
-        other = found[island - 1]
+    scores = []
+    for island, own in enumerate(results):
+        other = results[island - 1]
         starts.append(np.concatenate([own.values[:-many], other.values[:many]]))
-        known.append((*own.scores[:-many], *other.scores[:many]))
-    return starts, known
+        scores.append((*own.scores[:-many], *other.scores[:many]))
+    return starts, scores
 
 
 # Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
@@ -194,7 +194,7 @@ class NoGaitFound(CpgError):
 
 @dataclass(frozen=True)
 class Front:
-    """What a search has found.
+    """Result of a search.
 
     Attributes:
         space: what was varied.
@@ -295,6 +295,6 @@ def _order(score: Score) -> tuple[float, float]:
 
 
 def _non_dominated(scores: list[Score]) -> list[Score]:
-    values = np.array([one.objectives for one in scores])
-    return [one for one, own in zip(scores, values, strict=True)
+    values = np.array([score.objectives for score in scores])
+    return [score for score, own in zip(scores, values, strict=True)
             if not ((values <= own).all(axis=1) & (values < own).any(axis=1)).any()]

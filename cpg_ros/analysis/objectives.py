@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What makes a parameter set good for a gait: phases, stability, and waveforms that differ.
+"""Objectives of a search for parameters: phases, stability, and different waveforms.
 
 Phase errors are those of Rashidi et al. (2016), eqs. 6-9, with the cell numbers of their Table 5:
 the phase of every cell against the first one, compared with the gait's. Where a gait has two
@@ -96,7 +96,7 @@ class Space:
     @property
     def symmetry(self) -> Symmetry:
         """Symmetry of the gait, which all sets have."""
-        return self.build(np.array([one.low for one in self.free])).symmetry(self.gait)
+        return self.build(np.array([variable.low for variable in self.free])).symmetry(self.gait)
 
     def build(self, values: np.ndarray) -> Network:
         """Return the network with values for the free variables, rounded to 4 decimals."""
@@ -114,14 +114,14 @@ def _variables(network: type[Network], gait: str) -> list[Variable]:
     families = network.families(network.presets()[gait].network.symmetry(gait))
     stated = {member: (name, limits) for name, limits in network.searched.items()
               for member in network.groups.get(name, (name,))}
-    found = []
+    variables = []
     for family in families:
         # Its members have the same bounds, whatever groups they are of.
         name, limits = stated[min(family)]
-        found.append((name not in network.groups, Variable(
+        variables.append((name not in network.groups, Variable(
             names.get(frozenset(family), min(family)), *limits, tuple(sorted(family)))))
     return [variable for _, variable in sorted(
-        found, key=lambda one: (one[0], () if one[0] else one[1].members))]
+        variables, key=lambda one: (one[0], () if one[0] else one[1].members))]
 
 
 def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],
@@ -155,10 +155,10 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         if name not in places:
             raise InputError(f"'{name}' is not one of the variables of {gait}: "
                              f'{", ".join(variable.name for variable in variables)}')
-        place = places[name]
-        old = variables[place]
-        if place in given:
-            raise InputError(f'{name} is the same as {given[place]}, which is given already')
+        index = places[name]
+        old = variables[index]
+        if index in given:
+            raise InputError(f'{name} is the same as {given[index]}, which is given already')
         if name in bounds and not low < high:
             raise InputError(f'{name}: the lower bound {low:g} is not below the upper bound '
                              f'{high:g}')
@@ -166,8 +166,8 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         if not allowed.low <= low <= high <= allowed.high:
             raise InputError(f'{name}: {low:g}{"" if low == high else f" to {high:g}"} is not '
                              f'within {allowed.low:g} to {allowed.high:g}')
-        given[place] = name
-        variables[place] = Variable(old.name, low, high, old.members)
+        given[index] = name
+        variables[index] = Variable(old.name, low, high, old.members)
     space = Space(network, gait, tuple(variables))
     if not space.free:
         raise InputError('every variable is fixed: nothing is left to search')
@@ -219,7 +219,7 @@ class Score(ShortRepr):
 
     @property
     def objectives(self) -> np.ndarray:
-        """What is minimised: phase errors, stability, and minus a difference of waveforms."""
+        """Values to minimise: phase errors, stability, and minus a difference of waveforms."""
         rest = [self.stability] + ([] if self.difference is None else [-self.difference])
         return np.array([*np.maximum(self.errors, RESOLUTION), *rest])
 
@@ -230,8 +230,8 @@ def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
     At most three errors: with more than three pairs the last one is the largest of the rest.
     """
     first = symmetry.first[symmetry.waves].tolist()
-    found = [(cell, one) for cell, one in enumerate(first) if cell != one]
-    return [[pair] for pair in found[:2]] + ([found[2:]] if found[2:] else [])
+    partners = [(cell, partner) for cell, partner in enumerate(first) if cell != partner]
+    return [[pair] for pair in partners[:2]] + ([partners[2:]] if partners[2:] else [])
 
 
 def objective_names(symmetry: Symmetry) -> tuple[str, ...]:
@@ -246,12 +246,12 @@ def objective_names(symmetry: Symmetry) -> tuple[str, ...]:
 
 
 def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
-    """How far signals are from the gait's symmetry: largest RMS over pairs, over the signal's."""
+    """Return the deviation from the gait's symmetry: largest RMS over pairs, over the signal's."""
     largest = 0.0
-    for cell, one in (pair for group in pairs(symmetry) for pair in group):
-        theta = symmetry.phases[cell] - symmetry.phases[one]
-        gap = np.sqrt(np.mean((signals[:, cell] - shifted(signals[:, one], theta))**2))
-        size = min(signals[:, cell].std(), signals[:, one].std())
+    for cell, partner in (pair for group in pairs(symmetry) for pair in group):
+        theta = symmetry.phases[cell] - symmetry.phases[partner]
+        gap = np.sqrt(np.mean((signals[:, cell] - shifted(signals[:, partner], theta))**2))
+        size = min(signals[:, cell].std(), signals[:, partner].std())
         largest = max(largest, float(gap / size) if size > 0.0 else 10.0)
     return largest
 
@@ -281,9 +281,9 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
     two waveforms differ in shape.
     """
     cells, first = symmetry.group.cells, symmetry.first
-    have = [(np.ptp(signals[:, one]), LEAST_RANGE) for one in first]
-    have += [(steadiness(signals[:, one], signals[:, one + cells]), LEAST_STEADINESS)
-             for one in first]
+    have = [(np.ptp(signals[:, wave]), LEAST_RANGE) for wave in first]
+    have += [(steadiness(signals[:, wave], signals[:, wave + cells]), LEAST_STEADINESS)
+             for wave in first]
     if len(first) == 2:
         have.append((shape_difference(*signals[:, first].T), LEAST_DIFFERENCE))
     return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
@@ -340,17 +340,17 @@ def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
         seed: of the start.
 
     """
-    found = []
+    results = []
     for first in range(0, len(networks), LARGEST_BATCH):
         batch = networks[first:first + LARGEST_BATCH]
         runs = population_run(batch, start_states(batch, gait, seed))
-        found += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
-                  for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]
-    scores = [score for score, _ in found]
-    worth = sorted((k for k, (_, cycle) in enumerate(found) if cycle is not None),
+        results += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
+                    for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]
+    scores = [score for score, _ in results]
+    worth = sorted((k for k, (_, cycle) in enumerate(results) if cycle is not None),
                    key=lambda k: scores[k].stability)
     for k in worth[:MOST_EXACT]:
-        cycle = found[k][1]
+        cycle = results[k][1]
         assert cycle is not None
         scores[k] = _proven(scores[k], cycle, gait)
     return scores

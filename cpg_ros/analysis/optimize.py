@@ -78,7 +78,7 @@ def write_front(path: Path, front: Front) -> None:
 
 def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndarray]) -> None:
     """Draw two objectives of all sets; the front and the chosen set stand out."""
-    on = np.array([score.network in {one.network for one in front.scores}
+    on = np.array([score.network in {entry.network for entry in front.scores}
                    for score in front.tried])
     selected = np.array([score.network == front.best.preset.network for score in front.tried])
     exact = np.array([score.exact for score in front.tried])
@@ -134,10 +134,10 @@ def draw_front(path: Path, front: Front) -> None:
     matplotlib.use('Agg')
     from matplotlib import pyplot
     names = objective_names(front.space.symmetry)
-    values = dict(zip(names, np.array([one.objectives for one in front.tried]).T, strict=True))
+    values = dict(zip(names, np.array([score.objectives for score in front.tried]).T, strict=True))
     multiplier = 'leading multiplier a cycle [1]'
     stability = values.pop('leading multiplier [1]')
-    exact = np.array([one.exact for one in front.tried])
+    exact = np.array([score.exact for score in front.tried])
     values[multiplier] = np.clip(stability, FLOOR, APERIODIC)
     phases = [name for name in names if name.startswith('phase')]
     worst = 'largest phase error [deg]'
@@ -145,7 +145,7 @@ def draw_front(path: Path, front: Front) -> None:
     panels = [(phases[0], phases[1]), (worst, multiplier)]
     if front.best.orbit.waves.max():
         difference = 'difference in shape of the waveforms [1]'
-        values[difference] = np.array([one.difference for one in front.tried])
+        values[difference] = np.array([score.difference for score in front.tried])
         # Elsewhere the gait's two waveforms are not there to be compared.
         values[difference][~exact] = np.nan
         panels.append((difference, multiplier))

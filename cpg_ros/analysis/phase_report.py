@@ -87,10 +87,10 @@ class PhaseReport(ShortRepr):
     def as_dict(self) -> dict[str, Any]:
         """Return the curves in plain types, gait -> curves over the phase of the cell."""
         theta = np.arange(POINTS) / POINTS
-        found: dict[str, Any] = {gait: {'why': why} for gait, why in self.missing.items()}
+        gaits: dict[str, Any] = {gait: {'why': why} for gait, why in self.missing.items()}
         for gait, response in self.responses.items():
             locks, first = locking(response), response.orbit.symmetry.first
-            found[gait] = {
+            gaits[gait] = {
                 'diffusion': phase_diffusion(response, 1.0),
                 'theta': theta.tolist(), 'unit': 'cycles per unit of the variable',
                 'curves': [{'cells': (np.flatnonzero(response.orbit.waves == wave) + 1).tolist(),
@@ -98,7 +98,7 @@ class PhaseReport(ShortRepr):
                             'locking': float(locks[first[wave], variable]),
                             'response': response.waveform(theta, wave, variable).tolist()}
                            for wave, variable, name in curves(response)]}
-        return found
+        return gaits
 
 
 def curves(response: PhaseResponse) -> list[tuple[int, int, str]]:
@@ -109,5 +109,5 @@ def curves(response: PhaseResponse) -> list[tuple[int, int, str]]:
 
 def cells(response: PhaseResponse, wave: int) -> str:
     """Return the numbers of a wave's cells, or 'all'."""
-    found = np.flatnonzero(response.orbit.waves == wave) + 1
-    return 'all' if found.size == response.orbit.network.cells else ' '.join(map(str, found))
+    numbers = np.flatnonzero(response.orbit.waves == wave) + 1
+    return 'all' if numbers.size == response.orbit.network.cells else ' '.join(map(str, numbers))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every room uses: errors, files, the schema of files, reports, jobs, the command line.
+"""Errors, files, the schema of files, reports, jobs and the command line, for all rooms.
 
 Imports nothing of the package; knows nothing of ROS.
 """

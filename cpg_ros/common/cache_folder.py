@@ -58,10 +58,10 @@ def cache_folder(name: str) -> Path | None:
         user and root may have written into it. A warning says so.
 
     """
-    place = _place()
-    if place is None:
+    root = _place()
+    if root is None:
         return None
-    folder = place / name
+    folder = root / name
     try:
         new = not folder.exists()
         folder.mkdir(mode=0o700, exist_ok=True)
@@ -70,7 +70,7 @@ def cache_folder(name: str) -> Path | None:
             return None
         _use(folder)
         if new:
-            _remove_unused(place)
+            _remove_unused(root)
     except OSError as error:
         _warn(error.strerror or str(error))
         return None
@@ -97,52 +97,52 @@ def _warn_untrusted(reason: str) -> None:
     _LOGGER.warning('compiled code is not loaded: %s', reason)
 
 
-def _writable_by_others(found: os.stat_result) -> bool:
+def _writable_by_others(status: os.stat_result) -> bool:
     """Whether more than the owner, or a group of the user alone, may write."""
-    if found.st_mode & stat.S_IWOTH:
+    if status.st_mode & stat.S_IWOTH:
         return True
-    if not found.st_mode & stat.S_IWGRP:
+    if not status.st_mode & stat.S_IWGRP:
         return False
     try:
-        user, group = pwd.getpwuid(os.getuid()), grp.getgrgid(found.st_gid)
+        user, group = pwd.getpwuid(os.getuid()), grp.getgrgid(status.st_gid)
     except KeyError:
         return True
     # With the usual umask of 002 each user has a private group.
     return group.gr_name != user.pw_name or not set(group.gr_mem) <= {user.pw_name}
 
 
-def _untrusted(path: Path, found: os.stat_result, sticky: bool = False) -> str:
+def _untrusted(path: Path, status: os.stat_result, sticky: bool = False) -> str:
     """Return why others than the user and root may have written a file or folder, or ''.
 
     Args:
         path: named in the reason.
-        found: its status.
+        status: its status.
         sticky: a folder in which others can only add what is theirs is trusted, too.
 
     """
-    if found.st_uid not in (os.getuid(), 0):
-        return f'{path} belongs to the user {found.st_uid}'
-    if _writable_by_others(found) and not (sticky and found.st_mode & stat.S_ISVTX):
+    if status.st_uid not in (os.getuid(), 0):
+        return f'{path} belongs to the user {status.st_uid}'
+    if _writable_by_others(status) and not (sticky and status.st_mode & stat.S_ISVTX):
         return f'{path} can be written by other users'
     return ''
 
 
-def _untrusted_place(place: Path) -> str:
+def _untrusted_place(folder: Path) -> str:
     """Return why others may have written into a folder, or could replace it, or ''."""
-    if reason := _untrusted(place, place.stat()):
+    if reason := _untrusted(folder, folder.stat()):
         return reason
-    reasons = (_untrusted(parent, parent.stat(), sticky=True) for parent in place.parents)
+    reasons = (_untrusted(parent, parent.stat(), sticky=True) for parent in folder.parents)
     return next(filter(None, reasons), '')
 
 
 def _untrusted_contents(folder: Path) -> str:
     """Return why others may have written a folder of a trusted place or what is in it, or ''."""
-    found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode):
+    status = folder.lstat()
+    if not stat.S_ISDIR(status.st_mode):
         return f'{folder} is no folder'
-    if reason := _untrusted(folder, found):
+    if reason := _untrusted(folder, status):
         return reason
-    closed = not found.st_mode & (stat.S_IXGRP | stat.S_IXOTH)
+    closed = not status.st_mode & (stat.S_IXGRP | stat.S_IXOTH)
     for root, folders, files in os.walk(folder):
         for name in (*folders, *files):
             path = Path(root, name)
@@ -166,19 +166,19 @@ def _place() -> Path | None:
     others than the user and root may have written into is passed over, with a warning.
     """
     caches = Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser()
-    wanted = [Path(__file__).resolve().parents[1] / '__pycache__' / 'compiled',
-              caches / 'cpg_ros' / 'compiled']
+    candidates = [Path(__file__).resolve().parents[1] / '__pycache__' / 'compiled',
+                  caches / 'cpg_ros' / 'compiled']
     if os.environ.get('NUMBA_CACHE_DIR'):
-        wanted.insert(0, Path(os.environ['NUMBA_CACHE_DIR']) / 'cpg_ros')
-    for place in wanted:
+        candidates.insert(0, Path(os.environ['NUMBA_CACHE_DIR']) / 'cpg_ros')
+    for folder in candidates:
         with contextlib.suppress(OSError):
-            place.mkdir(mode=0o700, parents=True, exist_ok=True)
-            place = place.resolve()
-            if os.access(place, os.W_OK):
-                if not (reason := _untrusted_place(place)):
-                    return place
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            folder = folder.resolve()
+            if os.access(folder, os.W_OK):
+                if not (reason := _untrusted_place(folder)):
+                    return folder
                 _warn_untrusted(reason)
-    tried = f'compiled code cannot be kept in {" or ".join(map(str, wanted))}'
+    tried = f'compiled code cannot be kept in {" or ".join(map(str, candidates))}'
     with contextlib.suppress(OSError):
         temporary = _temporary()
         os.environ['NUMBA_CACHE_DIR'] = str(temporary)
@@ -197,15 +197,15 @@ def _temporary() -> Path:
 
     """
     user = os.getuid()
-    place = Path(tempfile.gettempdir()) / f'cpg_ros-{user}'
+    folder = Path(tempfile.gettempdir()) / f'cpg_ros-{user}'
     with contextlib.suppress(FileExistsError):
-        place.mkdir(mode=0o700)
-    found = place.lstat()
-    if found.st_uid != user or found.st_mode != stat.S_IFDIR | 0o700:
-        place = Path(tempfile.mkdtemp(prefix='cpg_ros-'))
-    if reason := _untrusted_place(place.resolve()):
+        folder.mkdir(mode=0o700)
+    status = folder.lstat()
+    if status.st_uid != user or status.st_mode != stat.S_IFDIR | 0o700:
+        folder = Path(tempfile.mkdtemp(prefix='cpg_ros-'))
+    if reason := _untrusted_place(folder.resolve()):
         raise OSError(reason)
-    return place
+    return folder
 
 
 def _use(folder: Path) -> None:
@@ -227,15 +227,15 @@ def _use(folder: Path) -> None:
         lock.close()
 
 
-def _remove_unused(place: Path) -> None:
+def _remove_unused(folder: Path) -> None:
     """Remove all folders but the last used ones and those that a process has locked."""
-    locks = sorted(place.glob(f'*/{_LOCK}'), key=_last_used)
+    locks = sorted(folder.glob(f'*/{_LOCK}'), key=_last_used)
     for path in locks[:-KEPT]:
         # Those that are in use, or whose users cannot be known.
         with contextlib.suppress(OSError), path.open('rb') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # At once, or a process that starts now would find half of it.
-            removed = path.parent.rename(place / f'.{path.parent.name}.{os.getpid()}')
+            removed = path.parent.rename(folder / f'.{path.parent.name}.{os.getpid()}')
             shutil.rmtree(removed)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every tool shares: its parser, messages of one line, and exit codes.
+"""The parser, messages and exit codes of all executables.
 
 A tool is one file with a parser, a function that takes the parsed arguments and returns the exit
 code, and ``main``, which passes both to ``run``. 0 is success, 1 a negative result, 2 unusable

@@ -60,11 +60,11 @@ def short(value: Any) -> str:
         text = repr(value)
         return text if len(text) <= LONGEST else text[:LONGEST - 4] + "...'"
     if isinstance(value, Mapping):
-        text = ', '.join(f'{key}: {short(one)}' for key, one in list(value.items())[:MOST])
+        text = ', '.join(f'{key}: {short(item)}' for key, item in list(value.items())[:MOST])
         few = len(value) < MOST and len(text) < LONGEST
         return f'{{{text}}}' if few else f'{{{len(value)} keys}}'
     if isinstance(value, Sequence):
-        text = ', '.join(short(one) for one in value[:MOST])
+        text = ', '.join(short(item) for item in value[:MOST])
         few = len(value) < MOST and len(text) < LONGEST
         return f'({text})' if few else f'({len(value)} items)'
     return type(value).__name__

@@ -181,14 +181,14 @@ def opened(path: str | Path, error: type[CpgError], what: str = '',
     """
     name = f'{what} {path}'.strip()
 
-    def check(found: os.stat_result) -> None:
-        if stat.S_ISDIR(found.st_mode):
+    def check(status: os.stat_result) -> None:
+        if stat.S_ISDIR(status.st_mode):
             raise error(one_line(f'{name}: {os.strerror(errno.EISDIR)}'))
-        if not stat.S_ISREG(found.st_mode):
-            kind = KINDS.get(stat.S_IFMT(found.st_mode), 'something else')
+        if not stat.S_ISREG(status.st_mode):
+            kind = KINDS.get(stat.S_IFMT(status.st_mode), 'something else')
             raise error(one_line(f'{name}: is {kind}, not a regular file'))
-        if found.st_size > largest:
-            raise error(one_line(f'{name}: has {found.st_size / 1e6:.4g} MB, more than the '
+        if status.st_size > largest:
+            raise error(one_line(f'{name}: has {status.st_size / 1e6:.4g} MB, more than the '
                                  f'{largest / 1e6:g} MB that are read; make it smaller'))
 
     try:

@@ -318,10 +318,10 @@ def in_order(executor: Executor, function: Callable[..., Any], jobs: Iterable[tu
     waiting: dict[int, Any] = {}
     following = 0
     numbered = ((number, function, job) for number, job in enumerate(jobs))
-    for one in outcomes(executor, _applied, numbered, tick):
-        if one.error is not None:
-            raise one.error
-        waiting[one.job[0]] = one.value
+    for outcome in outcomes(executor, _applied, numbered, tick):
+        if outcome.error is not None:
+            raise outcome.error
+        waiting[outcome.job[0]] = outcome.value
         while following in waiting:
             yield waiting.pop(following)
             following += 1

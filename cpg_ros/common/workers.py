@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where jobs run: processes of this machine, or the workers of a dask cluster.
+"""Executors of jobs: processes of this machine, or the workers of a dask cluster.
 
 A ``Fleet`` is a ``concurrent.futures.Executor`` over another one that is made anew when it breaks:
 a pool whose worker was killed, a cluster whose scheduler was restarted. What runs jobs takes any
@@ -76,24 +76,24 @@ def security(address: str, certificates: Certificates | None) -> Any:
     """
     from distributed import Security
     if certificates is None:
-        found = Security()
+        settings = Security()
     else:
         if not address.startswith(TLS):
             raise InputError(f"--tls needs an address that begins with {TLS}, not '{address}'")
         for file in (certificates.authority, certificates.certificate, certificates.key):
             if not Path(file).is_file():
                 raise InputError(f'{file}: no such file')
-        found = Security(tls_ca_file=certificates.authority, require_encryption=True,
-                         tls_client_cert=certificates.certificate,
-                         tls_client_key=certificates.key)
+        settings = Security(tls_ca_file=certificates.authority, require_encryption=True,
+                            tls_client_cert=certificates.certificate,
+                            tls_client_key=certificates.key)
     try:
-        context = found.get_connection_args('client')['ssl_context']
+        context = settings.get_connection_args('client')['ssl_context']
     except OSError as error:
         raise InputError(f'the certificates for {address} cannot be used: {error}') from error
     if context is None and address.startswith(TLS):
         raise InputError(f"{address} needs --tls CA CERT KEY, or dask's configuration "
                          'distributed.comm.tls')
-    return found
+    return settings
 
 
 def exposed(*addresses: str) -> str:
@@ -167,8 +167,8 @@ def processes(jobs: int = 0) -> ResilientExecutor:
     def close(wait: bool) -> None:
         # Children of the pool; its own list of them is private.
         mine = [] if wait else multiprocessing.active_children()
-        for one in mine:
-            one.terminate()
+        for process in mine:
+            process.terminate()
         held[0].shutdown(wait=True, cancel_futures=not wait)
 
     return ResilientExecutor(*made(), made, close)
@@ -276,7 +276,7 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
             comm.abort()
 
     try:
-        found = asyncio.run(asyncio.wait_for(ask(), seconds))
+        answers = asyncio.run(asyncio.wait_for(ask(), seconds))
     except (OSError, TimeoutError) as error:
         raise NoCluster(f'no dask scheduler answers at {address}' + (
             ' to these certificates' if address.startswith(TLS) else '')) from error
@@ -285,9 +285,9 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
     # Another protocol is taken for a message of any length.
     except MemoryError as error:
         raise NoCluster(f'what answers at {address} is not a dask scheduler') from error
-    if not isinstance(found, dict) or found.get('type') != 'Scheduler':
+    if not isinstance(answers, dict) or answers.get('type') != 'Scheduler':
         raise NoCluster(f'what answers at {address} is not a dask scheduler')
-    return str(found.get('address', address))
+    return str(answers.get('address', address))
 
 
 def _leave(held: list[Any]) -> None:

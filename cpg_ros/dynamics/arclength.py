@@ -52,7 +52,7 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
 
     """
     values = np.array([function(x) for x in grid]) if values is None else np.asarray(values)
-    places, found = list(grid), list(values)
+    places, ordinates = list(grid), list(values)
     sizes = np.abs(values)
     bend = np.maximum(sizes[:-2], sizes[2:]) - sizes[1:-1]
     turns = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
@@ -67,8 +67,8 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
         if lowest.fun < 0.0:
             at = int(np.searchsorted(places, lowest.x))
             places.insert(at, float(lowest.x))
-            found.insert(at, side * lowest.fun)
-    signs = np.sign(found)
+            ordinates.insert(at, side * lowest.fun)
+    signs = np.sign(ordinates)
     signs[signs == 0.0] = 1.0
     # Not a number where there is no value, whose product differs from -1.
     crossed = np.flatnonzero(signs[:-1] * signs[1:] == -1.0)
@@ -357,14 +357,14 @@ def resolve_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
         NoOrbit: it cannot be resolved.
 
     """
-    place = first = correct_point(curve, z, border, exact=exact)
-    while place is not None and first is not None:
-        new = place.curve.renewed(place.z, border, place is not first)
+    point = first = correct_point(curve, z, border, exact=exact)
+    while point is not None and first is not None:
+        new = point.curve.renewed(point.z, border, point is not first)
         if new is None:
-            return place if place is first else replace(place, steps=first.steps,
+            return point if point is first else replace(point, steps=first.steps,
                                                         cosine=first.cosine)
         border = new[2]
-        place = correct_point(*new, exact=exact)
+        point = correct_point(*new, exact=exact)
     return None
 
 
@@ -375,29 +375,29 @@ def fixed_unknown(size: int, which: int) -> np.ndarray:
     return border
 
 
-def predict_and_correct(place: CurvePoint, step: float) -> CurvePoint:
+def predict_and_correct(point: CurvePoint, step: float) -> CurvePoint:
     """Return the point a step along the tangent, in the same discretisation.
 
     Raises:
         NoOrbit: Newton's method does not converge.
 
     """
-    found = correct_point(place.curve, place.z + step * place.tangent, place.tangent)
-    if found is None:
+    ahead = correct_point(point.curve, point.z + step * point.tangent, point.tangent)
+    if ahead is None:
         raise NoOrbit('the curve is lost')
-    return found
+    return ahead
 
 
-def point_at_value(place: CurvePoint, value: float) -> CurvePoint | None:
+def point_at_value(point: CurvePoint, value: float) -> CurvePoint | None:
     """Return the curve's point with a value of the parameter, from one nearby; None if lost."""
-    z = place.z + (value - place.value) / place.rate * place.tangent
+    z = point.z + (value - point.value) / point.rate * point.tangent
     z[-1] = value
-    found = resolve_point(place.curve, z, fixed_unknown(z.size, -1))
-    if found is None:
+    ahead = resolve_point(point.curve, z, fixed_unknown(z.size, -1))
+    if ahead is None:
         return None
-    found.z[-1] = value
+    ahead.z[-1] = value
     # The border makes the value rise.
-    return found if place.rate > 0.0 else found.reversed()
+    return ahead if point.rate > 0.0 else ahead.reversed()
 
 
 def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where orbits on a branch gain or lose stability other than by a fold.
+"""Bifurcations of the orbits on a branch, other than folds.
 
 A multiplier that crosses the unit circle at 1 lets another branch leave (or this one fold), one
 at -1 a branch of twice the period, and a pair a torus (Kuznetsov, *Elements of Applied Bifurcation
@@ -59,7 +59,7 @@ class Bifurcation(ShortRepr):
 
     @property
     def value(self) -> float:
-        """Where on the line."""
+        """Value on the line."""
         return self.point.value
 
 
@@ -77,35 +77,35 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
     """
     spectra = [spectrum.subspaces for spectrum in judged or map(
         multipliers, (point.orbit for point in branch.points))]
-    found: list[Bifurcation] = []
+    crossings: list[Bifurcation] = []
     gaps: dict[int, _Gap] = {}
     for k, part, rank in _crossings(branch, spectra):
         gap = gaps.setdefault(k, _Gap(branch.points[k:k + 2], spectra[k:k + 2]))
         try:
-            one = _located(gap, part, rank, exact)
+            crossing = _located(gap, part, rank, exact)
         except NoOrbit:
             # Two curves that cross are hard to tell apart right there.
             continue
         # Both of a pair cross, and what symmetry makes alike crosses in several subspaces.
-        if one is not None and not any(
-                one.kind == other.kind
-                and np.isclose(one.value, other.value, 1e-7, max(1e-9, exact * gap.width))
-                and np.isclose(one.point.orbit.period, other.point.orbit.period,
+        if crossing is not None and not any(
+                crossing.kind == other.kind
+                and np.isclose(crossing.value, other.value, 1e-7, max(1e-9, exact * gap.width))
+                and np.isclose(crossing.point.orbit.period, other.point.orbit.period,
                                max(1e-5, exact))
-                for other in found):
-            found.append(one)
-    return tuple(found)
+                for other in crossings):
+            crossings.append(crossing)
+    return tuple(crossings)
 
 
 def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
                ) -> Iterator[tuple[int, int, int]]:
     """Yield the number of the point before, of the subspace, and how many there are larger."""
     for k, (left, right) in enumerate(pairwise(spectra)):
-        for part, (one, other) in enumerate(zip(left, right, strict=True)):
-            before, after = (int((np.abs(some) > 1.0).sum()) for some in (one, other))
+        for part, (old, new) in enumerate(zip(left, right, strict=True)):
+            before, after = (int((np.abs(some) > 1.0).sum()) for some in (old, new))
             folds = {k, k + 1} & set(branch.turns)
             for rank in range(min(before, after), max(before, after)):
-                pair = one[rank], other[rank]
+                pair = old[rank], new[rank]
                 # At a fold one multiplier of the class is 1, to rounding.
                 if part == 0 and folds and any(abs(mu - 1.0) < 1e-3 for mu in pair):
                     continue
@@ -135,7 +135,7 @@ class _Gap:
     """The curve between two neighbouring points of a branch, solved once at each place."""
 
     def __init__(self, ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]]) -> None:
-        self._left, self._right = (one.place for one in ends)
+        self._left, self._right = (end.place for end in ends)
         self._known = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
         self.width = abs(ends[1].value - ends[0].value)
 
@@ -147,10 +147,10 @@ class _Gap:
 
         """
         if fraction not in self._known:
-            place = _between(self._left, self._right, fraction)
-            if place is None:
+            located = _between(self._left, self._right, fraction)
+            if located is None:
                 raise NoOrbit('no orbit between two points of a branch')
-            point = BranchPoint(place.value, place.curve.orbit(place.z), place)
+            point = BranchPoint(located.value, located.curve.orbit(located.z), located)
             self._known[fraction] = point, multipliers(point.orbit).subspaces
         return self._known[fraction]
 

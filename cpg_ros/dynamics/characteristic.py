@@ -66,7 +66,7 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
         a, b = complex(now[0, 0]), complex(past[0, 0])
         return [(omega, critical_delay(a, b, omega)) for omega in frequencies(a, b)]
     unit = np.eye(len(now))
-    found: list[tuple[float, float]] = []
+    crossings: list[tuple[float, float]] = []
     first, middle, last = (np.kron(past, unit),
                            np.kron(now, unit) + np.kron(unit, now.conj()),
                            np.kron(unit, past.conj()))
@@ -80,11 +80,12 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
         z = complex(z / abs(z))
         for root in np.linalg.eigvals(now + past * z):
             close = ON_CIRCLE * (1.0 + abs(root))
-            one = (float(root.imag), _delay(z, float(root.imag), 0)) if root.imag > close else None
-            if one and abs(root.real) < close and not any(
-                    np.allclose(one, other, 1e-6, 0.0) for other in found):
-                found.append(one)
-    return sorted(found, reverse=True)
+            crossing = ((float(root.imag), _delay(z, float(root.imag), 0))
+                        if root.imag > close else None)
+            if crossing and abs(root.real) < close and not any(
+                    np.allclose(crossing, other, 1e-6, 0.0) for other in crossings):
+                crossings.append(crossing)
+    return sorted(crossings, reverse=True)
 
 
 #: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
@@ -155,10 +156,10 @@ def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996);
     # Newton's method on w + log w = L, whatever the sheet of the logarithm.
     argument = np.angle(b * np.exp(1j * exponent.imag))
-    wanted = np.log(abs(b) * tau) + exponent.real + 1j * (argument + 2.0 * np.pi * n)
-    w = wanted - np.log(wanted)
+    target = np.log(abs(b) * tau) + exponent.real + 1j * (argument + 2.0 * np.pi * n)
+    w = target - np.log(target)
     for _ in range(6):
-        gap = w + np.log(w) - wanted
+        gap = w + np.log(w) - target
         w = w - (gap - 2j * np.pi * np.round(gap.imag / (2.0 * np.pi))) / (1.0 + 1.0 / w)
     return w if exponent.real > 0.0 else np.where(n == 0, 0.0, w)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""All coexisting orbits of a gait: which there are, and which of them attract.
+"""Coexisting orbits of a gait, and their stability.
 
 At one parameter set a gait may have several periodic orbits, of which the one that Newton's method
 reaches first need not be the one on which the network settles. Orbits that attract within the
@@ -71,14 +71,14 @@ class CoexistingOrbits(ShortRepr):
 
     @property
     def searched(self) -> str:
-        """What was searched, as 'searched from 15 starts and 2 Hopf points'; '' for nothing."""
+        """The extent of the search, as 'searched from 15 starts and 2 Hopf points', or ''."""
         counts = [f'{count} {what}{"" if count == 1 else "s"}' for count, what in (
             (self.starts, 'start'), (self.hopf_points, 'Hopf point')) if count]
         deflated = ', and by deflation' if self.deflated and self.orbits else ''
         return f'searched from {" and ".join(counts)}{deflated}' if counts else ''
 
     def _summary(self) -> str:
-        periods = ', '.join(f'{one.period:.7g}' for one in self.orbits)
+        periods = ', '.join(f'{orbit.period:.7g}' for orbit in self.orbits)
         return ', '.join(filter(None, (f'{self.gait}: {periods}', self.searched)))
 
 
@@ -114,11 +114,11 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
         if everything or network.delay_parameter:
             search.follow()
         search.deflate()
-    found = search.result(near)
-    if not found.orbits:
+    orbits = search.result(near)
+    if not orbits.orbits:
         below = _below_threshold(network, gait)
-        raise NoOrbit('; '.join(filter(None, (below or why, found.searched))))
-    return found
+        raise NoOrbit('; '.join(filter(None, (below or why, orbits.searched))))
+    return orbits
 
 
 class _Search:
@@ -148,23 +148,24 @@ class _Search:
         return any(growth < ATTRACTS for growth in self._growth)
 
     def result(self, near: Orbit | None) -> CoexistingOrbits:
-        known = near or (self.orbits[0] if self.orbits else None)
+        nearest = near or (self.orbits[0] if self.orbits else None)
         order = sorted(range(len(self.orbits)), key=lambda k: (
             self._growth[k] >= ATTRACTS,
-            0.0 if known is None else abs(np.log(self.orbits[k].period / known.period))))
+            0.0 if nearest is None else abs(np.log(self.orbits[k].period / nearest.period))))
         return CoexistingOrbits(self.gait, tuple(self.orbits[k] for k in order), self.starts,
                                 self.hopf_points, self.deflated)
 
     def add(self, orbit: Orbit | None) -> bool:
         """Add an orbit unless it is known or has more symmetry; tell whether it is new."""
-        if orbit is None or extra_symmetry(orbit) or any(_same(orbit, one) for one in self.orbits):
+        if orbit is None or extra_symmetry(orbit) or any(
+                _same(orbit, other) for other in self.orbits):
             return False
         self.orbits.append(orbit)
         self._growth.append(leading_within(orbit))
         return True
 
     def simulate(self, random: int, longer: bool) -> None:
-        """Let the network settle in the gait's class from many states.
+        """Simulate the network from many states in the gait's class until it settles.
 
         Those that take long are waited for while nothing that attracts is known, or with longer.
         """
@@ -172,7 +173,7 @@ class _Search:
             for path, period in find_orbit(self.network, self.gait, random,
                                            lambda: longer or not self.attracting):
                 if len(self.orbits) < MOST and not any(
-                        _near(path, period, one) for one in self.orbits):
+                        _near(path, period, orbit) for orbit in self.orbits):
                     self.add(solve_from_path(self.network, self.symmetry, path, period))
         except NoEquilibrium:
             # About which the starts would be.
@@ -194,9 +195,9 @@ class _Search:
         while todo:
             orbit = todo.pop(0)
             for path, period in _scaled(orbit):
-                found = solve_from_path(self.network, self.symmetry, path, period,
-                                        [one.period for one in self.orbits])
-                if len(self.orbits) < MOST and self.add(found):
+                solution = solve_from_path(self.network, self.symmetry, path, period,
+                                           [other.period for other in self.orbits])
+                if len(self.orbits) < MOST and self.add(solution):
                     todo.append(self.orbits[-1])
 
 
@@ -224,7 +225,7 @@ def _same(one: Orbit, other: Orbit) -> bool:
 
 
 def _near(path: Path, period: float, orbit: Orbit) -> bool:
-    """Whether a simulation's cycle is a known orbit, so that it need not be solved for again."""
+    """Whether the cycle of a simulation is an orbit that has already been solved for."""
     if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
         return False
     theta = np.arange(POINTS) / POINTS

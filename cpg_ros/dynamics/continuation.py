@@ -46,7 +46,7 @@ STEEPER = 4.0
 
 @dataclass(frozen=True)
 class BranchEnd:
-    """How a branch ends.
+    """The end of a branch and its reason.
 
     Attributes:
         why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (it runs into an
@@ -134,7 +134,7 @@ def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _winds(slopes: np.ndarray) -> bool:
-    """Whether the value winds in, or no longer moves."""
+    """Whether the value spirals in, or no longer changes."""
     return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
 
 
@@ -191,7 +191,7 @@ class Branch(ShortRepr):
 
     @property
     def folds(self) -> tuple[BranchPoint, ...]:
-        """Where the branch turns round: on one side two orbits, on the other none."""
+        """Folds of the branch, with two orbits on one side and none on the other."""
         return tuple(self.points[k] for k in self.turns)
 
     @property
@@ -216,21 +216,21 @@ class Branch(ShortRepr):
             NoOrbit: between two points that the value lies between, Newton's method found none.
 
         """
-        found = []
+        points = []
         for left, right in zip(self.points, self.points[1:], strict=False):
             if left.value == value:
-                found.append(left.orbit)
+                points.append(left.orbit)
             elif (left.value - value) * (right.value - value) < 0.0:
                 # From the end that is nearer to a fold, where the value is yet to pick up.
-                place = (arclength.next_crossing(left.place, 1.0, value)
-                         if abs(left.place.rate) < abs(right.place.rate) else
-                         arclength.next_crossing(right.place, -1.0, value))
-                if place is None:
+                located = (arclength.next_crossing(left.place, 1.0, value)
+                           if abs(left.place.rate) < abs(right.place.rate) else
+                           arclength.next_crossing(right.place, -1.0, value))
+                if located is None:
                     raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
-                found.append(_point(place).orbit)
+                points.append(_point(located).orbit)
         if self.points[-1].value == value:
-            found.append(self.points[-1].orbit)
-        return tuple(found)
+            points.append(self.points[-1].orbit)
+        return tuple(points)
 
 
 def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: float, *,
@@ -387,8 +387,8 @@ def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> N
                              f'something else than {shift}')
 
 
-def _point(place: CurvePoint) -> BranchPoint:
-    return BranchPoint(place.value, place.curve.orbit(place.z), place)
+def _point(located: CurvePoint) -> BranchPoint:
+    return BranchPoint(located.value, located.curve.orbit(located.z), located)
 
 
 def _course(points: list[BranchPoint]) -> tuple[np.ndarray, np.ndarray]:
@@ -403,10 +403,10 @@ def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
     low, high, longest = limits
     points: list[BranchPoint] = []
 
-    def visit(place: CurvePoint) -> str:
-        points.append(_point(place))
+    def visit(origin: CurvePoint) -> str:
+        points.append(_point(origin))
         orbit = points[-1].orbit
-        if place.amplitude < REST:
+        if origin.amplitude < REST:
             return 'rest'
         if orbit.period > longest or grows_alone(*_course(points[-2:]), high - low):
             return 'period'

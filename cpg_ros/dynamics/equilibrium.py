@@ -15,7 +15,7 @@
 """Equilibria at which all cells are equal: the stand of a network.
 
 Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are those
-of one cell that hears itself. Where its rates are linear in all variables but one, x, they are
+of one cell that is its own input. Where its rates are linear in all variables but one, x, they are
 ``f0(x) + F1(x) y``, couplings included, and equilibria are roots of ``det(f0, F1)`` in x, which
 has no poles.
 """
@@ -48,7 +48,7 @@ class NoEquilibrium(CpgError):
 
 
 class Quotient(Field[Network]):
-    """A network in which all cells are alike: a cell that hears itself, now as a delay ago.
+    """A network in which all cells are alike: a cell that is its own input, now as a delay ago.
 
     Of the parameters that each cell has of its own, the first cell's stand for all.
     """
@@ -72,7 +72,7 @@ class Quotient(Field[Network]):
         # Of one state these are numbers, with which equations take a third of the time.
         variables = np.moveaxis(states, -1, 0)
         rates, slopes = equations.slopes(
-            [variables[one.variable] for one in equations.arguments], self._p)
+            [variables[argument.variable] for argument in equations.arguments], self._p)
         out, jacobian = np.empty(states.shape), np.zeros((*states.shape, states.shape[-1]))
         for v, rate in enumerate(rates):
             out[..., v] = rate
@@ -83,8 +83,8 @@ class Quotient(Field[Network]):
     def push(self, state: np.ndarray) -> np.ndarray:
         """Return the derivative of the rates by the share of the couplings, shape (variables,)."""
         out = np.zeros(state.size)
-        found = self._equations.by_parameter(self._arguments(state, None), self._p)
-        for (v, r), slope in found.items():
+        slopes = self._equations.by_parameter(self._arguments(state, None), self._p)
+        for (v, r), slope in slopes.items():
             if self._coupled[r]:
                 out[v] += (slope * self._whole[r]).item()
         return out
@@ -163,11 +163,11 @@ def equilibria(network: Network) -> np.ndarray:
         solved = [cell.newton(start) for start in _roots(cell, scanned)]
         reached = np.array([state for state in solved if state is not None]
                            ).reshape(-1, network.variables)
-    found: list[np.ndarray] = []
+    states: list[np.ndarray] = []
     while len(reached):
-        found.append(reached[0])
+        states.append(reached[0])
         reached = reached[~np.isclose(reached, reached[0], 1e-9, 1e-9).all(axis=1)]
-    return np.array(sorted(found, key=tuple)).reshape(-1, network.variables)
+    return np.array(sorted(states, key=tuple)).reshape(-1, network.variables)
 
 
 @cache
@@ -231,9 +231,9 @@ def equilibrium(network: Network) -> np.ndarray:
     _check(network)
     if not network.rests:
         raise NoEquilibrium('an uncoupled cell oscillates from any state: there is no stand')
-    known = network.at_rest()
-    if known is not None:
-        return known
+    rest = network.at_rest()
+    if rest is not None:
+        return rest
     cell = Quotient(network)
     cell.set_share(0.0)
     state = _uncoupled(replace(  # type: ignore[type-var]
@@ -258,19 +258,19 @@ def equilibrium(network: Network) -> np.ndarray:
             step, grow = 0.5 * step, 1.0
         if step < SHORTEST < 1.0 - fraction or size > FURTHEST:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'
-            place = ', '.join(f'{name} {value:.4f}' for name, value
-                              in named(network, state).items())
+            listed = ', '.join(f'{name} {value:.4f}' for name, value
+                               in named(network, state).items())
             raise NoEquilibrium(f'the stand is lost {how} at {fraction:.4f} of the couplings, '
-                                f'{place}')
+                                f'{listed}')
     return state
 
 
 @lru_cache(maxsize=64)
 def _uncoupled(alone: Network) -> np.ndarray:
-    found = equilibria(alone)
-    if len(found) != 1:
-        raise NoEquilibrium(f'an uncoupled cell has {len(found)} equilibria: none is the stand')
-    return found[0]
+    states = equilibria(alone)
+    if len(states) != 1:
+        raise NoEquilibrium(f'an uncoupled cell has {len(states)} equilibria: none is the stand')
+    return states[0]
 
 
 def _check(network: Network) -> None:

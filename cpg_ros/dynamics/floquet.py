@@ -80,12 +80,12 @@ class Multipliers(ShortRepr):
 
     @property
     def error(self) -> float:
-        """How far the trivial multiplier is from 1: the others are no better than that."""
+        """Distance of the trivial multiplier from 1, an estimate of the error of the others."""
         return abs(self.trivial - 1.0)
 
     @property
     def attracts(self) -> bool:
-        """Whether all disturbances decay: neutral ones, such as of rings not coupled, do not."""
+        """Whether all disturbances decay; neutral ones, as of uncoupled rings, do not."""
         return self.leading < ATTRACTS
 
     @property

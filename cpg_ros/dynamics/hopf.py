@@ -67,7 +67,7 @@ class NormalForm:
 
     @property
     def degenerate(self) -> bool:
-        """Whether there is no term of third order to tell anything about orbits: Re k2 = 0."""
+        """Whether the cubic coefficient vanishes, Re k2 = 0, so that it does not decide."""
         return self.k2.real == 0.0
 
     @property
@@ -148,7 +148,7 @@ class HopfPoint(ShortRepr):
 
     @property
     def wave(self) -> str:
-        """How the wave runs, as in the block."""
+        """Direction of the wave, as in the block."""
         return self.block.wave
 
     @cached_property
@@ -182,13 +182,13 @@ class HopfPoint(ShortRepr):
         """In model time, mu = value' - value; z belongs to q."""
         expansion, delay = self._expansion, self.network.delay
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
-        one, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
-        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
+        unit, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
+        still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
         double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
-        ahead = expansion.heard(q, chi, axis)
+        ahead = expansion.inputs(q, chi, axis)
         back, second = ahead.conj(), expansion.second
-        flat = expansion.heard(_moved(still, second(ahead, back)), one)
-        fast = expansion.heard(_moved(double, second(ahead, ahead)), twice, 2.0 * axis)
+        flat = expansion.inputs(_moved(still, second(ahead, back)), unit)
+        fast = expansion.inputs(_moved(double, second(ahead, ahead)), twice, 2.0 * axis)
         k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
                          + second(back, fast)))
 
@@ -202,11 +202,11 @@ class HopfPoint(ShortRepr):
         """Return the derivative of the critical root by the value on a line of parameters."""
         expansion, delay = self._expansion, self.network.delay
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
-        one, late = np.ones_like(chi), np.exp(-axis * delay)
-        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
-        moves = expansion.heard(_moved(still, expansion.along(line)), one)
+        unit, late = np.ones_like(chi), np.exp(-axis * delay)
+        still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
+        moves = expansion.inputs(_moved(still, expansion.along(line)), unit)
         now, past = expansion.linear_along(line, chi)
-        change = (now + past * late) @ q + expansion.second(moves, expansion.heard(q, chi, axis))
+        change = (now + past * late) @ q + expansion.second(moves, expansion.inputs(q, chi, axis))
         if self.network.delay_parameter in line.names:
             sign = line.signs[line.names.index(self.network.delay_parameter)]
             change = change - sign * axis * late * (self.block.past @ q)
@@ -267,15 +267,15 @@ class HopfPoint(ShortRepr):
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
         """All blocks with their other roots on the axis and right of it."""
         close = ON_AXIS * max(1.0, self.omega)
-        return tuple((one, self.but_critical(one, one.right_of(-close)))
-                     for one in blocks(self.network, self.rest))
+        return tuple((block, self.but_critical(block, block.right_of(-close)))
+                     for block in blocks(self.network, self.rest))
 
     @property
     def leading_other(self) -> complex:
         """The rightmost root but for the critical pair, 1/model time."""
         return complex(rightmost_first(np.concatenate([
-            self.but_critical(one, one.roots(3))
-            for one in blocks(self.network, self.rest)]))[0])
+            self.but_critical(block, block.roots(3))
+            for block in blocks(self.network, self.rest)]))[0])
 
     def _right(self, within: bool) -> int:
         close = ON_AXIS * max(1.0, self.omega)
@@ -284,12 +284,12 @@ class HopfPoint(ShortRepr):
 
     @property
     def unstable_roots(self) -> int:
-        """How many of the other roots have a positive real part."""
+        """Number of the other roots with positive real part."""
         return self._right(within=True)
 
     @property
     def unstable_transverse_roots(self) -> int:
-        """How many of these lie outside the gait's class: none would have to be there."""
+        """Number of these outside the gait's class."""
         return self._right(within=False)
 
     @property
@@ -366,8 +366,8 @@ def first_hopf(network: Network, gait: str) -> HopfPoint | None:
     points = [crossing_at(block, line, rest, omega, tau)
               for omega, tau in delay_crossings(block.now, block.past)]
     # With one variable the fast wave is the one that is born, and the slow one ends.
-    born = points[:1] if len(rest) == 1 else [one for one in points if one.direction > 0]
-    return min(born, key=lambda one: one.value, default=None)
+    born = points[:1] if len(rest) == 1 else [point for point in points if point.direction > 0]
+    return min(born, key=lambda point: point.value, default=None)
 
 
 def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: float, tau: float,
@@ -450,13 +450,13 @@ def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega:
 
 
 def _by_delay(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
-    rest, found = equilibrium(network), []
+    rest, points = equilibrium(network), []
     for block in blocks(network, rest):
         for omega, tau in delay_crossings(block.now, block.past):
             turn = 2.0 * np.pi / omega
-            found += [crossing_at(block, line, rest, omega, tau, n) for n in range(
+            points += [crossing_at(block, line, rest, omega, tau, n) for n in range(
                 max(0, int(np.ceil((low - tau) / turn))), int(np.floor((high - tau) / turn)) + 1)]
-    return sorted(found, key=lambda point: point.value)
+    return sorted(points, key=lambda point: point.value)
 
 
 def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
@@ -479,10 +479,10 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                        lambda value: bool(split(value)))
     if not any(split(value) for value in grid):
         equilibrium(line.at(network, low))
-    found: list[HopfPoint] = []
+    points: list[HopfPoint] = []
     for which in range(len(classes(network))):
         count = tracked_roots([split(value)[which] for value in grid if split(value)])
-        known: list[tuple[float, float]] = []
+        pairs: list[tuple[float, float]] = []
         for rank in range(count):
             def real_part(value: float, at: tuple[int, int, int] = (which, count, rank)) -> float:
                 return float(roots(value, *at[:2])[at[2]].real)
@@ -492,19 +492,19 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                 for root in roots(value, which, count):
                     omega = float(root.imag)
                     if (abs(root.real) <= ON_AXIS < omega
-                            and not any(np.allclose((value, omega), one) for one in known)):
-                        known.append((value, omega))
-                        found.append(hopf_at(line.at(network, value), line,
-                                             split(value)[which].mode, omega))
+                            and not any(np.allclose((value, omega), pair) for pair in pairs)):
+                        pairs.append((value, omega))
+                        points.append(hopf_at(line.at(network, value), line,
+                                              split(value)[which].mode, omega))
     # Points that symmetry puts in one place differ by rounding.
-    return sorted(found, key=lambda point: (round(point.value, 9), point.omega, point.mode))
+    return sorted(points, key=lambda point: (round(point.value, 9), point.omega, point.mode))
 
 
 def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
     """Return how many roots of a class can cross along some blocks: without a delay, all."""
-    if not any(one.past.any() for one in along):
+    if not any(block.past.any() for block in along):
         return along[0].network.variables
-    return spare + max(len(one.right_of(0.0)) for one in along)
+    return spare + max(len(block.right_of(0.0)) for block in along)
 
 
 def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:

@@ -61,15 +61,15 @@ def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
 
 def _halves(part: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
     """Part a subspace, orthonormal columns, into those that an involution keeps and turns."""
-    found = []
+    columns = []
     for sign in (1.0, -1.0):
         vectors, sizes, _ = np.linalg.svd(0.5 * (part + sign * image @ part), full_matrices=False)
         if (sizes > 0.5).any():
-            found.append(vectors[:, sizes > 0.5])
-    return found
+            columns.append(vectors[:, sizes > 0.5])
+    return columns
 
 
-# A cell's rates about a state in which all cells are alike, expanded in what the cell hears.
+# A cell's rates about a state in which all cells are alike, expanded in its inputs.
 
 class Expansion:
     """Derivatives of the first cell's rates, exact; they are those of every cell.
@@ -84,7 +84,7 @@ class Expansion:
         """Take the parameters and the state of every cell."""
         self.network, self.state = network, state
         self._equations = equations_of(type(network))
-        self._x = [state[one.variable] for one in self._equations.arguments]
+        self._x = [state[argument.variable] for argument in self._equations.arguments]
         self._p = [value.flat[0] for value in values_of(network)]
 
     @cached_property
@@ -113,13 +113,13 @@ class Expansion:
         variables = self.network.variables
         both = np.zeros((2, variables, variables), dtype=complex)
         for (v, k), slope in slopes.items():
-            one = self._equations.arguments[k]
-            both[int(one.delayed), v, one.variable] += slope * (
-                1.0 if one.source is None else chi[one.source[0]])
+            argument = self._equations.arguments[k]
+            both[int(argument.delayed), v, argument.variable] += slope * (
+                1.0 if argument.source is None else chi[argument.source[0]])
         return both[0], both[1]
 
-    def heard(self, h: np.ndarray, chi: np.ndarray, exponent: complex = 0.0) -> np.ndarray:
-        """Return what is heard of ``h chi exp(exponent t)`` at t = 0, shape (arguments,).
+    def inputs(self, h: np.ndarray, chi: np.ndarray, exponent: complex = 0.0) -> np.ndarray:
+        """Return the inputs from ``h chi exp(exponent t)`` at t = 0, shape (arguments,).
 
         Args:
             h: of a cell, shape (variables,).
@@ -128,8 +128,10 @@ class Expansion:
 
         """
         past = np.exp(-exponent * self.network.delay)
-        return np.array([h[one.variable] * (1.0 if one.source is None else chi[one.source[0]])
-                         * (past if one.delayed else 1.0) for one in self._equations.arguments])
+        return np.array([h[argument.variable]
+                         * (1.0 if argument.source is None else chi[argument.source[0]])
+                         * (past if argument.delayed else 1.0)
+                         for argument in self._equations.arguments])
 
     def second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Second derivative of the rates, B(a, b), at two sets of arguments, (variables,)."""
@@ -147,7 +149,7 @@ class Expansion:
         return out
 
     def _moving(self, line: ParameterLine) -> dict[int, float]:
-        """How fast the rows of parameters move along a line, those that do."""
+        """Return the rates at which rows of parameters change along a line, without zeros."""
         signs = dict(zip(line.names, line.signs, strict=True))
         by_cell = self._equations.by_cell
         names = [by_cell[row][0] if row in by_cell else row for row in self._equations.rows]
@@ -192,9 +194,9 @@ class Block(ShortRepr):
         """The network's gait that oscillates in this class, whichever way its wave runs."""
         mine = dict(self.symmetry.shifts)
         senses = [mine, {name: -shift % 1 for name, shift in mine.items()}]
-        found = {gait: dict(self.network.symmetry(gait).shifts) for gait in self.network.gaits()}
+        gaits = {gait: dict(self.network.symmetry(gait).shifts) for gait in self.network.gaits()}
         # Some networks have a name for each sense.
-        return next((gait for sense in senses for gait, shifts in found.items()
+        return next((gait for sense in senses for gait, shifts in gaits.items()
                      if shifts == sense), '')
 
     @property
@@ -214,7 +216,7 @@ class Block(ShortRepr):
 
     @property
     def wave(self) -> str:
-        """Which leg leads the first one, or follows it, if by neither 0 nor 1/2; else ''.
+        """Leg that leads or follows the first one by neither 0 nor 1/2, or ''.
 
         Tells the two senses of a wave apart, by the first cells of the legs of the network's
         first assignment.
@@ -246,7 +248,7 @@ class Block(ShortRepr):
         return roots_right_of(bound, self.now, self.past, self.network.delay, self.real)
 
     def within(self, other: 'Block') -> bool:
-        """Whether the class lies in the other's gait's class: what stays as it is under K.
+        """Whether the class lies in the fixed-point space of the K of the other's gait.
 
         With x -> -x what a shift of 1/2 turns round has to be turned round, too.
         """
@@ -317,9 +319,9 @@ def block_at(network: Network, state: np.ndarray, mode: tuple[int, ...]) -> Bloc
 
 def classes(network: Network) -> tuple[Symmetry, ...]:
     """Return the symmetries of the classes, as blocks has them; it raises the same."""
-    known = network.symmetry(network.gaits()[0])
-    found = characters(known.group, network.variables, known.odd)
-    broken = network.broken(found[0])
+    symmetry = network.symmetry(network.gaits()[0])
+    split = characters(symmetry.group, network.variables, symmetry.odd)
+    broken = network.broken(split[0])
     if broken:
         raise InputError(f'{broken} differ: the network does not have the symmetry of its gaits')
-    return found
+    return split

@@ -35,19 +35,19 @@ WIDTH = 0.1
 LARGEST = 3.0
 
 
-def deflation_factor(period: float, step: float, known: Sequence[float]) -> float:
+def deflation_factor(period: float, step: float, periods: Sequence[float]) -> float:
     """Return what Newton's step is multiplied by; 1 where no orbit is known.
 
     Args:
         period: the current one, in any unit of time.
         step: Newton's own step of it, in the same unit.
-        known: periods of the orbits to be kept off, the same.
+        periods: periods of the orbits to be kept off, the same.
 
     """
     slope = 0.0
-    for one in known:
-        x = period / one - 1.0 or 1e-12
-        slope -= 2.0 * WIDTH**2 / (x * (x * x + WIDTH**2)) / one
+    for other in periods:
+        x = period / other - 1.0 or 1e-12
+        slope -= 2.0 * WIDTH**2 / (x * (x * x + WIDTH**2)) / other
     factor = 1.0 / (1.0 - slope * step or 1e-12)
     return max(-LARGEST, min(LARGEST, factor))
 
@@ -108,7 +108,7 @@ class Orbit(ShortRepr, ABC):
     @property
     @abstractmethod
     def samples(self) -> int:
-        """How many evenly spaced points of a cycle resolve a waveform."""
+        """Number of evenly spaced points that resolve a waveform."""
 
     @property
     def gait(self) -> str:
@@ -137,21 +137,21 @@ class Orbit(ShortRepr, ABC):
     @cached_property
     def levels(self) -> np.ndarray:
         """Middle and half the range of each waveform, shape (waves, variables, 2)."""
-        found = np.empty((int(self.waves.max()) + 1, self.network.variables, 2))
+        ranges = np.empty((int(self.waves.max()) + 1, self.network.variables, 2))
         theta = np.arange(POINTS) / POINTS
-        for wave, variable in np.ndindex(found.shape[:2]):
+        for wave, variable in np.ndindex(ranges.shape[:2]):
             values = self.waveform(theta, 0, wave, variable)
             ends = []
-            for place in (theta[values.argmin()], theta[values.argmax()]):
+            for extremum in (theta[values.argmin()], theta[values.argmax()]):
                 for _ in range(3):
-                    slope, bend = (float(self.waveform(np.array([place]), order, wave,
+                    slope, bend = (float(self.waveform(np.array([extremum]), order, wave,
                                                        variable)[0]) for order in (1, 2))
                     if bend:
-                        place -= float(np.clip(slope / bend, -1.0 / POINTS, 1.0 / POINTS))
-                ends.append(float(self.waveform(np.array([place]), 0, wave, variable)[0]))
+                        extremum -= float(np.clip(slope / bend, -1.0 / POINTS, 1.0 / POINTS))
+                ends.append(float(self.waveform(np.array([extremum]), 0, wave, variable)[0]))
             low, high = min(ends[0], values.min()), max(ends[1], values.max())
-            found[wave, variable] = 0.5 * (high + low), 0.5 * (high - low)
-        return found
+            ranges[wave, variable] = 0.5 * (high + low), 0.5 * (high - low)
+        return ranges
 
     @property
     def peak(self) -> float:
@@ -242,12 +242,12 @@ def _beyond(symmetry: Symmetry, points: int) -> tuple[list[str], np.ndarray, np.
         shape (n, cells).
 
     """
-    own, found = dict(symmetry.shifts), []
+    own, extra = dict(symmetry.shifts), []
     for name, element in symmetry.group.elements.items():
         order = symmetry.group.order(name)
-        known = round(order * own[name]) if name in own else None
-        found += [(f'{name} shifts it by {k}/{order} of a cycle', points * k // order, element)
-                  for k in range(order) if k != known]
-    return ([name for name, _, _ in found], np.array([late for _, late, _ in found], dtype=int),
-            np.array([element for *_, element in found],
-                     dtype=int).reshape(len(found), symmetry.group.cells))
+        shift = round(order * own[name]) if name in own else None
+        extra += [(f'{name} shifts it by {k}/{order} of a cycle', points * k // order, element)
+                  for k in range(order) if k != shift]
+    return ([name for name, _, _ in extra], np.array([late for _, late, _ in extra], dtype=int),
+            np.array([element for *_, element in extra],
+                     dtype=int).reshape(len(extra), symmetry.group.cells))

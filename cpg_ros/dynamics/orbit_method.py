@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one place that chooses between the two ways to solve for orbits.
+"""Selection of the method that solves for orbits.
 
 Fourier collocation takes any delay, Gauss collocation on a mesh any steepness. Each is a folder
 with the same functions; what they solve for are orbits and curves that know what to do.

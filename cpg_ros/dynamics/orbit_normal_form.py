@@ -22,11 +22,11 @@ states are ``x = u(s) + z v(s) + conj(z v(s)) + ...`` with, at the critical para
     s' = 1 + a z^2,  z' = c z^3  with x = u(s) + z v(s) + ... where mu is real: twice the period
     (mu = -1), or a branch that breaks a symmetry (mu = 1).
 
-Where Re c < 0 what leaves the orbit attracts and grows slowly from it: the change of gait is
-soft. Where Re c > 0 nothing near is left that attracts, and the gait jumps. With a delay tau the
-state is a history, of which s and z of a delay ago are known to the same order, s - tau s' and
-z - tau z': as rates B x(t - tau) hear them, ``E y = y + tau B y(t - tau)`` takes y's place in what
-s' and z' multiply (cf. Lentjes, Spek, Bosschaert & Kuznetsov, Periodic normal forms for
+Where Re c < 0 the motion that branches off attracts and grows slowly: the change of gait is soft.
+Where Re c > 0 no motion nearby attracts, and the gait jumps. With a delay tau the state is a
+history, of which s and z of a delay ago are known to the same order, s - tau s' and z - tau z': as
+rates B x(t - tau) depend on them, ``E y = y + tau B y(t - tau)`` takes y's place in what s' and z'
+multiply (cf. Lentjes, Spek, Bosschaert & Kuznetsov, Periodic normal forms for
 bifurcations of limit cycles in DDEs, 2023).
 """
 
@@ -70,14 +70,14 @@ class _Bordered:
     def answer(self, right: np.ndarray) -> np.ndarray:
         """Return the answer that is normal to the rows, shape (n,) as the right-hand side."""
         n, k = self._shape
-        found: np.ndarray = self._solve(np.append(right, np.zeros(k)).astype(complex), trans=0)
-        return found[:n]
+        solution: np.ndarray = self._solve(np.append(right, np.zeros(k)).astype(complex), trans=0)
+        return solution[:n]
 
     def null(self, adjoint: bool) -> np.ndarray:
         """Return the matrix's right or left null vectors, of length 1, shape (k, n)."""
         n, k = self._shape
-        found = self._solve(np.eye(n + k, k, -n, dtype=complex), trans=2 * adjoint)[:n].T
-        return found / np.linalg.norm(found, axis=1)[:, None]
+        vectors = self._solve(np.eye(n + k, k, -n, dtype=complex), trans=2 * adjoint)[:n].T
+        return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
 
 class Linearised:
@@ -126,8 +126,8 @@ class Linearised:
         if turn not in self._systems:
             none = np.zeros((0, self.equation.along().size))
             self._systems[turn] = _Bordered(self.equation.matrix(turn), none, none), none
-        found = self._systems[turn][0].answer(self.equation.right(rates, turn))
-        return self.equation.values(found, rates, turn)
+        solution = self._systems[turn][0].answer(self.equation.right(rates, turn))
+        return self.equation.values(solution, rates, turn)
 
     def second(self, a: States, b: States) -> np.ndarray:
         """Return the rates' second derivative B(a, b) along the orbit."""
@@ -173,12 +173,12 @@ class OrbitNormalForm(ShortRepr):
 
     @property
     def soft(self) -> bool | None:
-        """Whether what leaves the orbit attracts; None if the normal form cannot tell."""
+        """Whether the motion that branches off attracts; None if the form does not decide."""
         return None if self.why else self.cubic.real < 0.0
 
     @property
     def verdict(self) -> str:
-        """In words."""
+        """The verdict in words."""
         return f'cannot tell: {self.why}' if self.why else (
             'supercritical' if self.soft else 'subcritical')
 
@@ -200,25 +200,25 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
     if why := _undecided(orbit, multiplier, pair):
         return OrbitNormalForm(complex('nan'), why)
     try:
-        found = [_cubic(Linearised(orbit, halvings), multiplier, part, pair)
+        forms = [_cubic(Linearised(orbit, halvings), multiplier, part, pair)
                  for halvings in (0, 1)]
     except (NoOrbit, np.linalg.LinAlgError, RuntimeError) as error:
         return OrbitNormalForm(complex('nan'), str(error))
-    if abs(found[1].real - found[0].real) > SAME * abs(found[1].real):
-        return OrbitNormalForm(found[1], f'c is {found[0]:.3g} or {found[1]:.3g}, by the mesh')
-    return OrbitNormalForm(found[1])
+    if abs(forms[1].real - forms[0].real) > SAME * abs(forms[1].real):
+        return OrbitNormalForm(forms[1], f'c is {forms[0]:.3g} or {forms[1]:.3g}, by the mesh')
+    return OrbitNormalForm(forms[1])
 
 
 def loses_stability(orbit: Orbit) -> bool:
-    """Whether nothing else grows where a multiplier of an orbit crosses the unit circle."""
-    known = multipliers(orbit)
-    return bool((np.abs([*known.within, *known.transverse]) < GROWS).all())
+    """Whether all other multipliers are inside the unit circle where one of them crosses it."""
+    spectrum = multipliers(orbit)
+    return bool((np.abs([*spectrum.within, *spectrum.transverse]) < GROWS).all())
 
 
 def _undecided(orbit: Orbit, multiplier: complex, pair: bool) -> str:
     """Say what makes a normal form with one disturbance the wrong one, '' if nothing does."""
-    known = multipliers(orbit)
-    there = np.concatenate([known.within, known.transverse])
+    spectrum = multipliers(orbit)
+    there = np.concatenate([spectrum.within, spectrum.transverse])
     if (np.abs(np.abs(there) - 1.0) < CRITICAL).sum() > 1 + pair:
         return 'other multipliers are on the unit circle, too'
     for power in (1, 2, 3, 4):
@@ -242,8 +242,8 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
     along, guesses = equation.slope, [equation.along()]
     if alike:
         guesses.append(guess)
-    found = linear.find(1.0, np.array(guesses))
-    right = found[1] if alike else linear.find(turn, guess[None])[0]
+    critical = linear.find(1.0, np.array(guesses))
+    right = critical[1] if alike else linear.find(turn, guess[None])[0]
     v = equation.values(right, np.zeros_like(along[0]), turn)
     size = np.abs(v[0]).max()
     v = v[0] / size, None if v[1] is None else v[1] / size

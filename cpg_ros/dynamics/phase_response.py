@@ -91,8 +91,8 @@ class PhaseResponse(ShortRepr):
         if not by_past.size:
             return np.zeros(shape)
         flat = self(later).swapaxes(-1, -2).reshape(*times.shape, network.components)
-        heard = np.einsum('...i,...ij->...j', flat, by_past)
-        return heard.reshape(*times.shape, network.variables, network.cells).swapaxes(-1, -2)
+        inputs = np.einsum('...i,...ij->...j', flat, by_past)
+        return inputs.reshape(*times.shape, network.variables, network.cells).swapaxes(-1, -2)
 
     def shift(self, time: float, motion: Callable[[np.ndarray], np.ndarray]) -> float:
         """Return by how many cycles a motion added to state and history advances the phase.

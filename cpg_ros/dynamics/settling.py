@@ -78,15 +78,15 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
     rng = np.random.default_rng(seed)
     sizes, offsets = np.array([1.0, rng.uniform(0.4, 1.0)]), np.array([0.0, rng.uniform()])
     disturbance = DISTURBANCE * rng.standard_normal(networks[0].components)
-    found = []
+    states = []
     for network in networks:
         symmetry = network.symmetry(gait)
         turn = 2.0 * np.pi * (symmetry.phases + offsets[symmetry.waves])
         size = sizes[symmetry.waves]
-        found.append(np.concatenate([
+        states.append(np.concatenate([
             middle + half * size * np.cos(turn - 2.0 * np.pi * late)
             for middle, half, late in network.typical_cycle]))
-    return np.array(found) + disturbance
+    return np.array(states) + disturbance
 
 
 def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajectory:

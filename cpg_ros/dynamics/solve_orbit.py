@@ -79,7 +79,7 @@ def _line(network: Network) -> tuple[ParameterLine, float, float]:
 
 
 def _repeats(network: Network) -> bool:
-    """Whether the delay is nothing but that, so that orbits return after whole periods of it."""
+    """Whether the parameter is a delay alone, so that orbits recur at whole periods of it."""
     return (bool(network.delay_parameter)
             and network.delay_parameter not in equations_of(type(network)).rows)
 
@@ -110,18 +110,18 @@ def _crossings(network: Network, branch: Branch, value: float, turns: int) -> It
         if a * b > 0.0 or a == b:
             continue
         fraction = a / (a - b)
-        one, other = left.orbit, right.orbit
+        lower, other = left.orbit, right.orbit
 
-        def path(theta: np.ndarray, fraction: float = fraction, one: Orbit = one,
+        def path(theta: np.ndarray, fraction: float = fraction, lower: Orbit = lower,
                  other: Orbit = other
                  ) -> np.ndarray:
-            return ((1.0 - fraction) * one(theta * one.period)
+            return ((1.0 - fraction) * lower(theta * lower.period)
                     + fraction * other(theta * other.period))
 
-        period = (1.0 - fraction) * one.period + fraction * other.period
-        found = orbit_method(network).solve.from_path(network, one.symmetry, path, period)
-        if found is not None:
-            yield found
+        period = (1.0 - fraction) * lower.period + fraction * other.period
+        orbit = orbit_method(network).solve.from_path(network, lower.symmetry, path, period)
+        if orbit is not None:
+            yield orbit
 
 
 # Gaits as exact periodic orbits, for every network.
@@ -145,8 +145,8 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
     """
     preset = network.presets().get(gait)
     try:
-        found: Orbit = orbit_method(network).solve.solve(network, gait, near)
-        return found
+        orbit: Orbit = orbit_method(network).solve.solve(network, gait, near)
+        return orbit
     except NoOrbit as error:
         if near is not None or (preset is not None and preset.start is not None):
             raise
@@ -164,16 +164,16 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
         NoOrbit: the method leads elsewhere; a shorter way may do.
 
     """
-    found: Orbit = orbit_method(network).solve.beside(network, near)
-    return found
+    orbit: Orbit = orbit_method(network).solve.beside(network, near)
+    return orbit
 
 
 @lru_cache(maxsize=64)
 def solve_preset(preset: Preset) -> Orbit:
     """Solve for a preset's orbit; errors as in solve_orbit."""
     try:
-        found: Orbit = orbit_method(preset.network).solve.from_preset(preset)
-        return found
+        orbit: Orbit = orbit_method(preset.network).solve.from_preset(preset)
+        return orbit
     except NoOrbit as error:
         if preset.start is not None:
             raise
@@ -192,7 +192,7 @@ def _from_hopf_point(network: Network, gait: str, error: NoOrbit) -> Orbit:
 
 def solve_from_path(network: Network, symmetry: Symmetry,
                     path: Callable[[np.ndarray], np.ndarray], period: float,
-                    known: Sequence[float] = ()) -> Orbit | None:
+                    periods: Sequence[float] = ()) -> Orbit | None:
     """Solve for an orbit from a guess; None where Newton's method leads to none.
 
     Args:
@@ -201,9 +201,9 @@ def solve_from_path(network: Network, symmetry: Symmetry,
         path: states, shape (m, components), as a function of times in cycles, shape (m,), that
             begin where cell 1 peaks.
         period: in model time.
-        known: periods, model time, of orbits that Newton's method is to be kept off.
+        periods: periods, model time, of orbits that Newton's method is to be kept off.
 
     """
-    found: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period,
-                                                                known)
-    return found
+    orbit: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period,
+                                                                periods)
+    return orbit

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a parameter set does, gait by gait: whether there is one, how large, how fast, how stable.
+"""The gaits of a parameter set: existence, amplitude, period and stability.
 
 And what stands nearest where there is none: the threshold at which rest gives way.
 """
@@ -47,7 +47,7 @@ RATE = 0.5
 
 @dataclass(frozen=True)
 class Stability:
-    """What is known of an orbit's stability.
+    """Stability of an orbit.
 
     Attributes:
         enough: symmetry gain (1/model time) that makes transverse disturbances decay.
@@ -158,7 +158,7 @@ class GaitAssessment(ShortRepr):
                 'stable': self.stable, 'min_symmetry_gain': self.smallest_gain,
                 'default_symmetry_gain': self.default_gain,
                 'stable_with_default_gain': self.stable_with_default_gain,
-                'searched': self.searched, 'others': [one.as_dict() for one in self.others]}
+                'searched': self.searched, 'others': [orbit.as_dict() for orbit in self.others]}
 
 
 def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
@@ -178,26 +178,26 @@ def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
         InputError: a parameter that is not finite, or a delay that is not positive.
 
     """
-    found = {}
+    assessments = {}
     for count, gait in enumerate(network.gaits()):
         done(count)
-        known = near if near is not None and near.gait == gait else None
+        guess = near if near is not None and near.gait == gait else None
         try:
-            one = coexisting_orbits(network, gait, known, starts=everything,
-                                    everything=everything)
-            found[gait] = _assessed(one)
-            if not (found[gait].stable or one.starts):
-                found[gait] = _assessed(coexisting_orbits(network, gait, one.orbits[0],
-                                                          everything=False))
+            orbits = coexisting_orbits(network, gait, guess, starts=everything,
+                                       everything=everything)
+            assessments[gait] = _assessed(orbits)
+            if not (assessments[gait].stable or orbits.starts):
+                assessments[gait] = _assessed(coexisting_orbits(network, gait, orbits.orbits[0],
+                                                                everything=False))
         except (NoEquilibrium, NoOrbit) as error:
-            found[gait] = GaitAssessment(gait, None, str(error))
-    done(len(found))
-    return found
+            assessments[gait] = GaitAssessment(gait, None, str(error))
+    done(len(assessments))
+    return assessments
 
 
-def _assessed(found: CoexistingOrbits) -> GaitAssessment:
-    first, *others = (GaitAssessment(found.gait, orbit) for orbit in found.orbits)
-    return replace(first, others=tuple(others), searched=found.searched)
+def _assessed(orbits: CoexistingOrbits) -> GaitAssessment:
+    first, *others = (GaitAssessment(orbits.gait, orbit) for orbit in orbits.orbits)
+    return replace(first, others=tuple(others), searched=orbits.searched)
 
 
 def nearest_threshold(network: Network) -> str:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every network states of itself: parameters, cells, equations, legs, gaits.
+"""The definition of a network: parameters, cells, equations, legs and gaits.
 
 States are vectors of ``components`` numbers, variable by variable: first that of every cell
 which the legs read (x or v), then the second one (w or u). All networks have the form
@@ -112,10 +112,10 @@ def positive(x: Number) -> Term:
 
 # A cell of a network and its parameters, as the network's equations see them.
 
-#: Which cell each cell hears, from 0.
+#: The cell from which each cell receives input, from 0.
 Source = tuple[int, ...]
-#: The same, or a rule: cell -> the cell that it hears, counted round.
-Heard = Source | Callable[[int], int]
+#: The same, or a rule: cell -> the cell that it receives input from, modulo the cells.
+Inputs = Source | Callable[[int], int]
 
 
 @dataclass(frozen=True)
@@ -123,9 +123,9 @@ class Argument:
     """A state variable as it stands in the equations of a cell.
 
     Attributes:
-        variable: of the cell that is heard, from 0.
-        source: the cell that each cell hears; None for itself.
-        delayed: whether it is heard a delay ago.
+        variable: of the cell that is the input, from 0.
+        source: the cell that each cell receives input from; None for itself.
+        delayed: whether its value a delay ago counts.
 
     """
 
@@ -138,28 +138,28 @@ class Cell:
     """Any cell of a network, as its equations see it."""
 
     def __init__(self, variables: int, cells: int) -> None:
-        """Begin to note what is heard."""
+        """Record the inputs that the equations read."""
         self._variables, self._cells = variables, cells
         self.arguments: list[Argument] = []
 
-    def now(self, source: Heard | None = None) -> tuple[Term, ...]:
-        """Return the variables of the cell itself, or of those that each cell hears."""
-        return self._heard(source, False)
+    def now(self, source: Inputs | None = None) -> tuple[Term, ...]:
+        """Return the variables of the cell itself, or of its inputs."""
+        return self._input(source, False)
 
-    def past(self, source: Heard | None = None) -> tuple[Term, ...]:
+    def past(self, source: Inputs | None = None) -> tuple[Term, ...]:
         """Return the same as they were a delay ago."""
-        return self._heard(source, True)
+        return self._input(source, True)
 
-    def _heard(self, source: Heard | None, delayed: bool) -> tuple[Term, ...]:
+    def _input(self, source: Inputs | None, delayed: bool) -> tuple[Term, ...]:
         if callable(source):
             source = tuple(source(i) % self._cells for i in range(self._cells))
-        found = []
+        states = []
         for variable in range(self._variables):
-            one = Argument(variable, None if source is None else tuple(source), delayed)
-            if one not in self.arguments:
-                self.arguments.append(one)
-            found.append(Term(f'x{self.arguments.index(one)}'))
-        return tuple(found)
+            argument = Argument(variable, None if source is None else tuple(source), delayed)
+            if argument not in self.arguments:
+                self.arguments.append(argument)
+            states.append(Term(f'x{self.arguments.index(argument)}'))
+        return tuple(states)
 
 
 class Parameters:
@@ -221,7 +221,7 @@ class NetworkDefinition(ABC):
         own_of_cells: name in the equations -> the parameter that each cell has for it, where
             they are not to be set together as a group is.
         kinks: variables at whose zeros the rates have a kink.
-        couplings: parameters without which no cell hears another.
+        couplings: parameters without which the cells are uncoupled.
         offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
             are a gait and no symmetry tells them.
         unnamed: the gait whose phases have no name, of such a network.
@@ -277,9 +277,9 @@ class NetworkDefinition(ABC):
     def fitted(cls, legs: int) -> dict[str, Any]:
         """Return what the network states for another number of legs: attribute -> value.
 
-        One that takes any even number gives its cells, legs, sides and girdles by a rule, and
-        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
-        legs have of their own are named by ``fields``.
+        A network for any even number gives its cells, legs, sides and girdles by a rule, and
+        all that depends on them; ``equations`` then state inputs by rules, too. ``fields`` names
+        the parameters that each leg has.
 
         Raises:
             ValueError: it takes no such number.
@@ -306,8 +306,8 @@ class NetworkDefinition(ABC):
         """
         members = cls.groups.get(name, (name,))
         if not set(members) <= set(cls.parameters()):
-            known = ', '.join((*cls.groups, *cls.parameters()))
-            raise InputError(f"'{name}' is not one of {known}")
+            names = ', '.join((*cls.groups, *cls.parameters()))
+            raise InputError(f"'{name}' is not one of {names}")
         return members
 
     @property
@@ -317,7 +317,7 @@ class NetworkDefinition(ABC):
 
     @property
     def delay(self) -> float:
-        """How far back the rates look, model time; 0 for an ordinary differential equation."""
+        """Delay of the rates, model time; 0 for an ordinary differential equation."""
         return float(getattr(self, self.delay_parameter)) if self.delay_parameter else 0.0
 
     @staticmethod
@@ -326,9 +326,9 @@ class NetworkDefinition(ABC):
         """Return the rate of each variable of a cell, written once for all cells.
 
         Args:
-            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
-                cells that each cell hears, ``cell.past(source)`` the same a delay ago. The source
-                is a cell for each cell, or a function that gives it, counted round.
+            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of
+                its input, ``cell.past(source)`` the same a delay ago. The source is a cell for
+                each cell, or a function that gives it, modulo the number of cells.
             p: the parameters, and groups of them that have one for each cell, by name.
 
         """

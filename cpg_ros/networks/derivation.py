@@ -24,7 +24,7 @@ from sympy.printing.numpy import NumPyPrinter
 
 
 class EquationTexts(Protocol):
-    """What is derived from: see Equations, whose functions are written here."""
+    """The texts of the equations; the functions of Equations are generated from them."""
 
     texts: tuple[str, ...]
     arguments: tuple[Argument, ...]
@@ -72,15 +72,15 @@ def _function(name: str, symbols: Sequence[Any], parts: Sequence[Sequence[Any]])
 
 
 def _nonzero(table: Iterable[tuple[tuple[int, ...], Any]]) -> tuple[list[Any], list[Any]]:
-    kept = [(place, one) for place, one in table if one != 0]
-    return [place for place, _ in kept], [one for _, one in kept]
+    kept = [(index, entry) for index, entry in table if entry != 0]
+    return [index for index, _ in kept], [entry for _, entry in kept]
 
 
 def _source(*parts: str) -> str:
     text = '\n\n\n'.join(parts)
-    known = sorted({word for word in ('abs', 'cos', 'cosh', 'exp', 'sign', 'sin', 'sinh', 'sqrt',
-                                      'tan', 'tanh') if f'{word}(' in text})
-    head = f'from numpy import {", ".join(known)}\n\n\n' if known else ''
+    functions = [word for word in ('abs', 'cos', 'cosh', 'exp', 'sign', 'sin', 'sinh', 'sqrt',
+                                   'tan', 'tanh') if f'{word}(' in text]
+    head = f'from numpy import {", ".join(functions)}\n\n\n' if functions else ''
     return f'{head}{text}\n'
 
 

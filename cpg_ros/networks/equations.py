@@ -14,7 +14,7 @@
 
 """A network's equations, read once: what they are made of, and functions on arrays from them.
 
-Every cell obeys the same equations, in which it hears other cells, now or a delay ago. They are
+Every cell obeys the same equations, in which other cells are inputs, now or a delay ago. They are
 written once for a cell (``Network.equations``); here they are read as texts, and sympy derives the
 rates and their derivatives, exactly, as numpy code that is kept on disk.
 """
@@ -78,25 +78,25 @@ def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
         write: makes the text.
 
     """
-    known = f'cpg_ros_generated_{key}_{name}'
-    if known in sys.modules:
-        return sys.modules[known]
-    place = folder(key)
-    path = None if place is None else place / f'{name}.py'
+    module_name = f'cpg_ros_generated_{key}_{name}'
+    if module_name in sys.modules:
+        return sys.modules[module_name]
+    cache = folder(key)
+    path = None if cache is None else cache / f'{name}.py'
     if path is None or not path.exists():
         text = write()
         if path is not None:
             with writing():
                 write_atomically(path, text)
         if path is None or not path.exists():
-            module = sys.modules[known] = ModuleType(known)
-            exec(compile(text, known, 'exec'), vars(module))
+            module = sys.modules[module_name] = ModuleType(module_name)
+            exec(compile(text, module_name, 'exec'), vars(module))
             return module
-    spec = importlib.util.spec_from_file_location(known, path)
+    spec = importlib.util.spec_from_file_location(module_name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     # Under its name, or numba's disk cache does not find the module of what it has compiled.
-    sys.modules[known] = module
+    sys.modules[module_name] = module
     spec.loader.exec_module(module)
     return module
 
@@ -123,9 +123,9 @@ class Equations:
 
         """
         cell = Cell(network.variables, network.cells)
-        found = network.equations(cell, Parameters((*network.parameters(), *network.by_cell())))
+        rates = network.equations(cell, Parameters((*network.parameters(), *network.by_cell())))
         self.texts = tuple(term.text if isinstance(term, Term) else repr(float(term))
-                           for term in found)
+                           for term in rates)
         if len(self.texts) != network.variables:
             raise TypeError(f'{network.__name__}.equations returns {len(self.texts)} rates for '
                             f'{network.variables} variables')
@@ -198,7 +198,7 @@ def multilinear(derivatives: Mapping[Any, Any], sets: Sequence[Any]) -> dict[int
     for (v, *places), value in derivatives.items():
         for order in set(permutations(places)):
             out[v] = out.get(v, 0.0) + value * prod(
-                one[k] for one, k in zip(sets, order, strict=True))
+                vectors[k] for vectors, k in zip(sets, order, strict=True))
     return out
 
 
@@ -257,9 +257,9 @@ class Field(Generic[AnyDefinition]):
         self._equations = equations_of(type(network))
         own = np.arange(cells)
         #: For each argument, where the kept cells find it.
-        self._heard = [self.place[one.variable * cells + np.asarray(
-            own if one.source is None else one.source)[first]]
-            for one in self._equations.arguments]
+        self._inputs = [self.place[argument.variable * cells + np.asarray(
+            own if argument.source is None else argument.source)[first]]
+            for argument in self._equations.arguments]
         self._p = [value[first] if value.ndim else value for value in values_of(network)]
         columns = list(network.parameters())
         #: For each row of parameters, the columns of the kept cells.
@@ -269,8 +269,8 @@ class Field(Generic[AnyDefinition]):
                          for row in self._equations.rows]
 
     def _arguments(self, now: np.ndarray, past: np.ndarray | None) -> list[np.ndarray]:
-        return [(past if one.delayed and past is not None else now)[..., heard]
-                for one, heard in zip(self._equations.arguments, self._heard, strict=True)]
+        return [(past if argument.delayed and past is not None else now)[..., indices]
+                for argument, indices in zip(self._equations.arguments, self._inputs, strict=True)]
 
     def _filled(self, rates: list, shape: tuple[int, ...]) -> np.ndarray:
         out = np.empty(shape)
@@ -295,14 +295,14 @@ class Field(Generic[AnyDefinition]):
         Without a delay the last one is empty: its last two axes have the length 0.
         """
         rates, slopes = self._equations.slopes(self._arguments(now, past), self._p)
-        delays = any(one.delayed for one in self._equations.arguments)
+        delays = any(argument.delayed for argument in self._equations.arguments)
         d = now.shape[-1]
         by_now = np.zeros((*now.shape, d))
         by_past = np.zeros((*now.shape, d) if delays else (*now.shape[:-1], 0, 0))
         i = np.arange(self.size)
         for (v, k), slope in slopes.items():
             into = by_past if self._equations.arguments[k].delayed else by_now
-            into[..., i + v * self.size, self._heard[k]] += slope
+            into[..., i + v * self.size, self._inputs[k]] += slope
         return self._filled(rates, now.shape), by_now, by_past
 
     def multilinear(self, at: States, *sets: States) -> np.ndarray:
@@ -327,7 +327,7 @@ class Field(Generic[AnyDefinition]):
         """
         out = np.zeros((*now.shape, len(self.network.parameters())))
         i = np.arange(self.size)
-        found = self._equations.by_parameter(self._arguments(now, past), self._p)
-        for (v, r), slope in found.items():
+        slopes = self._equations.by_parameter(self._arguments(now, past), self._p)
+        for (v, r), slope in slopes.items():
             out[..., i + v * self.size, self._columns[r]] += slope
         return out

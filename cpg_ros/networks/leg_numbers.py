@@ -66,8 +66,8 @@ def leg_names(legs: int) -> tuple[str, ...]:
         InputError: as of pairs.
 
     """
-    found = pairs(legs)
-    return BIPED if legs == 2 else tuple(side + pair for pair in found for side in 'lr')
+    girdles = pairs(legs)
+    return BIPED if legs == 2 else tuple(side + pair for pair in girdles for side in 'lr')
 
 
 def places(legs: int) -> dict[str, Any]:
@@ -79,8 +79,8 @@ def places(legs: int) -> dict[str, Any]:
     """
     if legs == 2:
         return {'sides': {leg: leg for leg in BIPED}, 'girdles': {}, 'usual_robot': ROBOTS[2]}
-    known = pairs(legs)
-    words = dict.fromkeys(known, 'middle') | {known[0]: 'hind', known[-1]: 'fore'}
+    girdles = pairs(legs)
+    words = dict.fromkeys(girdles, 'middle') | {girdles[0]: 'hind', girdles[-1]: 'fore'}
     names = leg_names(legs)
     return {'sides': {leg: {'l': 'left', 'r': 'right'}[leg[0]] for leg in names},
             'girdles': {leg: words[leg[1:]] for leg in names},
@@ -135,8 +135,8 @@ def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
 
 def split_name(name: str) -> tuple[str, int] | None:
     """Split a name such as 'delayed6' into that of the family and the number of legs."""
-    found = _NUMBERED.fullmatch(name)
-    return (found['family'], int(found['legs'])) if found and len(found['legs']) < 4 else None
+    match = _NUMBERED.fullmatch(name)
+    return (match['family'], int(match['legs'])) if match and len(match['legs']) < 4 else None
 
 
 def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]

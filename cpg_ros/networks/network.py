@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every network is: its rates, presets and the symmetries of its gaits; what is usual for it.
+"""The base class of networks: rates, presets, symmetries of gaits, and their defaults.
 
 What it states of its parameters, cells and equations is in network_definition.
 """
@@ -82,10 +82,10 @@ class Network(NetworkDefinition):
             InputError: a name that is neither a parameter nor a group of the network.
 
         """
-        found: dict[str, float] = {}
+        changes: dict[str, float] = {}
         for name, value in values.items():
-            found |= dict.fromkeys(self.members(name), value)
-        return dataclasses.replace(self, **found)  # type: ignore[type-var]
+            changes |= dict.fromkeys(self.members(name), value)
+        return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
     @property
     def coefficients(self) -> np.ndarray:
@@ -117,17 +117,17 @@ class Network(NetworkDefinition):
         """Phase of each cell against cell 1 in cycles, where parameters state it; or else ()."""
         if not self.offsets:
             return ()
-        found = [0.0] * self.cells
+        by_cell = [0.0] * self.cells
         for leg, cells in next(iter(self.legs.values())).items():
             for cell in cells:
-                found[cell - 1] = float(getattr(self, self.offsets[leg]))
-        return tuple((lead - found[0]) % 1.0 for lead in found)
+                by_cell[cell - 1] = float(getattr(self, self.offsets[leg]))
+        return tuple((lead - by_cell[0]) % 1.0 for lead in by_cell)
 
     def with_phases(self: AnyNetwork, phases: Mapping[str, float]) -> AnyNetwork:
         """Return the network with the phases of these legs, cycles; itself if it states none."""
-        wanted = {self.offsets[leg]: float((phase + 0.5) % 1.0 - 0.5)
-                  for leg, phase in phases.items() if leg in self.offsets}
-        return self.replace(**wanted) if wanted else self
+        offsets = {self.offsets[leg]: float((phase + 0.5) % 1.0 - 0.5)
+                   for leg, phase in phases.items() if leg in self.offsets}
+        return self.replace(**offsets) if offsets else self
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
         """Return a state near the gait's orbit and its period, where they are known beforehand.
@@ -264,7 +264,7 @@ class ParameterLine:
                         for name, sign in zip(self.names, self.signs, strict=True))
 
     def value(self, network: Network) -> float:
-        """Where a network is on the line: the value of its first parameter."""
+        """Return the network's value on the line, that of its first parameter."""
         return network.as_dict()[self.names[0]]
 
     def direction(self, network: Network) -> np.ndarray:

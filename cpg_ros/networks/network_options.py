@@ -107,9 +107,9 @@ def chosen_preset(args: Namespace) -> tuple[Preset, Network]:
                               for member in kind.groups.get(key, (key,))])
     for key, value in args.set:
         if key not in (*kind.parameters(), *kind.groups):
-            known = ', '.join((*kind.groups, *kind.parameters()))
+            names = ', '.join((*kind.groups, *kind.parameters()))
             raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "
-                             f'{known}')
+                             f'{names}')
         if not np.isfinite(value):
             raise InputError(f'--set: {key} is {value:g}, it must be finite')
         if abs(value) > LARGEST:

@@ -70,7 +70,7 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
         raise reader.fail('network', f"is '{tree['network']}', not '{network.name}'")
     if not isinstance(tree['presets'], dict) or not tree['presets']:
         raise reader.fail('presets', 'must be a mapping with at least one name')
-    found = {}
+    presets = {}
     for name, entry in tree['presets'].items():
         where = f'presets.{name}'
         entry = reader.keys(entry, where, {'gait', 'parameters'}, {'start', 'period'})
@@ -83,7 +83,7 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
         if ('start' in entry) != ('period' in entry):
             raise reader.fail(where, "'start' and 'period' go together")
         if 'start' not in entry:
-            found[name] = Preset(gait, parameters)
+            presets[name] = Preset(gait, parameters)
             continue
         if parameters.delay:
             raise reader.fail(f'{where}.start', f'is not for the network {network.name}, which '
@@ -93,9 +93,9 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
             raise reader.fail(f'{where}.start', f'has {len(start)} numbers, not '
                               f'{parameters.components}: the first variable of each cell, then '
                               'the second')
-        found[name] = Preset(gait, parameters, start, reader.number(
+        presets[name] = Preset(gait, parameters, start, reader.number(
             entry['period'], f'{where}.period', positive))
-    return found
+    return presets
 
 
 @cache

@@ -58,10 +58,10 @@ def flaw(network: type[Network]) -> str:
     return next(chain(_names(network), _legs(network), _gaits(network)), '')
 
 
-def _unknown(where: str, names: Any, known: Any) -> Iterator[str]:
+def _unknown(where: str, names: Any, listed: Any) -> Iterator[str]:
     for name in names:
-        if name not in known:
-            yield f"{where}: '{name}' is not one of {', '.join(map(str, known))}"
+        if name not in listed:
+            yield f"{where}: '{name}' is not one of {', '.join(map(str, listed))}"
 
 
 def _names(network: type[Network]) -> Iterator[str]:
@@ -83,7 +83,7 @@ def _names(network: type[Network]) -> Iterator[str]:
     yield from _unknown('offsets', network.offsets.values(), parameters)
     yield from _unknown('readout', [network.readout], ('waveform', 'phase'))
     if network.readout == 'phase' and network.variables < 2:
-        yield 'readout: the phase is told by cells with two variables'
+        yield "readout 'phase' needs cells with two variables"
     for name, members in network.own_of_cells.items():
         yield from _unknown(f'own_of_cells: {name}', members, parameters)
         if len(members) != network.cells:
@@ -197,9 +197,9 @@ class _Networks(Mapping[str, type[Network]]):
         own = {**SHIPPED, **{network.name: network for network in self.files}}
         if name in own:
             return own[name]
-        known = split_name(name)
-        if name not in self._offered and known is not None and known[0] in self:
-            return _numbered(*known)
+        parts = split_name(name)
+        if name not in self._offered and parts is not None and parts[0] in self:
+            return _numbered(*parts)
         return _of_entry_point(self._offered[name])
 
 
@@ -260,11 +260,11 @@ def reference(name: str) -> str:
 
 def numbered(legs: int) -> tuple[type[Network], ...]:
     """Return the shipped networks for a number of legs."""
-    found = []
+    networks = []
     for network in SHIPPED.values():
         with suppress(InputError):
-            found.append(with_legs(network, legs))
-    return tuple(found)
+            networks.append(with_legs(network, legs))
+    return tuple(networks)
 
 
 def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]:
@@ -322,14 +322,14 @@ def _of_file(path: Path) -> type[Network]:
     loader = spec.loader
     try:
         _usable(str(path), lambda: loader.exec_module(module))
-        found = [value for value in vars(module).values()
-                 if isinstance(value, type) and issubclass(value, Network)
-                 and value.__module__ == name and not isabstract(value)]
-        if len(found) != 1:
-            listed = ', '.join(network.__name__ for network in found)
+        classes = [value for value in vars(module).values()
+                   if isinstance(value, type) and issubclass(value, Network)
+                   and value.__module__ == name and not isabstract(value)]
+        if len(classes) != 1:
+            listed = ', '.join(network.__name__ for network in classes)
             raise NetworkError(f'{path}: it must define one class of networks, not '
-                               + (f'{len(found)}: {listed}' if found else 'none'))
-        network = _checked(str(path), found[0])
+                               + (f'{len(classes)}: {listed}' if classes else 'none'))
+        network = _checked(str(path), classes[0])
         if network.name in NETWORKS:
             raise NetworkError(f"{path}: the name '{network.name}' is that of another network")
     except NetworkError:

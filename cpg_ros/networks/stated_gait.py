@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one gait that a network's parameters make where they state the phase of every leg.
+"""The gait of a network whose parameters are the phases of its legs.
 
 Such a network (amplitude-controlled phase oscillators) has no symmetry that tells its gaits apart:
 its offsets are the gait. They make the named gait whose leg phases are nearest.
@@ -84,13 +84,13 @@ def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]
         raise ValueError('table is empty')
     distances = {}
     for name, reference in table.items():
-        wanted = np.asarray(reference, dtype=float)
-        if phases.ndim != 1 or not phases.size or wanted.shape != phases.shape:
+        target = np.asarray(reference, dtype=float)
+        if phases.ndim != 1 or not phases.size or target.shape != phases.shape:
             raise ValueError(f'phases have the shape {phases.shape}, those of {name!r} '
-                             f'{wanted.shape}; both must be (legs,)')
-        if not np.isfinite(phases + wanted).all():
-            raise InputError(f'a phase is not finite: {phases}, {name!r} {wanted}')
-        ahead = np.sort((phases - wanted) % 1.0)
+                             f'{target.shape}; both must be (legs,)')
+        if not np.isfinite(phases + target).all():
+            raise InputError(f'a phase is not finite: {phases}, {name!r} {target}')
+        ahead = np.sort((phases - target) % 1.0)
         # The circular mean of least squares cuts the circle between two of the legs.
         cuts = ahead + np.tri(ahead.size, k=-1)
         distances[name] = float(cuts.std(axis=1).min())

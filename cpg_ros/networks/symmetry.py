@@ -64,14 +64,14 @@ class Group:
                 power = _compose(generator, power)
             powers.append(listed)
             names.append(['', name, *(f'{name}^{k}' for k in range(2, len(listed)))])
-        found: dict[str, Permutation] = {}
+        named: dict[str, Permutation] = {}
         for choice in product(*(range(len(listed)) for listed in powers)):
             element = tuple(range(self.cells))
             for listed, k in zip(powers, choice, strict=True):
                 element = _compose(listed[k], element)
             name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
-            found[name or '1'] = element
-        return found
+            named[name or '1'] = element
+        return named
 
     @cached_property
     def exponent(self) -> int:
@@ -110,21 +110,21 @@ class Group:
 
         """
         names = {element: name for name, element in self.elements.items()}
-        found = {tuple(range(self.cells)): Fraction(0)}
-        waiting = list(found)
+        phases = {tuple(range(self.cells)): Fraction(0)}
+        waiting = list(phases)
         while waiting:
             element = waiting.pop()
             for name, shift in shifts.items():
                 image = _compose(self.elements[name], element)
-                theta = (found[element] + shift) % 1
-                if image not in found:
-                    found[image] = theta
+                theta = (phases[element] + shift) % 1
+                if image not in phases:
+                    phases[image] = theta
                     waiting.append(image)
-                elif found[image] != theta:
+                elif phases[image] != theta:
                     raise InputError(f'{names[image]} would have the shifts {theta} and '
-                                     f'{found[image]}')
-        return {name: found[element] for name, element in self.elements.items()
-                if element in found}
+                                     f'{phases[image]}')
+        return {name: phases[element] for name, element in self.elements.items()
+                if element in phases}
 
 
 #: omega: i -> i + 2 round both rings; kappa swaps 1-2, 3-4, 5-6, 7-8 (two rings of four cells).
@@ -174,8 +174,8 @@ class Symmetry(ShortRepr):
         for name in shifts:
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
-        found = _generated(group, tuple(shifts.items()), variables, odd)
-        return found.led(leads)
+        symmetry = _generated(group, tuple(shifts.items()), variables, odd)
+        return symmetry.led(leads)
 
     def led(self, leads: tuple[float, ...]) -> 'Symmetry':
         """Return the same symmetry with other stated phases of the cells."""
@@ -244,7 +244,7 @@ class Symmetry(ShortRepr):
 
     @cached_property
     def self_conjugate(self) -> bool:
-        """Whether all shifts are 0 or 1/2: of the two senses of a wave there is but one."""
+        """Whether all shifts are 0 or 1/2, so that both directions of a wave coincide."""
         return all(2 * shift % 1 == 0 for _, shift in self.shifts)
 
     @cached_property
@@ -263,11 +263,11 @@ class Symmetry(ShortRepr):
     @cached_property
     def classes(self) -> np.ndarray:
         """Number of each cell's class under K, from 0, shape (cells,): such cells are equal."""
-        found = np.full(self.group.cells, -1)
+        numbers = np.full(self.group.cells, -1)
         for cell in range(self.group.cells):
-            if found[cell] < 0:
-                found[[self.group.elements[name][cell] for name in self.k]] = found.max() + 1
-        return found
+            if numbers[cell] < 0:
+                numbers[[self.group.elements[name][cell] for name in self.k]] = numbers.max() + 1
+        return numbers
 
     @cached_property
     def basis(self) -> np.ndarray:
@@ -348,17 +348,17 @@ def label(group: Group, subgroup: Subgroup) -> str:
 @cache
 def subgroups(group: Group) -> tuple[Subgroup, ...]:
     """Return all subgroups of an abelian group, from the trivial one to the whole."""
-    found = {_closure(group, ())}
-    waiting = list(found)
+    groups = {_closure(group, ())}
+    waiting = list(groups)
     while waiting:
         subgroup = waiting.pop()
         for name in group.elements:
             larger = _closure(group, (*subgroup, name))
-            if larger not in found:
-                found.add(larger)
+            if larger not in groups:
+                groups.add(larger)
                 waiting.append(larger)
-    place = {name: n for n, name in enumerate(group.elements)}
-    return tuple(sorted(found, key=lambda names: (len(names), [place[name] for name in names])))
+    index = {name: n for n, name in enumerate(group.elements)}
+    return tuple(sorted(groups, key=lambda names: (len(names), [index[name] for name in names])))
 
 
 @cache
@@ -371,14 +371,14 @@ def admissible_pairs(group: Group) -> tuple[Pair, ...]:
 
     """
     group.check_regular()
-    found = []
+    pairs = []
     for h, k in product(reversed(subgroups(group)), repeat=2):
         order = len(h) // len(k)
         # The quotient is cyclic if one element runs through all of it.
         if set(k) <= set(h) and any(group.order(name, k) == order for name in h):
-            found.append(Pair(h, k, order, group.cells // len(h), group.cells // len(k),
+            pairs.append(Pair(h, k, order, group.cells // len(h), group.cells // len(k),
                               (label(group, h), label(group, k))))
-    return tuple(found)
+    return tuple(pairs)
 
 
 @cache
@@ -388,8 +388,8 @@ def symmetries(group: Group) -> tuple[Symmetry, ...]:
     A pair of order m has phi(m) of them (Euler's function): the element with shift 1/m may have
     any multiple of it prime to m. With m = 4 these are a wave and the same run backwards.
     """
-    return tuple(one for h in reversed(subgroups(group))
-                 for one in homomorphisms(group, generators(group, h)))
+    return tuple(homomorphism for h in reversed(subgroups(group))
+                 for homomorphism in homomorphisms(group, generators(group, h)))
 
 
 def homomorphisms(group: Group, names: Iterable[str], variables: int = 2, odd: bool = False

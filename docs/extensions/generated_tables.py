@@ -43,6 +43,7 @@ import robot_keys
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 from sphinx.util.docutils import SphinxDirective
+import yaml
 
 
 def cell(text: object) -> str:
@@ -248,6 +249,18 @@ def reexported(room: str, module: str) -> list[str]:
             != place.__name__ and not hasattr(place, '__path__')]
 
 
+def errata(_: str) -> str:
+    """Return the errata of the papers, each with how it was verified."""
+    def plain(text: str) -> str:
+        return re.sub(r'([_*<^])', r'\\\1', text)
+
+    path = Path(cpg_ros.__file__).parent / 'analysis' / 'papers' / 'errata.yaml'
+    return '\n'.join(
+        f"{number}. **{erratum['paper']}.** {plain(erratum['text'])} *Verified:* "
+        f"{erratum['verified']}"
+        for number, erratum in yaml.safe_load(path.read_text('utf-8')).items())
+
+
 def rst(blocks: Iterable[str]) -> str:
     """Return reStructuredText within Markdown."""
     return '```{eval-rst}\n' + '\n'.join(blocks) + '```\n'
@@ -281,7 +294,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {'parameters': made_by(parameters), 'presets': made_by(presets),
                             'options': made_by(options), 'launch': made_by(arguments),
                             'door': made_by(door), 'room': made_by(room),
-                            'topics': Topics, 'robotfile': RobotFile}.items():
+                            'errata': made_by(errata), 'topics': Topics,
+                            'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
     app.connect('autodoc-process-docstring', escaped, priority=400)
     app.connect('autodoc-process-docstring', restored, priority=600)

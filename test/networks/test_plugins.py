@@ -129,7 +129,7 @@ def test_presets_stand_beside_the_file(tmp_path):
     ('sides = {}', "free = ('k',)", "free: 'k' is not one of a, b, c, d, tau"),
     ('sides = {}', "line = 'k'", "InputError: 'k' is not one of a, b, c, d, tau"),
     ('sides = {}', "sides = {}\n    usual_gait = 'canter'", "usual_gait: 'canter' is not one of "),
-    ('sides = {}', "readout = 'phase'", 'readout: the phase is told by cells with two variables'),
+    ('sides = {}', "readout = 'phase'", "readout 'phase' needs cells with two variables"),
     ('sides = {}', "searched = {'a': (0, 1)}", "searched: the parameter 'b' has no bounds"),
     ('one.gait,', "'canter',", "presets: walk: 'canter' is not one of pronk, pace"),
     ('cls(**', 'Delayed(**', 'presets: walk: it is of another network, Delayed'),

@@ -67,10 +67,10 @@ exit codes: 0 drawn, 2 invalid arguments, 130 stopped (finished parts are kept).
 
 
 def _points(text: str) -> tuple[int, int]:
-    one, sign, other = text.partition('x')
-    if not (one.isdecimal() and (other.isdecimal() or not sign)):
+    rows, sign, columns = text.partition('x')
+    if not (rows.isdecimal() and (columns.isdecimal() or not sign)):
         raise argparse.ArgumentTypeError(f"'{text}' is not of the form 200x200")
-    return int(one), int(other or one)
+    return int(rows), int(columns or rows)
 
 
 def _parser() -> Parser:

@@ -69,10 +69,10 @@ class CodimensionTwo(ShortRepr):
     @classmethod
     def of(cls, stored: dict[str, Any]) -> 'CodimensionTwo':
         """Make one from what as_dict returned."""
-        one, other = stored['values']
+        first, second = stored['values']
         omegas = [math.nan if stored[name] is None else stored[name]
                   for name in ('omega', 'other_omega')]
-        return cls(stored['type'], stored['gait'], (one, other), stored['test'], omegas[0],
+        return cls(stored['type'], stored['gait'], (first, second), stored['test'], omegas[0],
                    tuple(stored['other']), omegas[1])
 
 
@@ -126,10 +126,10 @@ class ParameterPlane:
         """Lengths of both axes, shape (2,)."""
         return np.array([self.first.high, self.second.high]) - self.low
 
-    def at(self, one: float, other: float) -> Network:
+    def at(self, first: float, second: float) -> Network:
         """Return the network with a value on each axis."""
         whole = find_network(self.network)(**self.base)
-        return self.second.line.at(self.first.line.at(whole, one), other)
+        return self.second.line.at(self.first.line.at(whole, first), second)
 
     def at_fractions(self, fraction: np.ndarray) -> Network:
         """Return the network at a point given in fractions of the ranges, shape (2,)."""
@@ -137,8 +137,8 @@ class ParameterPlane:
 
     def values_at(self, fraction: np.ndarray) -> tuple[float, float]:
         """Return the values on both axes at a point in fractions of the ranges, shape (2,)."""
-        one, other = (self.low + fraction * self.size).tolist()
-        return one, other
+        first, second = (self.low + fraction * self.size).tolist()
+        return first, second
 
     def fraction(self, point: tuple[int, int]) -> np.ndarray:
         """Return a point of the grid, given by row and column, in fractions of the ranges."""
@@ -171,11 +171,11 @@ def chart_of(network: str, base: Network, over: list[tuple[str, tuple[float, flo
         if not (np.isfinite(low) and np.isfinite(high) and low < high):
             raise InputError(f'{text}: {low:g} is not below {high:g}')
         for name, sign in zip(line.names, line.signs, strict=True):
-            known = type(base).ranges[name]
+            bounds = type(base).ranges[name]
             for value in (sign * low, sign * high):
-                if not known.low <= value <= known.high:
-                    raise InputError(f'{name}: {value:g} is not within {known.low:g} to '
-                                     f'{known.high:g}')
+                if not bounds.low <= value <= bounds.high:
+                    raise InputError(f'{name}: {value:g} is not within {bounds.low:g} to '
+                                     f'{bounds.high:g}')
         if not 2 <= count <= 2001:
             raise InputError(f'{text}: {count} points are not between 2 and 2001')
         axes.append(Axis(line, low, high, count))

@@ -62,7 +62,7 @@ ALONG, EXACT = 1e-7, 1e-13
 SMALLEST = 0.02
 
 
-def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, way: float
+def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float, way: float
                 ) -> CodimensionTwo | None:
     """Locate the cusp in which a fold curve ends; None if it ends otherwise.
 
@@ -70,7 +70,7 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, 
         chart: the plane.
         gait: whose.
         fold: the curve's last fold, along the second axis.
-        one: value on the first axis there.
+        first: value on the first axis there.
         way: 1 or -1, the direction in which the curve was followed.
 
     """
@@ -86,26 +86,26 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float, 
         def place(value: float) -> CurvePoint:
             curve: Any = base.curve
             moved = replace(curve, network=chart.at(value, base.value))
-            found = resolve_point(moved, base.z, base.tangent)
-            if found is None:
+            point = resolve_point(moved, base.z, base.tangent)
+            if point is None:
                 raise NoOrbit('the branch is lost')
-            return found
+            return point
 
         def dip(value: float) -> float:
             return _extremum(rate_along(place(value)), reach, sign)[1]
 
         for fraction in BEYOND:
-            far = one + way * fraction * chart.size[0]
+            far = first + way * fraction * chart.size[0]
             if not chart.first.low <= far <= chart.first.high:
                 return None
-            if dip(far) > 0.0 > dip(one):
-                cusp = brentq(dip, *sorted((one, far)), xtol=EXACT * chart.size[0], rtol=1e-15)
+            if dip(far) > 0.0 > dip(first):
+                cusp = brentq(dip, *sorted((first, far)), xtol=EXACT * chart.size[0], rtol=1e-15)
                 there = place(cusp)
                 middle, left = _extremum(rate_along(there), reach, sign)
-                found = predict_and_correct(there, middle)
+                point = predict_and_correct(there, middle)
                 if abs(left) > 1e-6 or abs(middle) > 0.9 * reach:
                     return None
-                return CodimensionTwo('cusp', gait, (float(cusp), found.value), abs(left))
+                return CodimensionTwo('cusp', gait, (float(cusp), point.value), abs(left))
     except (NoOrbit, np.linalg.LinAlgError, ValueError):
         return None
     return None
@@ -128,9 +128,9 @@ def _pair(fold: CurvePoint) -> tuple[float, float]:
 
 def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tuple[float, float]:
     """Return where the rate, with a sign, is least, and what it is there."""
-    found = minimize_scalar(lambda step: sign * rate(step), method='bounded',
-                            bounds=(-reach, reach), options={'xatol': ALONG})
-    return float(found.x), float(found.fun)
+    extremum = minimize_scalar(lambda step: sign * rate(step), method='bounded',
+                               bounds=(-reach, reach), options={'xatol': ALONG})
+    return float(extremum.x), float(extremum.fun)
 
 
 # Curves in two parameters on which the period of a gait's orbits grows without bound.
@@ -146,29 +146,29 @@ ROUNDING = 1e-11
 
 
 def infinite_periods(chart: ParameterPlane, gait: str, branch: Branch,
-                     one: float) -> list[Boundary]:
+                     first: float) -> list[Boundary]:
     """Follow the ends of a branch at which its period grows without bound.
 
     Args:
         chart: the plane.
         gait: whose.
         branch: along the second axis.
-        one: value on the first axis there.
+        first: value on the first axis there.
 
     Returns:
         Boundaries 'homoclinic' and 'SNIC' (a saddle node on the invariant circle).
 
     """
-    found = []
+    curves = []
     for end, points in ((branch.ends[0], branch.points[::-1]), (branch.ends[1], branch.points)):
         if end.why == 'period' and (law := _law(points)):
             start = points[-1].place
-            ways = [_continue_long_period(chart, start, one, way,
+            ways = [_continue_long_period(chart, start, first, way,
                                           SHARES[law]) for way in (-1.0, 1.0)]
-            here = _limit(chart, start, one, SHARES[law])
-            found.append(Boundary(law, (gait,), np.array([
-                *ways[0][::-1], *([] if here is None else [(one, here[0])]), *ways[1]])))
-    return [curve for curve in found if len(curve.points) > 1]
+            here = _limit(chart, start, first, SHARES[law])
+            curves.append(Boundary(law, (gait,), np.array([
+                *ways[0][::-1], *([] if here is None else [(first, here[0])]), *ways[1]])))
+    return [curve for curve in curves if len(curve.points) > 1]
 
 
 def _law(points: tuple[BranchPoint, ...]) -> str | None:
@@ -176,7 +176,7 @@ def _law(points: tuple[BranchPoint, ...]) -> str | None:
                          np.array([point.orbit.period for point in points]))
 
 
-def _continue_long_period(chart: ParameterPlane, place: CurvePoint, one: float, way: float,
+def _continue_long_period(chart: ParameterPlane, point: CurvePoint, first: float, way: float,
                           fractions: tuple[float, ...]
               ) -> list[tuple[float, float]]:
     """Follow orbits of one large period from a place on, in a direction of the first parameter."""
@@ -187,41 +187,41 @@ def _continue_long_period(chart: ParameterPlane, place: CurvePoint, one: float, 
                  if chart.first.low <= value <= chart.first.high else None)
         return limit and (value, limit)
 
-    found: list[tuple[float, float]] = []
-    for value, (limit, _) in continue_steps(advance, (one, (place.value, place)), STEP, SHORTEST,
+    limits: list[tuple[float, float]] = []
+    for value, (limit, _) in continue_steps(advance, (first, (point.value, point)), STEP, SHORTEST,
                                             STEP):
         if not chart.second.low <= limit <= chart.second.high:
             break
-        found.append((value, limit))
-    return found
+        limits.append((value, limit))
+    return limits
 
 
-def _limit(chart: ParameterPlane, place: CurvePoint, one: float, fractions: tuple[float, ...]
+def _limit(chart: ParameterPlane, start: CurvePoint, first: float, fractions: tuple[float, ...]
            ) -> tuple[float, CurvePoint] | None:
     """Return the second parameter's limit at a value of the first, and the orbit nearest to it.
 
     Args:
         chart: the plane.
-        place: an orbit of the large period, at a value of the first parameter nearby.
-        one: the first parameter.
+        start: an orbit of the large period, at a value of the first parameter nearby.
+        first: the first parameter.
         fractions: of that period, falling.
 
     """
-    length = float(place.z[-2])
+    length = float(start.z[-2])
     places: list[CurvePoint] = []
     for fraction in fractions:
-        last = places[-1] if places else place
+        last = places[-1] if places else start
         curve: Any = last.curve
         z = last.z.copy()
         z[-2] = fraction * length
         try:
-            found = resolve_point(replace(curve, network=chart.at(one, last.value)), z,
-                                  fixed_unknown(z.size, -2))
+            solved = resolve_point(replace(curve, network=chart.at(first, last.value)), z,
+                                   fixed_unknown(z.size, -2))
         except (NoOrbit, np.linalg.LinAlgError):
             return None
-        if found is None:
+        if solved is None:
             return None
-        places.append(found)
+        places.append(solved)
     return _extrapolated(np.array([point.value for point in places]), np.array(fractions),
                          ROUNDING * chart.size[1]), places[0]
 
@@ -249,13 +249,13 @@ TRIED, MOST, SAME = 8, 80, 0.02
 def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
     """Return neighbours on the coarse grid, along the second axis, one of which has no orbit."""
     columns = grid_indices(chart.second.count, COARSE)
-    found = []
+    edges = []
     for row in grid_indices(chart.first.count, COARSE):
-        for one, other in pairwise(columns):
-            for at, there in (((row, one), (row, other)), ((row, other), (row, one))):
+        for column, other in pairwise(columns):
+            for at, there in (((row, column), (row, other)), ((row, other), (row, column))):
                 if at in sheet.waves and sheet.label[there] == NONE:
-                    found.append(Edge(chart.fraction(at), chart.fraction(there), *sheet.waves[at]))
-    return found
+                    edges.append(Edge(chart.fraction(at), chart.fraction(there), *sheet.waves[at]))
+    return edges
 
 
 def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
@@ -264,43 +264,43 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
     Where the branch ends in orbits without a period these are followed, too.
     """
     chart, gait, edges = job
-    found: list[Boundary] = []
+    curves: list[Boundary] = []
     for edge in edges[::max(1, len(edges) // TRIED)]:
         try:
             branch = _branch(chart, gait, edge)
         except (CpgError, np.linalg.LinAlgError):
             continue
-        one = chart.first.low + edge.here[0] * chart.size[0]
+        first = chart.first.low + edge.here[0] * chart.size[0]
         for fold in branch.folds:
-            if not _known(chart, found, one, fold.value):
-                found.append(fold_curve(chart, gait, fold.place, one))
-        if any(end.why == 'period' and not _known(chart, found, one, end.value)
+            if not _known(chart, curves, first, fold.value):
+                curves.append(fold_curve(chart, gait, fold.place, first))
+        if any(end.why == 'period' and not _known(chart, curves, first, end.value)
                for end in branch.ends):
-            found += infinite_periods(chart, gait, branch, one)
-    return found
+            curves += infinite_periods(chart, gait, branch, first)
+    return curves
 
 
-def _known(chart: ParameterPlane, found: list[Boundary], one: float, other: float) -> bool:
-    point = (np.array([one, other]) - chart.low) / chart.size
-    return any(on_curve(curve, chart, point, SAME) for curve in found)
+def _known(chart: ParameterPlane, curves: list[Boundary], first: float, second: float) -> bool:
+    point = (np.array([first, second]) - chart.low) / chart.size
+    return any(on_curve(curve, chart, point, SAME) for curve in curves)
 
 
-def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, one: float) -> Boundary:
+def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float) -> Boundary:
     """Follow the folds on both sides of one, with the cusps in which they end.
 
     Args:
         chart: the plane.
         gait: whose.
         fold: a fold along the second axis.
-        one: value on the first axis there.
+        first: value on the first axis there.
 
     """
-    back, ahead = (continue_fold(chart, fold, one, way) for way in (-1.0, 1.0))
-    points = [(value, place.value) for value, place in
-              [*back[::-1], (one, fold), *ahead]]
-    ends = [(back or [(one, fold)])[-1], (ahead or [(one, fold)])[-1]]
-    cusps = [cusp_beyond(chart, gait, place, value, way)
-             for (value, place), way in zip(ends, (-1.0, 1.0), strict=True)]
+    back, ahead = (continue_fold(chart, fold, first, way) for way in (-1.0, 1.0))
+    points = [(value, member.value) for value, member in
+              [*back[::-1], (first, fold), *ahead]]
+    ends = [(back or [(first, fold)])[-1], (ahead or [(first, fold)])[-1]]
+    cusps = [cusp_beyond(chart, gait, member, value, way)
+             for (value, member), way in zip(ends, (-1.0, 1.0), strict=True)]
     # A cusp is the last point of its curve.
     return Boundary('fold', (gait,), np.array([
         *(cusp.values for cusp in cusps[:1] if cusp), *points,
@@ -314,21 +314,21 @@ def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
                           most=MOST)
 
 
-def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: float
+def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, way: float
              ) -> list[tuple[float, CurvePoint]]:
     """Follow folds from one on in a direction of the first parameter.
 
     Args:
         chart: the plane.
         fold: a fold along the second axis.
-        one: value on the first axis there.
+        first: value on the first axis there.
         way: 1 or -1, the direction.
 
     Returns:
         The value on the first axis and the fold, of each.
 
     """
-    path = [(one, fold)]
+    path = [(first, fold)]
 
     def advance(here: tuple[float, CurvePoint], step: float) -> tuple[float, CurvePoint] | None:
         (value, last), guess = here, here[1].z
@@ -345,7 +345,7 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: floa
             return None
         return new, ahead
 
-    for here in continue_steps(advance, (one, fold), STEP, SHORTEST, STEP):
+    for here in continue_steps(advance, (first, fold), STEP, SHORTEST, STEP):
         if not chart.second.low <= here[1].value <= chart.second.high:
             break
         path.append(here)
@@ -353,7 +353,7 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, one: float, way: floa
 
 
 def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step: float) -> bool:
-    """Whether a fold lies about where the two before it lead, a step in fractions later."""
+    """Whether a fold lies close to the line through the two before it, a step later."""
     if len(last) < 3:
         return True
     (a, one), (b, two), (c, three) = last
@@ -398,13 +398,13 @@ def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
     branch does not turn within the plane.
     """
     chart, curve = job
-    found = []
+    curves = []
     for point in curve.codimension_two:
         if point.kind == 'Bautin':
             born = _born(chart, point)
             if born is not None:
-                found.append(born)
-    return found
+                curves.append(born)
+    return curves
 
 
 def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary]:
@@ -414,9 +414,9 @@ def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary
         fractions = curve.fractions(chart)
         some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
         if curve.kind != 'fold' or not any(
-                one.kind == 'fold' and one.gaits == curve.gaits
-                and all(on_curve(one, chart, fraction, SAME_CURVE) for fraction in some)
-                for one in kept):
+                other.kind == 'fold' and other.gaits == curve.gaits
+                and all(on_curve(other, chart, fraction, SAME_CURVE) for fraction in some)
+                for other in kept):
             kept.append(curve)
     return kept
 
@@ -430,8 +430,8 @@ def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:
         born = _born(replace(chart, first=chart.second, second=chart.first), _turned(point))
         return born and Boundary('fold', born.gaits, born.points[:, ::-1],
                                  tuple(map(_turned, born.codimension_two)))
-    for fold, one in _folds(condition, fraction, tangent):
-        whole = fold_curve(chart, point.gait, fold, one)
+    for fold, first in _folds(condition, fraction, tangent):
+        whole = fold_curve(chart, point.gait, fold, first)
         points = whole.points
         gaps = [(np.abs(end - point.values) / chart.size).max()
                 for end in (points[0], points[-1])]

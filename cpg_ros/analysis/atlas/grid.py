@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a coarse grid to a fine one: points between neighbours that differ are computed.
+"""Refinement of a grid: points between neighbours that differ are computed.
 
 Between neighbours that agree for a gait in everything that is named (whether it exists and how
 stable it is) they are filled in, bilinearly. What is computed does not depend on the workers.
@@ -61,16 +61,16 @@ class GaitMap(ShortRepr):
 
     def take(self, points: Iterable[dict[str, Any]]) -> None:
         """Enter the points of a job, where they are better than those known."""
-        for one in points:
-            at = one['row'], one['column']
-            if self.computed[at] and one['label'] <= self.label[at]:
+        for point in points:
+            at = point['row'], point['column']
+            if self.computed[at] and point['label'] <= self.label[at]:
                 continue
-            self.label[at], self.computed[at] = one['label'], True
+            self.label[at], self.computed[at] = point['label'], True
             for name in NUMBERS:
-                if one.get(name) is not None:
-                    self.numbers[name][at] = one[name]
-            if 'wave' in one:
-                self.waves[at] = one['wave'], one['period']
+                if point.get(name) is not None:
+                    self.numbers[name][at] = point[name]
+            if 'wave' in point:
+                self.waves[at] = point['wave'], point['period']
 
     def fill(self, at: tuple[int, int], corners: list[tuple[int, int]]) -> None:
         """Fill in a point from those around it, which agree."""
@@ -81,11 +81,12 @@ class GaitMap(ShortRepr):
 
 def grid_indices(count: int, stride: int) -> list[int]:
     """Return the indices of a grid of this stride: the coarse one with the last index, halved."""
-    found, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
+    indices, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
     while halved > stride:
-        found = sorted({*found, *((one + other) // 2 for one, other in itertools.pairwise(found))})
+        indices = sorted({*indices, *((left + right) // 2
+                                     for left, right in itertools.pairwise(indices))})
         halved //= 2
-    return found
+    return indices
 
 
 def coarse_rows(chart: ParameterPlane, gaits: tuple[str, ...],
@@ -142,7 +143,7 @@ def refine_once(chart: ParameterPlane, gait: str, sheet: GaitMap, stride: int) -
     """Halve the grid of a stride: fill in points that are clear; return jobs for the others."""
     rows, columns = grid_indices(chart.first.count, stride), grid_indices(chart.second.count,
                                                                           stride)
-    wanted: set[tuple[int, int]] = set()
+    points: set[tuple[int, int]] = set()
     fillable: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for top, bottom in itertools.pairwise(rows):
         for left, right in itertools.pairwise(columns):
@@ -154,12 +155,12 @@ def refine_once(chart: ParameterPlane, gait: str, sheet: GaitMap, stride: int) -
                 if clear:
                     fillable.setdefault(at, between)
                 else:
-                    wanted.add(at)
+                    points.add(at)
     for at, between in fillable.items():
-        if at not in wanted:
+        if at not in points:
             sheet.fill(at, between)
     by_row: dict[int, list[int]] = {}
-    for row, column in sorted(wanted):
+    for row, column in sorted(points):
         by_row.setdefault(row, []).append(column)
     return [AtlasRow(chart, gait, row, tuple(some), tuple(_near(sheet, row, some, stride)))
             for row, some in by_row.items()]
@@ -179,14 +180,14 @@ def uncrossed_edges(chart: ParameterPlane, gait: str, sheet: GaitMap, curves: It
     own = [curve for curve in curves if gait in curve.gaits]
     rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
                                                                           COARSE)
-    pairs = [*((0, (one, column), (other, column)) for column in columns
-               for one, other in itertools.pairwise(rows)),
-             *((1, (row, one), (row, other)) for row in rows
-               for one, other in itertools.pairwise(columns))]
-    for axis, one, other in pairs:
-        here, there = chart.fraction(one), chart.fraction(other)
+    pairs = [*((0, (left, column), (right, column)) for column in columns
+               for left, right in itertools.pairwise(rows)),
+             *((1, (row, left), (row, right)) for row in rows
+               for left, right in itertools.pairwise(columns))]
+    for axis, left, right in pairs:
+        here, there = chart.fraction(left), chart.fraction(right)
         middle, reach = 0.5 * (here + there), float(np.abs(here - there).max())
-        if sheet.label[one] != sheet.label[other] and not any(
+        if sheet.label[left] != sheet.label[right] and not any(
                 on_curve(curve, chart, middle, reach) for curve in own):
             low, high = ((chart.low + fraction * chart.size).tolist() for fraction in (here,
                                                                                        there))

@@ -61,8 +61,8 @@ class HopfCondition:
         network = self.chart.at_fractions(fraction[:2])
         block = block_at(network, equilibrium(network), self.mode)
         matrix = characteristic_matrix(1j * fraction[2], block.now, block.past, network.delay)[0]
-        found = np.linalg.det(matrix)
-        return np.array([found.real, found.imag])
+        determinant = np.linalg.det(matrix)
+        return np.array([determinant.real, determinant.imag])
 
     def tangent(self, fraction: np.ndarray) -> np.ndarray:
         """Return the unit tangent of the curve, either way, shape (3,)."""
@@ -161,13 +161,13 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
         points = hopf_points(network, line, segment.low, segment.high)
     except CpgError:
         return []
-    found = []
+    starts = []
     for point in points:
         gait = gaits.get(frozenset(point.block.symmetry.shifts))
         if gait is not None:
             fraction = (np.array(segment.place(point.value)) - chart.low) / chart.size
-            found.append(HopfStart(gait, point.mode, np.append(fraction, point.omega)))
-    return found
+            starts.append(HopfStart(gait, point.mode, np.append(fraction, point.omega)))
+    return starts
 
 
 #: Steps in fractions of the ranges, and points of a curve at most.
@@ -308,8 +308,8 @@ class _End:
         network = chart.at_fractions(fraction[:2])
         self.rest = equilibrium(network)
         self.moves = not odd(network) and network.at_rest() is None
-        self.together = next(one for one in classes(network)
-                             if all(shift == 0 for _, shift in one.shifts))
+        self.together = next(character for character in classes(network)
+                             if all(shift == 0 for _, shift in character.shifts))
         self.free = len(self.rest) if self.moves else 0
 
     def _split(self, unknowns: np.ndarray) -> tuple[np.ndarray, Expansion]:
@@ -344,12 +344,12 @@ def _determinant(block: Block, root: complex) -> complex:
 def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Apply Newton's method; return the solution and its largest residual, or None."""
     try:
-        found = newton(equations, start, steps=END_NEWTON, tolerance=EXACT, difference=DIFFERENCE,
-                       longest=1.0)
-        left = math.inf if found is None else float(np.abs(equations(found)).max())
+        solution = newton(equations, start, steps=END_NEWTON, tolerance=EXACT,
+                          difference=DIFFERENCE, longest=1.0)
+        left = math.inf if solution is None else float(np.abs(equations(solution)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
         return None
-    return None if found is None or not left < LEFT else (found, left)
+    return None if solution is None or not left < LEFT else (solution, left)
 
 
 def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
@@ -372,17 +372,18 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
         start = np.concatenate([end.rest[:end.free], last])
         ahead = last[2] - before[2]
         if block.real and ahead < 0.0:
-            found = _solved(end.takens, start[:-1])
-            if found and _here(found[0][end.free:], last):
+            solution = _solved(end.takens, start[:-1])
+            if solution and _here(solution[0][end.free:], last):
                 yield CodimensionTwo('Bogdanov-Takens', gait,
-                                     chart.values_at(found[0][end.free:]), found[1], 0.0)
+                                     chart.values_at(solution[0][end.free:]), solution[1], 0.0)
                 continue
         if end.moves:
-            found = _solved(end.zero_hopf, start)
-            if found and _here(found[0][end.free:-1], last) and found[0][-1] > 0.5 * last[2]:
+            solution = _solved(end.zero_hopf, start)
+            if (solution and _here(solution[0][end.free:-1], last)
+                    and solution[0][-1] > 0.5 * last[2]):
                 folds = block_of(Expansion(network, end.rest), end.together).gait
-                yield CodimensionTwo('zero-Hopf', gait, chart.values_at(found[0][end.free:-1]),
-                                     found[1], float(found[0][-1]), (folds,), 0.0)
+                yield CodimensionTwo('zero-Hopf', gait, chart.values_at(solution[0][end.free:-1]),
+                                     solution[1], float(solution[0][-1]), (folds,), 0.0)
 
 
 def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
@@ -425,18 +426,18 @@ class _Curve:
                                          float(fraction[2]), rest), split
         return self._known[key]
 
-    def between(self, one: np.ndarray, other: np.ndarray, way: float) -> np.ndarray:
+    def between(self, left: np.ndarray, right: np.ndarray, way: float) -> np.ndarray:
         """Return the curve's point at a fraction of the way between two of its points.
 
         Raises:
             ArithmeticError: Newton's method has lost it.
 
         """
-        tangent = (other - one) / np.linalg.norm(other - one)
-        found = self.condition.corrected(one + way * (other - one), tangent)
-        if found is None:
+        tangent = (right - left) / np.linalg.norm(right - left)
+        point = self.condition.corrected(left + way * (right - left), tangent)
+        if point is None:
             raise ArithmeticError('the curve is lost')
-        return found
+        return point
 
     def zeros(self, test: Test, small: float) -> Iterator[np.ndarray]:
         """Yield the places at which a test function changes its sign through 0.
@@ -455,11 +456,11 @@ class _Curve:
             try:
                 way = brentq(lambda s, one=one, other=other: test(self.between(one, other, s)),
                              0.0, 1.0, xtol=BRACKET, rtol=1e-14)
-                place = self.between(one, other, way)
+                zero = self.between(one, other, way)
             except (ArithmeticError, ValueError, CpgError):
                 continue
-            if abs(test(place)) < VANISHED * min(abs(left), abs(right)):
-                yield place
+            if abs(test(zero)) < VANISHED * min(abs(left), abs(right)):
+                yield zero
 
 
 def with_degeneracies(job: tuple[ParameterPlane, Boundary]) -> Boundary:
@@ -482,16 +483,16 @@ def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[Codimensi
 
     """
     fractions = np.column_stack([curve.fractions(chart), curve.points[:, 2]])
-    found: list[CodimensionTwo] = []
+    points: list[CodimensionTwo] = []
     for k, gait in enumerate(curve.gaits):
         condition = condition_of(chart, gait, fractions[len(fractions) // 2])
         whole = _Curve(condition, fractions)
-        found += _bautin(whole, gait)
+        points += _bautin(whole, gait)
         if k == 0:
             # The classes of a curve have the same roots.
-            found += _other_roots(whole, gait)
-            found += curve_ends(chart, gait, condition.mode, fractions)
-    return tuple(sorted(found, key=lambda one: _along(chart, fractions, one.values)))
+            points += _other_roots(whole, gait)
+            points += curve_ends(chart, gait, condition.mode, fractions)
+    return tuple(sorted(points, key=lambda point: _along(chart, fractions, point.values)))
 
 
 def _along(chart: ParameterPlane, fractions: np.ndarray, values: tuple[float, float]) -> int:
@@ -512,14 +513,14 @@ def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
 
     small = ROUNDING * float(np.nanmax([0.0,
                                         *(abs(test(fraction)) for fraction in curve.fractions)]))
-    for place in curve.zeros(test, small):
-        yield CodimensionTwo('Bautin', gait, curve.chart.values_at(place[:2]), test(place),
-                             float(place[2]))
+    for zero in curve.zeros(test, small):
+        yield CodimensionTwo('Bautin', gait, curve.chart.values_at(zero[:2]), test(zero),
+                             float(zero[2]))
 
 
 def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     """Return where other roots of any class cross: pairs, or a real one."""
-    found: list[CodimensionTwo] = []
+    crossings: list[CodimensionTwo] = []
     small = ON_AXIS * max(1.0, float(curve.fractions[:, 2].max()))
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
@@ -533,30 +534,30 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
             def test(fraction: np.ndarray, rank: int = rank, others: Callable = others) -> float:
                 return float(others(fraction)[rank].real)
 
-            for place in curve.zeros(test, small):
-                block, root = curve.at(place)[1][which], complex(others(place)[rank])
+            for zero in curve.zeros(test, small):
+                block, root = curve.at(zero)[1][which], complex(others(zero)[rank])
                 # Of a pair in two conjugate classes that with positive imaginary part counts.
-                if root.imag > -REAL * place[2] or block.real:
-                    _enter(found, _crossing(curve, gait, place, block, root), curve.chart)
-    return found
+                if root.imag > -REAL * zero[2] or block.real:
+                    _enter(crossings, _crossing(curve, gait, zero, block, root), curve.chart)
+    return crossings
 
 
-def _crossing(curve: _Curve, gait: str, place: np.ndarray, block: Block, root: complex
+def _crossing(curve: _Curve, gait: str, zero: np.ndarray, block: Block, root: complex
               ) -> CodimensionTwo:
     kind, omega = 'Hopf-Hopf', abs(root.imag)
-    if omega < REAL * place[2]:
+    if omega < REAL * zero[2]:
         kind, omega = 'zero-Hopf', 0.0
-    return CodimensionTwo(kind, gait, curve.chart.values_at(place[:2]), root.real,
-                          float(place[2]), (block.gait,), omega)
+    return CodimensionTwo(kind, gait, curve.chart.values_at(zero[:2]), root.real,
+                          float(zero[2]), (block.gait,), omega)
 
 
-def _enter(found: list[CodimensionTwo], new: CodimensionTwo, chart: ParameterPlane) -> None:
+def _enter(points: list[CodimensionTwo], new: CodimensionTwo, chart: ParameterPlane) -> None:
     """Enter a point, unless it is known: then only what it adds to that one's classes."""
-    for k, one in enumerate(found):
-        gap = np.abs(np.subtract(one.values, new.values) / chart.size).max()
-        if (one.kind == new.kind and gap < SAME_POINT
-                and np.isclose(one.other_omega, new.other_omega, rtol=SAME_POINT,
+    for k, point in enumerate(points):
+        gap = np.abs(np.subtract(point.values, new.values) / chart.size).max()
+        if (point.kind == new.kind and gap < SAME_POINT
+                and np.isclose(point.other_omega, new.other_omega, rtol=SAME_POINT,
                                atol=SAME_POINT)):
-            found[k] = replace(one, other=tuple(dict.fromkeys((*one.other, *new.other))))
+            points[k] = replace(point, other=tuple(dict.fromkeys((*point.other, *new.other))))
             return
-    found.append(new)
+    points.append(new)

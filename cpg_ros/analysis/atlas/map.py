@@ -50,19 +50,19 @@ TOGETHER = 2e-3
 def markers(chart: ParameterPlane, curves: list[Boundary], gait: str
             ) -> list[tuple[tuple[float, float], list[str]]]:
     """Return where a gait's points of codimension two are, each once, with their labels."""
-    found: list[tuple[tuple[float, float], list[str]]] = []
+    placed: list[tuple[tuple[float, float], list[str]]] = []
     for point in (point for curve in curves for point in curve.codimension_two):
         if point.gait != gait:
             continue
         label = LABELS[point.kind]
-        near = next((labels for place, labels in found
-                     if (np.abs(np.subtract(place, point.values)) / chart.size).max() < TOGETHER),
-                    None)
+        near = next((labels for position, labels in placed
+                     if (np.abs(np.subtract(position, point.values)) / chart.size).max()
+                     < TOGETHER), None)
         if near is None:
-            found.append((point.values, [label]))
+            placed.append((point.values, [label]))
         elif label not in near:
             near.append(label)
-    return found
+    return placed
 
 
 def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
@@ -93,12 +93,12 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
             if gait in curve.gaits:
                 colour, style = LINES[curve.kind]
                 panel.plot(curve.points[:, 0], curve.points[:, 1], style, color=colour, lw=1.1)
-        for place, labels in markers(chart, curves, gait):
-            panel.plot(*place, 'o', ms=4.5, mfc='#ffffff', mec='#1a202c', mew=1.0, zorder=4)
+        for position, labels in markers(chart, curves, gait):
+            panel.plot(*position, 'o', ms=4.5, mfc='#ffffff', mec='#1a202c', mew=1.0, zorder=4)
             # At the right and the upper edge the text is on the inside.
-            fraction = (np.array(place) - chart.low) / chart.size
-            panel.annotate(' '.join(labels), place, (-5 if fraction[0] > 0.85 else 5,
-                                                     -10 if fraction[1] > 0.9 else 4),
+            fraction = (np.array(position) - chart.low) / chart.size
+            panel.annotate(' '.join(labels), position, (-5 if fraction[0] > 0.85 else 5,
+                                                        -10 if fraction[1] > 0.9 else 4),
                            textcoords='offset points', fontsize=7, zorder=5,
                            ha='right' if fraction[0] > 0.85 else 'left',
                            bbox={'fc': '#ffffff', 'ec': 'none', 'alpha': 0.75, 'pad': 0.6})
@@ -163,8 +163,8 @@ class AtlasFolder:
 
     def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:
         """Return the points of a job, if it is done."""
-        found: list[dict[str, Any]] | None = stored_json(self._place(row))
-        return found
+        points: list[dict[str, Any]] | None = stored_json(self._place(row))
+        return points
 
     def put(self, row: AtlasRow, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Store the points of a job, and return them as get will."""
@@ -175,13 +175,13 @@ class AtlasFolder:
 
     def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
-        found = stored_json(self.folder / 'boundaries.json')
-        if found is None or any('losses' not in one for one in found):
+        stored = stored_json(self.folder / 'boundaries.json')
+        if stored is None or any('losses' not in curve for curve in stored):
             return None  # Those of an earlier version are followed anew.
-        return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']),
-                         tuple(map(CodimensionTwo.of, one['codimension_two'])),
-                         tuple(map(LossOnCurve.of, one['losses'])))
-                for one in found]
+        return [Boundary(curve['kind'], tuple(curve['gaits']), np.array(curve['points']),
+                         tuple(map(CodimensionTwo.of, curve['codimension_two'])),
+                         tuple(map(LossOnCurve.of, curve['losses'])))
+                for curve in stored]
 
     def put_curves(self, curves: list[Boundary]) -> None:
         """Store the boundaries."""
@@ -204,17 +204,17 @@ class AtlasFolder:
         first = next(tables)
         with (replacing(path) as beside,
               arrow.parquet.ParquetWriter(beside, first.schema) as writer):
-            for one in chain([first], tables):
-                writer.write_table(one)
+            for table in chain([first], tables):
+                writer.write_table(table)
         return path
 
 
 def _columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict[str, Any]]:
-    one, other = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
+    first, second = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
     for gait, sheet in sheets.items():
         label = sheet.label.ravel()
-        yield {'gait': [gait] * label.size, str(chart.first.line): one.ravel(),
-               str(chart.second.line): other.ravel(), 'exists': label > 0,
+        yield {'gait': [gait] * label.size, str(chart.first.line): first.ravel(),
+               str(chart.second.line): second.ravel(), 'exists': label > 0,
                'state': [LABEL_NAMES[k] for k in label], 'computed': sheet.computed.ravel(),
                **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
 
@@ -231,16 +231,16 @@ def _packed(values: np.ndarray) -> str:
 
 def _waves(sheet: GaitMap, cells: int) -> list[Any]:
     """Row, column and cells over a cycle, of some points of the grid."""
-    found, seen = [], set()
+    waves, seen = [], set()
     for (row, column), (wave, _) in sorted(sheet.waves.items()):
-        place = row // APART, column // APART
-        if place in seen:
+        tile = row // APART, column // APART
+        if tile in seen:
             continue
-        seen.add(place)
+        seen.add(tile)
         x = np.array(wave)[:, :cells]
         some = x[::max(1, len(x) // POINTS)]
-        found.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
-    return found
+        waves.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
+    return waves
 
 
 def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
@@ -263,13 +263,14 @@ def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
         'states': list(STATES), 'colours': list(STATES.values()),
         'lines': {name: line[0] for name, line in LINES.items()},
         'legs': [[leg, cells[0] - 1] for leg, cells in legs.items()],
-        'curves': [{'kind': one.kind, 'gaits': one.gaits,
-                    'points': np.round(one.points[:, :2], 5).tolist()} for one in curves],
+        'curves': [{'kind': boundary.kind, 'gaits': boundary.gaits,
+                    'points': np.round(boundary.points[:, :2], 5).tolist()}
+                   for boundary in curves],
         'gaits': {gait: {
             'label': _packed(sheet.label.astype(np.uint8)),
             **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in SHOWN},
-            'special': [[*place, ' '.join(labels)]
-                        for place, labels in markers(chart, curves, gait)],
+            'special': [[*position, ' '.join(labels)]
+                        for position, labels in markers(chart, curves, gait)],
             'waves': _waves(sheet, max(max(cells) for cells in legs.values()))}
             for gait, sheet in sheets.items()}}
     data = json.dumps(atlas).replace('<', '\\u003c')

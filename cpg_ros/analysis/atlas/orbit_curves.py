@@ -59,17 +59,17 @@ def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.n
         fractions: points of the curve in fractions of the ranges.
 
     """
-    found: list[np.ndarray] = []
-    for place, n, at in [*_candidates(plane, part, rank, fractions)]:
+    points: list[np.ndarray] = []
+    for guess, n, at in [*_candidates(plane, part, rank, fractions)]:
         plane.last = at
-        solved = _solved(plane, part, n, place)
+        solved = _solved(plane, part, n, guess)
         if solved is None:
             continue
         fraction, left = solved
-        if (np.abs(fraction - place).max() < REACH and (fraction >= 0.0).all()
+        if (np.abs(fraction - guess).max() < REACH and (fraction >= 0.0).all()
             and (fraction <= 1.0).all()
-                and not any(np.abs(fraction - one).max() < SAME for one in found)):
-            found.append(fraction)
+                and not any(np.abs(fraction - point).max() < SAME for point in points)):
+            points.append(fraction)
             yield CodimensionTwo(f'1:{n} resonance', plane.gait, plane.chart.values_at(fraction),
                                  left)
 
@@ -84,15 +84,15 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
             along.append((fraction, complex(spectrum(plane.last)[part][rank]), plane.last))
         except (CpgError, IndexError):
             break
-    for (one, left, orbit), (other, right, _) in pairwise(along):
+    for (here, left, orbit), (there, right, _) in pairwise(along):
         complexes = [abs(mu.imag) > REAL for mu in (left, right)]
         for n in (3, 4):
             gaps = [2.0 * mu.real - SUMS[n] for mu in (left, right)]
             if all(complexes) and gaps[0] * gaps[1] <= 0.0 and gaps[0] != gaps[1]:
-                yield one + gaps[0] / (gaps[0] - gaps[1]) * (other - one), n, orbit
+                yield here + gaps[0] / (gaps[0] - gaps[1]) * (there - here), n, orbit
         if complexes == [True, False]:
             # Where it has met on the real axis the curve is no torus's any more.
-            yield one, 1 if right.real > 0.0 else 2, orbit
+            yield here, 1 if right.real > 0.0 else 2, orbit
             return
     if along and abs(along[-1][1].imag) > REAL:
         last, mu, orbit = along[-1]
@@ -109,9 +109,9 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
     def gaps(fraction: np.ndarray) -> np.ndarray:
         plane.last = plane.orbit(fraction)
         some = spectrum(plane.last)[part]
-        one = complex(some[np.abs(some - target).argmin()])
-        if abs(one.imag) > REAL * REAL:
-            product, total = abs(one)**2, 2.0 * one.real
+        root = complex(some[np.abs(some - target).argmin()])
+        if abs(root.imag) > REAL * REAL:
+            product, total = abs(root)**2, 2.0 * root.real
         else:
             real = some[np.abs(some.imag) <= REAL * REAL].real
             pair = real[np.abs(real - target.real).argsort()[:2]]
@@ -119,12 +119,12 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
         return np.array([product - 1.0, total - SUMS[n]])
 
     try:
-        found = newton(gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
-                       difference=RESONANCE_DIFFERENCE, longest=REACH)
-        left = np.inf if found is None else float(np.abs(gaps(found)).max())
+        solution = newton(gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
+                          difference=RESONANCE_DIFFERENCE, longest=REACH)
+        left = np.inf if solution is None else float(np.abs(gaps(solution)).max())
     except (CpgError, np.linalg.LinAlgError, IndexError):
         return None
-    return None if found is None or not left < LEFT else (found, left)
+    return None if solution is None or not left < LEFT else (solution, left)
 
 
 #: Curves of a gait at most, points of each, steps in fractions of the ranges.
@@ -149,7 +149,7 @@ def edges(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
     """Return neighbours on the coarse grid that differ in the number of unstable multipliers."""
     rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
                                                                           COARSE)
-    found = []
+    crossed = []
     for k, row in enumerate(rows):
         for m, column in enumerate(columns):
             for other in ((row, columns[m + 1]) if m + 1 < len(columns) else None,
@@ -158,33 +158,34 @@ def edges(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
                 if other is None or at not in sheet.waves or sheet.label[other] == NONE:
                     continue
                 if sheet.numbers['unstable'][at] != sheet.numbers['unstable'][other]:
-                    found.append(Edge(chart.fraction(at), chart.fraction(other), *sheet.waves[at]))
-    return found
+                    crossed.append(Edge(chart.fraction(at), chart.fraction(other),
+                                        *sheet.waves[at]))
+    return crossed
 
 
 def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
     """Follow the curves that some edges cross; those that cannot be followed are left out."""
     chart, gait, crossed = job
-    found: list[Boundary] = []
+    curves: list[Boundary] = []
     for edge in crossed:
         middle = 0.5 * (edge.here + edge.there)
         reach = np.abs(edge.here - edge.there).max()
-        if any(on_curve(curve, chart, middle, 1.5 * reach) for curve in found):
+        if any(on_curve(curve, chart, middle, 1.5 * reach) for curve in curves):
             continue
         try:
-            found += _through(chart, gait, edge)
+            curves += _through(chart, gait, edge)
         except (NoOrbit, np.linalg.LinAlgError):
             continue
-        if len(found) >= CURVES:
+        if len(curves) >= CURVES:
             break
-    return found
+    return curves
 
 
 def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]:
     plane = OrbitPlane(chart, gait)
-    one, other = edge.here, edge.there
-    plane.last = solve_from_wave(chart.at_fractions(one), gait, edge.wave, edge.period)
-    before, after = spectrum(plane.last), spectrum(plane.orbit(other))
+    here, there = edge.here, edge.there
+    plane.last = solve_from_wave(chart.at_fractions(here), gait, edge.wave, edge.period)
+    before, after = spectrum(plane.last), spectrum(plane.orbit(there))
     for part, (left, right) in enumerate(zip(before, after, strict=True)):
         counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
         if counts[0] == counts[1]:
@@ -198,8 +199,8 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
             return float(np.log(np.abs(some[rank]))) if len(some) > rank else -10.0
 
         start = plane.last
-        place = brentq(lambda s: g(one + s * (other - one)), 0.0, 1.0, xtol=1e-9)
-        fraction = one + place * (other - one)
+        root = brentq(lambda s: g(here + s * (there - here)), 0.0, 1.0, xtol=1e-9)
+        fraction = here + root * (there - here)
         crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
         kind = ('torus' if abs(crossing.imag) > REAL else
                 'branch point' if crossing.real > 0.0 else 'period doubling')

@@ -53,10 +53,10 @@ class OrbitPlane:
 
         """
         assert self.last is not None
-        found = solve_beside(self.chart.at_fractions(fraction), self.last)
-        if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
+        solved = solve_beside(self.chart.at_fractions(fraction), self.last)
+        if solved.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
             raise NoOrbit('the orbit has shrunk')
-        return found
+        return solved
 
 
 #: Places on a curve at which the normal form is computed.
@@ -65,7 +65,7 @@ PLACES = 5
 
 @dataclass(frozen=True)
 class LossOnCurve:
-    """What the normal form says at a place on a curve.
+    """The normal form's verdict at a point of a curve.
 
     Attributes:
         values: on both axes.
@@ -81,8 +81,8 @@ class LossOnCurve:
     @staticmethod
     def of(stored: dict[str, Any]) -> 'LossOnCurve':
         """Return it from what as_dict has made."""
-        one, other = stored['values']
-        return LossOnCurve((one, other), stored['soft'], stored['why'])
+        first, second = stored['values']
+        return LossOnCurve((first, second), stored['soft'], stored['why'])
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""

@@ -151,12 +151,12 @@ class _Finder:
         end = np.array([self.one, value])
         orbit = solve_from_wave(chart.at(*map(float, begin)), self.row.gait, wave, period)
         for steps in STEPS:
-            found = orbit
+            ahead = orbit
             try:
                 for k in range(1, steps + 1):
-                    found = solve_beside(chart.at(*map(float, begin + k / steps * (end - begin))),
-                                         found)
-                return found
+                    ahead = solve_beside(chart.at(*map(float, begin + k / steps * (end - begin))),
+                                         ahead)
+                return ahead
             except NoOrbit:
                 if steps == STEPS[-1]:
                     raise
@@ -219,7 +219,7 @@ def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period
     """
     columns = np.array(wave).T
     orbit = solve_from_path(network, network.symmetry(gait), lambda theta: np.array(
-        [collocation.evaluate(one, theta) for one in columns]).T, period)
+        [collocation.evaluate(column, theta) for column in columns]).T, period)
     if orbit is None:
         raise NoOrbit('no orbit near the stored one')
     return orbit

@@ -85,7 +85,7 @@ class SolvedGait:
 
     @property
     def phases(self) -> np.ndarray:
-        """Of the eight cells against cell 1, cycles."""
+        """Phases of the eight cells relative to cell 1, cycles."""
         return self.seen.found.phases
 
 
@@ -194,12 +194,12 @@ def slow_gaits() -> Iterator[ReproducedRow | Picture]:
 def constants() -> Iterator[ReproducedRow | Picture]:
     """Yield the cell of section 6, read off the compiled rates."""
     at = Citation(AUTHORS, 'section 6')
-    found = cell_constants(Quadruped(0.0, 0.0, 0.0, 0.0), float(CURRENT))
+    values = cell_constants(Quadruped(0.0, 0.0, 0.0, 0.0), float(CURRENT))
     for name, printed in SECTION_6.items():
-        yield at.number(name, printed, found[name], within=1e-8,
+        yield at.number(name, printed, values[name], within=1e-8,
                         note=f'read off the compiled rates, with i = {CURRENT}')
     yield at.formula('tau ten widths v4 from v3, over its least', 'cosh(5)', np.cosh(5.0),
-                     found['tau_far'])
+                     values['tau_far'])
 
 
 Subgroup = frozenset[Permutation]
@@ -227,21 +227,21 @@ def inverse(element: Permutation) -> Permutation:
 
 def generated(*generators: Permutation) -> Subgroup:
     """Return the subgroup that permutations generate."""
-    found = {tuple(range(len(generators[0])))}
-    waiting = list(found)
+    elements = {tuple(range(len(generators[0])))}
+    waiting = list(elements)
     while waiting:
         element = waiting.pop()
         for generator in generators:
             image = after(generator, element)
-            if image not in found:
-                found.add(image)
+            if image not in elements:
+                elements.add(image)
                 waiting.append(image)
-    return frozenset(found)
+    return frozenset(elements)
 
 
 def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
     """``g S g^-1``."""
-    return frozenset(after(after(by, one), inverse(by)) for one in subgroup)
+    return frozenset(after(after(by, element), inverse(by)) for element in subgroup)
 
 
 @cache
@@ -269,8 +269,8 @@ TYPES = ('Z4 in D4', 'D2p in D4', 'D2s in D4', 'Z2 in Z4', 'Z2 in D2p', 'Z2p in 
 
 
 def _name(subgroup: Subgroup) -> str:
-    return next(name for name, one in NAMES.items()
-                if any(conjugate(g, one) == subgroup for g in D4))
+    return next(name for name, representative in NAMES.items()
+                if any(conjugate(g, representative) == subgroup for g in D4))
 
 
 def solutions() -> list[tuple[Subgroup, Subgroup]]:
@@ -282,14 +282,14 @@ def solutions() -> list[tuple[Subgroup, Subgroup]]:
 def dihedral() -> Iterator[ReproducedRow | Picture]:
     """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
     at = Citation(AUTHORS, 'section 2.3')
-    classes = {frozenset(conjugate(g, one) for g in D4) for one in all_subgroups(D4)}
+    classes = {frozenset(conjugate(g, subgroup) for g in D4) for subgroup in all_subgroups(D4)}
     yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))
     types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4)
              for k, h in solutions()}
     yield at.number('types of periodic solutions with H larger than K', '12', len(types))
-    found = {f'{_name(k)} in {_name(h)}' for k, h in solutions()}
+    pairs = {f'{_name(k)} in {_name(h)}' for k, h in solutions()}
     yield at.word('those types', ', '.join(TYPES), ', '.join(
-        [name for name in TYPES if name in found] + sorted(found - set(TYPES))))
+        [name for name in TYPES if name in pairs] + sorted(pairs - set(TYPES))))
     quarter = {f'{_name(k)} in {_name(h)}' for k, h in solutions() if len(h) == 4 * len(k)}
     yield at.word('those with a quarter-period phase shift', '1 in Z4',
                   ', '.join(sorted(quarter)))
@@ -329,10 +329,10 @@ def four_cells() -> Iterator[ReproducedRow | Picture]:
     """Theorem 3.1: conjugation by the walk's four-cycle."""
     at = Citation(AUTHORS, 'Theorem 3.1')
     turn = cycles('(1 3 2 4)', 4)
-    for one, other in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
-                       ('(1 2)(3 4)', '(1 2)(3 4)')):
-        image = after(after(turn, cycles(one, 4)), inverse(turn))
-        yield at.word(f'(1 3 2 4) {one} (1 3 2 4)^-1', other, _written(image))
+    for first, second in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
+                          ('(1 2)(3 4)', '(1 2)(3 4)')):
+        image = after(after(turn, cycles(first, 4)), inverse(turn))
+        yield at.word(f'(1 3 2 4) {first} (1 3 2 4)^-1', second, _written(image))
 
 
 def _written(element: Permutation) -> str:
@@ -354,7 +354,7 @@ def assignments() -> tuple[tuple[str, ...], ...]:
     Cells that share a leg are carried by every symmetry to cells that share one.
     """
     symmetries = list(Z4_Z2.elements.values())
-    found = []
+    accepted = []
     for partition in _pairings(tuple(range(8))):
         pairs = {frozenset(pair) for pair in partition}
         if all(frozenset(g[i] for i in pair) in pairs for g in symmetries for pair in pairs):
@@ -363,8 +363,8 @@ def assignments() -> tuple[tuple[str, ...], ...]:
             for legs in permutations(LEGS[1:]):
                 leg = {i: name for pair, name in zip((own, *others), (LEGS[0], *legs),
                                                      strict=True) for i in pair}
-                found.append(tuple(leg[i] for i in range(8)))
-    return tuple(found)
+                accepted.append(tuple(leg[i] for i in range(8)))
+    return tuple(accepted)
 
 
 def _pairings(cells: tuple[int, ...]) -> Iterator[list[tuple[int, int]]]:
@@ -467,8 +467,8 @@ class Action:
 def of_cells(group: Subgroup, variables: int) -> Action:
     """Return how permutations act on cells with some variables."""
     def matrix(g: Permutation) -> np.ndarray:
-        found: np.ndarray = np.kron(np.eye(variables), np.eye(len(g))[np.argsort(g)])
-        return found
+        permuted: np.ndarray = np.kron(np.eye(variables), np.eye(len(g))[np.argsort(g)])
+        return permuted
 
     return Action(group, matrix)
 
@@ -491,7 +491,7 @@ def conditions() -> Iterator[ReproducedRow | Picture]:
         for condition in CONDITIONS:
             yield at.holds(f'{name}, eight cells with two variables: all pairs with cyclic H/K '
                            f'meet ({condition})',
-                           not any(condition in one for one in failing),
+                           not any(condition in failed for failed in failing),
                            note=f'{len(some)} pairs')
         gaps = [action.fixed(k).shape[1] - action.fixed(generated(g, *k)).shape[1]
                 for k, _ in some for g in group - k]
@@ -531,8 +531,8 @@ def one_variable() -> Iterator[ReproducedRow | Picture]:
                    note=f'({", ".join(failing["trot"])}) is not met; ruled out: {ruled_out}')
     network = Delayed.presets()['liu2024_trot'].network
     orbit = solve_orbit(network, 'trot')
-    found = multipliers(orbit)
-    gap = float(np.abs(np.abs(np.concatenate([found.within, found.transverse])) - 1.0).min())
+    roots = multipliers(orbit)
+    gap = float(np.abs(np.abs(np.concatenate([roots.within, roots.transverse])) - 1.0).min())
     yield at.holds('a delay escapes that: one-dimensional cells have a hyperbolic trot with it',
                    network.variables == 1 and orbit.residual < 1e-8 and gap > HYPERBOLIC,
                    note=f'Liu & Zhang (2024), period {orbit.period:.4f}, residual '

@@ -98,13 +98,13 @@ def the_stand() -> Iterator[ReproducedRow | Picture]:
 def existence() -> Iterator[ReproducedRow | Picture]:
     """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
     nu = stand_sample(UNCOUPLED).trace('L_00').real
-    for place, gait, line, text, value, speed in (
+    for theorem, gait, line, text, value, speed in (
             ('Theorem 4.1', 'walk', 'gamma=delta=-alpha=-beta', 'nu_0/2', nu / 2.0, '-2'),
             ('Theorem 4.1', 'trot', 'xi=eta=-alpha=-beta', '-nu_0/4', -nu / 4.0, None),
             ('Theorem 4.3', 'pace', 'alpha=beta=-gamma=-delta', '-nu_0/4', -nu / 4.0, None),
             ('Theorem 4.3', 'bound', 'alpha=beta=-gamma=-delta', 'nu_0/4', nu / 4.0, None)):
         point = hopf(UNCOUPLED, line, gait, value - 0.1, value + 0.1)
-        at = Citation(AUTHORS, place)
+        at = Citation(AUTHORS, theorem)
         yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, value,
                          point.value)
         if speed:
@@ -142,7 +142,7 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
         yield at.number(f'{gait}: {name} at the Hopf point', printed, points[gait].value,
                         within=APPROXIMATE * abs(float(printed)),
                         note='the table says approximate; the other coupling as printed')
-    alpha, gamma, xi = (float(one) for one in TABLE_12['trot'])
+    alpha, gamma, xi = (float(row) for row in TABLE_12['trot'])
     sample = stand_sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
     leading = max(sample.largest(name) for name in sample.blocks)
     yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
@@ -169,17 +169,17 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
 
 def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
     """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
-    found: dict[str, HopfPoint] = {}
+    points: dict[str, HopfPoint] = {}
     for clause, gait, alpha, sign, (low, high), stable in THEOREM:
         point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
-        found.setdefault(gait, point)
+        points.setdefault(gait, point)
         yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
             f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
             f'{point.value:.4f}', 'stable' if stable else 'unstable',
             'stable' if point.stable else 'unstable',
             erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
-    trot = found['trot']
+    trot = points['trot']
     sample = stand_sample(trot.network)
     n = sample.network
     at = Citation(AUTHORS, 'Proposition 5.5')
@@ -192,7 +192,7 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
                          value, sample.trace(name).real)
     at = Citation(AUTHORS, 'Proposition 5.7')
     for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
-        sample = stand_sample(found[gait].network)
+        sample = stand_sample(points[gait].network)
         gamma = sample.network.gamma
         phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
         root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
@@ -218,7 +218,7 @@ EQUAL = 1e-7
 
 @dataclass(frozen=True)
 class TheoremVerdict:
-    """What the theorem says of a Hopf bifurcation.
+    """The theorem's statement on a Hopf bifurcation.
 
     Attributes:
         gait: that branches off.
@@ -264,7 +264,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
     For jump and walk the proof holds only for the rightmost pair of the class ("we always refer
     to the real part of the eigenvalue with greatest real part", corollary 5.4) and for alpha so
     small that the real blocks have complex eigenvalues ("if we choose alpha small enough").
-    Where alpha is 0 the cells of a ring do not hear one another, classes coincide, and no
+    Where alpha is 0 the cells of a ring are not coupled, classes coincide, and no
     bifurcation is simple.
 
     Raises:
@@ -342,12 +342,12 @@ def _on_line(gait: str) -> HopfPoint:
 def genericity() -> Iterator[ReproducedRow | Picture]:
     """Eq. 5.6, and Hopf points beyond the lines of the proofs."""
     for gait, (_, free, _, _) in PROOFS.items():
-        found = float(np.linalg.det(genericity_matrix(gait)))
-        place = ('section 6', 'easily verified') if gait in ('pace', 'bound', 'trot') else (
+        determinant = float(np.linalg.det(genericity_matrix(gait)))
+        theorem = ('section 6', 'easily verified') if gait in ('pace', 'bound', 'trot') else (
             'eq. 5.6', 'generically nonzero')
-        yield Citation(AUTHORS, place[0]).holds(
+        yield Citation(AUTHORS, theorem[0]).holds(
             f'{gait}: the determinant of eq. 5.6, of the genericity condition, is not 0',
-            abs(found) > NONZERO, note=f'{place[1]}: {found:.4f}')
+            abs(determinant) > NONZERO, note=f'{theorem[1]}: {determinant:.4f}')
         point = _on_line(gait)
         network = point.network
         assert isinstance(network, Quadruped)
@@ -415,13 +415,13 @@ def necessary_and_sufficient() -> Iterator[ReproducedRow | Picture]:
         Quadruped(alpha, mirror * alpha, 0.0, 0.0), 'gamma=delta', *GAMMAS)]
         for mirror in (1, -1)}
     for gait, (mirror, along, across) in SIGNS.items():
-        found = [(along * alpha >= 0.0 and across * point.value > 0.0, point.stable)
-                 for alpha, point in points[mirror] if point.gait == gait
+        agreed = [(along * alpha >= 0.0 and across * point.value > 0.0, point.stable)
+                  for alpha, point in points[mirror] if point.gait == gait
                  # 'We always refer to the eigenvalue with greatest real part' (section 5.3).
-                 and point.block.roots(2).real.max() < ON_AXIS]
-        otherwise = sum(met != stable for met, stable in found)
+                  and point.block.roots(2).real.max() < ON_AXIS]
+        otherwise = sum(met != stable for met, stable in agreed)
         yield Citation(AUTHORS, 'Theorem 4.2').holds(
             f'{gait}: the conditions are necessary and sufficient at equal couplings',
-            bool(found) and not otherwise, erratum=23 if mirror < 0 else None,
-            note=f'{len(found)} Hopf points, {sum(stable for _, stable in found)} of them '
+            bool(agreed) and not otherwise, erratum=23 if mirror < 0 else None,
+            note=f'{len(agreed)} Hopf points, {sum(stable for _, stable in agreed)} of them '
                  f'stable, {otherwise} otherwise than by the conditions')

@@ -175,7 +175,7 @@ class Sample:
 
     def __init__(self, network: Quadruped, state: np.ndarray) -> None:
         self.network, self.state = network, state
-        self.blocks: dict[str, Block] = {one.name: one for one in blocks(network, state)}
+        self.blocks: dict[str, Block] = {block.name: block for block in blocks(network, state)}
         alone = blocks(UNCOUPLED, state)[0]
         self.tables = Tables.at(network, alone.now.real)
 
@@ -207,11 +207,11 @@ def phases() -> Iterator[ReproducedRow | Picture]:
     sample = drawn()
     whole = sample.network.jacobian(everywhere(sample.network, sample.state))
     values, vectors = np.linalg.eig(whole)
-    found = np.concatenate([one.roots(2) for one in sample.blocks.values()])
-    gap = max(np.abs(values - one).min() for one in found)
+    roots = np.concatenate([block.roots(2) for block in sample.blocks.values()])
+    gap = max(np.abs(values - root).min() for root in roots)
     yield Citation(AUTHORS, 'section 5.2').holds(
         'the eight blocks hold all eigenvalues of L',
-        gap < 1e-9 and max(np.abs(found - one).min() for one in values) < 1e-9,
+        gap < 1e-9 and max(np.abs(roots - root).min() for root in values) < 1e-9,
         note=f'largest difference {gap:.1e}')
     at = Citation(AUTHORS, 'Table 5')
     for (j, k), (gait, printed) in TABLE_5.items():

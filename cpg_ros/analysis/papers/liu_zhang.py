@@ -62,10 +62,10 @@ def taylor_terms() -> Iterator[ReproducedRow | Picture]:
         return -tau / 3.0 * (b * now[cell]**3 + d * now[behind - 1]**3 + c * past[across[cell]]**3)
 
     def third_derivative(cell: int) -> float:
-        heard = np.array([(past if one.delayed else now)[
-            cell if one.source is None else one.source[cell]]
-            for one in equations_of(Delayed).arguments])
-        return tau * float(expansion.third(heard, heard, heard)[0].real)
+        inputs = np.array([(past if argument.delayed else now)[
+            cell if argument.source is None else argument.source[cell]]
+            for argument in equations_of(Delayed).arguments])
+        return tau * float(expansion.third(inputs, inputs, inputs)[0].real)
 
     for cell, behind in enumerate(BEHIND):
         value, wrong = cubes(cell, behind), cell == 2
@@ -214,18 +214,18 @@ def _example(example: Example) -> Iterator[ReproducedRow | Picture]:
         'unstable' if roots else 'stable', erratum=(3, 'unstable'),
         note=f'roots of the rest state with positive real part outside the class of the gait: '
              f'{roots}')
-    found = multipliers(solve_orbit(network, gait))
+    spectrum = multipliers(solve_orbit(network, gait))
     yield at.stable(f'{gait} at tau {network.tau:g}, within its symmetry class',
-                    found.leading_within)
+                    spectrum.leading_within)
     yield at.stable(f'{gait} at tau {network.tau:g}, in the full network',
-                    found.leading_transverse, erratum=3, which='leading transverse')
+                    spectrum.leading_transverse, erratum=3, which='leading transverse')
     yield from _simulated(example)
 
 
 def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
     """Yield the gait that the printed start values lead to."""
-    gait, place = example.gait, f'Figure {example.figure}'
-    at = Citation(AUTHORS, place)
+    gait, figure = example.gait, f'Figure {example.figure}'
+    at = Citation(AUTHORS, figure)
     gaits = primary_gaits(variables=1)
     seen = rhythm(example.network, example.start, DEVELOPED, Z4_Z2, gaits)
     phases = f'phases of cells 1 to 4: {np.round(seen.found.phases[:4], 4) % 1.0}'
@@ -244,17 +244,17 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
         yield at.word('walk as quadrupeds walk: LH, LF, RH, RF', 'walk', sense,
                       erratum=(7, 'diagonal-sequence walk'), note=phases)
     drawn = seen.run.t <= DRAWN
-    yield Picture(AUTHORS, place, caption, trajectories(
-        f'{AUTHORS}, {place}: {seen.kind}, tau {example.network.tau:g}', seen.run.t[drawn],
+    yield Picture(AUTHORS, figure, caption, trajectories(
+        f'{AUTHORS}, {figure}: {seen.kind}, tau {example.network.tau:g}', seen.run.t[drawn],
         seen.run.x[drawn, :4], ('$x_1$ (LH)', '$x_2$ (RH)', '$x_3$ (LF)', '$x_4$ (RF)')))
 
 
 def conditions() -> Iterator[ReproducedRow | Picture]:
     """(H1) and (H2), the conditions of the bifurcations."""
-    for place, name, key, sign in (('Example 1', 'H1', 'walk', 1.0),
-                                   ('Example 2', 'H2', 'pace', -1.0)):
+    for example, name, key, sign in (('Example 1', 'H1', 'walk', 1.0),
+                                     ('Example 2', 'H2', 'pace', -1.0)):
         a, b, c, d, _ = EXAMPLES[key].network.as_dict().values()
-        yield Citation(AUTHORS, place).holds(
+        yield Citation(AUTHORS, example).holds(
             f'the parameters satisfy ({name})',
             sign * (a + b) * d > 0.0 and abs(c) > abs(a + b + sign * d))
 
@@ -302,9 +302,9 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
     return states + misfit, theta
 
 
-def _inversion(place: str, example: Example, name: str, starts: dict[str, str]
+def _inversion(figure: str, example: Example, name: str, starts: dict[str, str]
                ) -> Iterator[ReproducedRow | Picture]:
-    at = Citation(AUTHORS, place)
+    at = Citation(AUTHORS, figure)
     samples, theta = recording(example, name)
 
     def fitted(start: float) -> CycleFit:

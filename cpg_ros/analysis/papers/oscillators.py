@@ -63,19 +63,19 @@ def amplitudes() -> Iterator[ReproducedRow]:
     angle = TURN * np.array(network.leads)
     state = np.concatenate([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.zeros(4)])
     run = simulate(network, state, 0.5, 0.001, progress=False)
-    found = np.hypot(run.x[[100, 250, 500], 0], run.x[[100, 250, 500], 4])
+    radii = np.hypot(run.x[[100, 250, 500], 0], run.x[[100, 250, 500], 4])
     half = 0.5 * network.a * run.t[[100, 250, 500]]
     yield cite.number('largest difference of an amplitude from R - (R - r0) (1 + a t/2) '
                       'exp(-a t/2), at t = 0.1, 0.25 and 0.5', '0', float(np.abs(
-                          found - 1.0 + 0.5 * (1.0 + half) * np.exp(-half)).max()), within=1e-9)
+                          radii - 1.0 + 0.5 * (1.0 + half) * np.exp(-half)).max()), within=1e-9)
 
 
 def stance_and_swing() -> Iterator[ReproducedRow]:
     """Durations of stance and swing of a Hopf oscillator alone."""
     cite = Citation(RIGHETTI, 'oscillator')
     for duty in (0.5, 0.6, 0.75):
-        known: Any = Hopf.presets()['trot'].network
-        network = _alone(replace(known, duty=duty, b=50.0))
+        base: Any = Hopf.presets()['trot'].network
+        network = _alone(replace(base, duty=duty, b=50.0))
         orbit = solve_orbit(network, 'trot')
         stance, swing = (np.pi * network.nu / fraction for fraction in (duty, 1.0 - duty))
 
@@ -95,18 +95,18 @@ def stance_and_swing() -> Iterator[ReproducedRow]:
 
 
 def neurons() -> Iterator[ReproducedRow]:
-    """When two neurons with fatigue oscillate, how large and how fast."""
+    """Two neurons with fatigue: onset, amplitude and frequency of their oscillation."""
     cite = Citation(MATSUOKA, 'two neurons')
-    known = _alone(Matsuoka.presets()['trot'].network)
-    tau, tau_v, beta = known.tau, known.tau_v, known.beta
+    network = _alone(Matsuoka.presets()['trot'].network)
+    tau, tau_v, beta = network.tau, network.tau_v, network.beta
     for a, there in ((1.0 + tau / tau_v - 0.005, False), (1.0 + tau / tau_v + 0.005, True),
                      (1.0 + beta - 0.005, True), (1.0 + beta + 0.005, False)):
         yield cite.holds(f'a = {a:g}: they {"oscillate" if there else "do not oscillate"}, as '
-                         '1 + tau/tau_v < a < 1 + beta says', _oscillates(known, a) == there)
-    orbit, double = (solve_orbit(replace(known, c=c), 'trot') for c in (1.0, 2.0))
+                         '1 + tau/tau_v < a < 1 + beta says', _oscillates(network, a) == there)
+    orbit, double = (solve_orbit(replace(network, c=c), 'trot') for c in (1.0, 2.0))
     yield cite.formula('amplitude with twice the input, over that with it', '2', 2.0,
                        double.peak / orbit.peak)
-    slow = solve_orbit(replace(known, tau=2.0 * tau, tau_v=2.0 * tau_v), 'trot')
+    slow = solve_orbit(replace(network, tau=2.0 * tau, tau_v=2.0 * tau_v), 'trot')
     yield cite.formula('period with twice the time constants, over that with them', '2', 2.0,
                        slow.period / orbit.period)
 
@@ -114,9 +114,9 @@ def neurons() -> Iterator[ReproducedRow]:
 def frequency() -> Iterator[ReproducedRow]:
     """The frequency formula by harmonic balance, where it is exact and where it is not."""
     cite = Citation(MATSUOKA, 'frequency (2011)')
-    known = _alone(Matsuoka.presets()['trot'].network)
+    base = _alone(Matsuoka.presets()['trot'].network)
     for a, within in ((1.26, 0.001), (1.5, 0.005), (2.0, 0.015)):
-        network = replace(known, a=a)
+        network = replace(base, a=a)
         ours = TURN / solve_orbit(network, 'trot').period
         yield cite.number(f'omega at a = {a:g}, tau/tau_v = 0.25, beta = 2.5',
                           f'{network.omega:.4f}', ours, within=within * ours,

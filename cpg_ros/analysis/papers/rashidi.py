@@ -154,14 +154,14 @@ def _written(elements: tuple[str, ...]) -> str:
 def cell() -> Iterator[ReproducedRow | Picture]:
     """Table 1, and equations 1 and 2."""
     network = printed('walk')
-    found = cell_constants(network, network.current)
+    values = cell_constants(network, network.current)
     at = Citation(AUTHORS, 'Table 1')
     for name, value in TABLE_1.items():
-        yield at.number(name, value, found[name], within=1e-8,
+        yield at.number(name, value, values[name], within=1e-8,
                         note='read off the compiled rates')
     yield Citation(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
                                              '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
-                                             found['tau_far'])
+                                             values['tau_far'])
     at = Citation(AUTHORS, 'eq. 1')
     yield at.holds("the walk's cells oscillate with u' = -phi tau(v) (n(v) - u), as printed",
                    _oscillates(-1.0), erratum=8, note='u runs away')
@@ -202,10 +202,10 @@ def primary() -> Iterator[ReproducedRow | Picture]:
                 ('left extensor against flexor', 2, 0, FIGURE_2[gait][1]),
                 ('right extensor against flexor', 3, 1, FIGURE_2[gait][1])):
             yield at.phases(f'{name}: {text}', value, [phases[cell_a] - phases[cell_b]])
-        place, wanted = EQUATIONS[gait]
-        for n, (degrees, phase) in enumerate(zip(wanted, phases[1:], strict=True), 1):
+        equation, expected = EQUATIONS[gait]
+        for n, (degrees, phase) in enumerate(zip(expected, phases[1:], strict=True), 1):
             off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
-            yield Citation(AUTHORS, place).number(
+            yield Citation(AUTHORS, equation).number(
                 f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
                 within=CLOSE, erratum=(8, '180'),
                 note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
@@ -226,12 +226,12 @@ def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
                   f'({", ".join(signals(seen))})')
 
 
-def _drawn(place: str, name: str, seen: Rhythm, caption: str) -> Picture:
+def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
     run = seen.run
     late = run.t >= run.t[-1] - 5.0 * seen.found.period
     shapes = [int(signal[1]) - 1 for signal in signals(seen)]
-    return Picture(AUTHORS, place, caption, trajectories(
-        f'{AUTHORS}, {place}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,
+    return Picture(AUTHORS, figure, caption, trajectories(
+        f'{AUTHORS}, {figure}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,
         shapes, variable='v'))
 
 
@@ -246,12 +246,12 @@ def secondary() -> Iterator[ReproducedRow | Picture]:
         if gait in TABLE_5:
             yield from _table_5(gait, seen)
         if gait in NOT_REACHED:
-            found = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
-            reached = seen.gait == gait and found.attracts
+            roots = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
+            reached = seen.gait == gait and roots.attracts
             yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
-                note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
+                note=f'leading Floquet multiplier {roots.leading:.3g} a cycle')
     for number, (before, gait) in TRANSITIONS.items():
         network = Biped.presets()[gait].network
         assert isinstance(network, Biped)

@@ -117,11 +117,11 @@ class Reproduction:
     def errata(self) -> dict[int, tuple[str, str]]:
         """Errata of these papers, by number: paper and text."""
         authors = {paper.authors for paper in self.papers}
-        return {number: one for number, one in ERRATA.items() if one[0] in authors}
+        return {number: erratum for number, erratum in ERRATA.items() if erratum[0] in authors}
 
     @property
     def summary(self) -> str:
-        """How many rows agree, in one line."""
+        """The number of rows that agree, as one line."""
         agree = sum(row.agrees for row in self.rows)
         return (f'{len(self.rows)} published quantities: {agree} agree, {len(self.explained)} '
                 f'explained by errata, {len(self.failed)} fail')
@@ -133,11 +133,11 @@ def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow]
     figures: list[Drawn] = []
     section = paper.sections[number]
     try:
-        for one in section():
-            if isinstance(one, ReproducedRow):
-                rows.append(one)
+        for row in section():
+            if isinstance(row, ReproducedRow):
+                rows.append(row)
             elif draw:
-                figures.append(_drawn(one))
+                figures.append(_drawn(row))
     except (CpgError, ArithmeticError) as error:
         rows.append(ReproducedRow(paper.authors, section.__name__.replace('_', ' '),
                                   'what is printed here',
@@ -200,32 +200,32 @@ def _cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[:width - 3] + '...'
 
 
-def table(found: Reproduction) -> str:
+def table(report: Reproduction) -> str:
     """Write the rows by paper in aligned columns, the errata that were used, and the summary."""
     head, *rest = command_line.table([HEAD, *(
         (row.place, *(_cut(text, width) for text, width in zip(
             (row.quantity, row.published, row.computed), WIDEST, strict=True)), row.verdict)
-        for row in found.rows)])
+        for row in report.rows)])
     lines: list[str] = []
-    for paper in found.papers:
+    for paper in report.papers:
         lines += [paper.reference, head, *(line for row, line in zip(
-            found.rows, rest, strict=True) if row.paper == paper.authors), '']
-    used = {row.erratum for row in found.explained}
+            report.rows, rest, strict=True) if row.paper == paper.authors), '']
+    used = {row.erratum for row in report.explained}
     lines += [f'erratum {number} ({paper}): {text}'
-              for number, (paper, text) in found.errata.items() if number in used]
-    return '\n'.join([*lines, *([''] if used else []), found.summary])
+              for number, (paper, text) in report.errata.items() if number in used]
+    return '\n'.join([*lines, *([''] if used else []), report.summary])
 
 
-def as_json(found: Reproduction) -> str:
+def as_json(report: Reproduction) -> str:
     """Write everything but the figures for machines."""
     tree = {
         'papers': [{'name': paper.name, 'authors': paper.authors, 'reference': paper.reference}
-                   for paper in found.papers],
-        'summary': {'published': len(found.rows), 'agree': sum(row.agrees for row in found.rows),
-                    'explained': len(found.explained), 'failed': len(found.failed)},
-        'rows': [{**asdict(row), 'verdict': row.verdict} for row in found.rows],
+                   for paper in report.papers],
+        'summary': {'published': len(report.rows), 'agree': sum(row.agrees for row in report.rows),
+                    'explained': len(report.explained), 'failed': len(report.failed)},
+        'rows': [{**asdict(row), 'verdict': row.verdict} for row in report.rows],
         'errata': {str(number): {'paper': paper, 'text': text}
-                   for number, (paper, text) in found.errata.items()}}
+                   for number, (paper, text) in report.errata.items()}}
     return json.dumps(command_line.finite(tree), indent=1, allow_nan=False) + '\n'
 
 
@@ -241,21 +241,21 @@ def _line(row: ReproducedRow) -> str:
             f'<td class="verdict">{verdict}</td><td class="note">{escape(note)}</td></tr>')
 
 
-def as_html(found: Reproduction) -> str:
+def as_html(report: Reproduction) -> str:
     """Write one page with the rows, the errata and the figures."""
-    parts = [f'<p>{escape(found.summary)}.</p>']
-    for paper in found.papers:
+    parts = [f'<p>{escape(report.summary)}.</p>']
+    for paper in report.papers:
         parts += [f'<h2>{escape(paper.reference)}</h2>', html_table(
             (*HEAD, 'note; how compared'),
-            [_line(row) for row in found.rows if row.paper == paper.authors])]
-        for figure in found.figures:
+            [_line(row) for row in report.rows if row.paper == paper.authors])]
+        for figure in report.figures:
             if figure.paper == paper.authors:
                 name = f'{figure.paper}, {figure.place}'
                 parts.append(image(figure.png, name, '<figcaption>'
                                    f'{escape(f"{name}. {figure.caption}")}</figcaption>'))
     parts += ['<h2>Errata</h2>', '<ol>']
     parts += [f'<li id="erratum-{number}" value="{number}">{escape(paper)}: {escape(text)}</li>'
-              for number, (paper, text) in found.errata.items()]
+              for number, (paper, text) in report.errata.items()]
     return page('The papers reproduced', [*parts, '</ol>'])
 
 
@@ -308,14 +308,14 @@ def _reproduce(args: argparse.Namespace) -> int:
     for path in files:
         _ready(path)
     with progress_bar('reproducing', parts(names)) as progress:
-        found = reproduce(names, args.jobs, args.html is not None, progress)
+        report = reproduce(names, args.jobs, args.html is not None, progress)
     if json is not None:
-        write_atomically(json, as_json(found))
+        write_atomically(json, as_json(report))
     if args.html is not None:
-        write_atomically(args.html, as_html(found))
-    say(as_json(found).rstrip() if args.json == '-' else '\n'.join(
-        [table(found), *([f'written: {", ".join(map(str, files))}'] if files else [])]))
-    return 1 if found.failed else 0
+        write_atomically(args.html, as_html(report))
+    say(as_json(report).rstrip() if args.json == '-' else '\n'.join(
+        [table(report), *([f'written: {", ".join(map(str, files))}'] if files else [])]))
+    return 1 if report.failed else 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -262,8 +262,8 @@ def _exponent(text: str) -> int:
 def _shown(value: Value) -> str:
     values = np.ravel(value)
     if np.iscomplexobj(values) and np.abs(values.imag).max() > 1e-12:
-        return ', '.join(f'{one.real:.4f}{one.imag:+.4f}i' for one in values)
-    return ', '.join(f'{one.real + 0.0:.4f}' for one in values)
+        return ', '.join(f'{number.real:.4f}{number.imag:+.4f}i' for number in values)
+    return ', '.join(f'{number.real + 0.0:.4f}' for number in values)
 
 
 # Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
@@ -389,5 +389,5 @@ def rhythm(network: Network, start: Sequence[float] | np.ndarray, t_end: float, 
     run = simulate(network, np.asarray(start, dtype=float), t_end, network.step, progress=False)
     first = int((1.0 - SETTLED) * run.t.size)
     every = max(1, (run.t.size - first) // SAMPLES)
-    found = recognise(run.t[first::every], run.x[first::every, :network.cells], group, gaits)
-    return Rhythm(run, found)
+    gait = recognise(run.t[first::every], run.x[first::every, :network.cells], group, gaits)
+    return Rhythm(run, gait)

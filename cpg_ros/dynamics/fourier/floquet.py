@@ -151,8 +151,8 @@ class Variation:
             values[:self.n * degree + 1] = histories.reshape(-1, d, k)
             for element in range(self.count):
                 start = (self.n + element) * degree
-                heard = values[element * degree + 1:(element + 1) * degree + 1]
-                right = past[element] @ heard - (
+                nodes = values[element * degree + 1:(element + 1) * degree + 1]
+                right = past[element] @ nodes - (
                     DERIVATIVE[1:, 0, None, None] / self.length * values[start])
                 values[start + 1:start + degree + 1] = (
                     inverse[element] @ right.reshape(degree * d, k)).reshape(degree, d, k)
@@ -220,18 +220,18 @@ class Variation:
             # The last gain's answer is a good start.
             start = self._vectors.get(id(columns), np.random.default_rng(0).standard_normal(size))
             with suppress(arpack.ArpackError):
-                found, vectors = arpack.eigs(operator, k=count, ncv=24, tol=exact, v0=start,
+                roots, vectors = arpack.eigs(operator, k=count, ncv=24, tol=exact, v0=start,
                                              maxiter=20)
                 self._vectors[id(columns)] = vectors.real.sum(axis=1)
-                return np.asarray(found)
+                return np.asarray(roots)
         return np.linalg.eigvals(later(np.eye(size)))
 
 
 def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
     """Return the multipliers within the gait's class but the trivial one, and that."""
-    found = variation(orbit)[1]
-    place = int(np.abs(found - 1.0).argmin())
-    return np.delete(found, place), complex(found[place])
+    roots = variation(orbit)[1]
+    trivial = int(np.abs(roots - 1.0).argmin())
+    return np.delete(roots, trivial), complex(roots[trivial])
 
 
 def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
@@ -435,5 +435,5 @@ class Variational:
     def delayed(self, values: States) -> np.ndarray:
         """Return what the part a delay ago adds to the rates."""
         assert values[1] is not None
-        found: np.ndarray = np.einsum('tij,tj->ti', self._past, values[1])
-        return found
+        sources: np.ndarray = np.einsum('tij,tj->ti', self._past, values[1])
+        return sources

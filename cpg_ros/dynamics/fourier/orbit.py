@@ -16,7 +16,7 @@
 
 On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
 all cells collapse to a periodic problem for one cell of each: with theta = t / T in cycles,
-``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for what a cell hears,
+``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for the inputs of a cell,
 solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
 """
 
@@ -40,7 +40,7 @@ def _waves(n: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def _circulant(n: int) -> np.ndarray:
-    """Which entry of a column each entry of its circulant matrix is, shape (n, n)."""
+    """Return the index in the first column of each entry of a circulant matrix, shape (n, n)."""
     return (np.arange(n)[:, None] - np.arange(n)) % n
 
 
@@ -136,7 +136,7 @@ class FourierOrbit(Orbit):
 
     @property
     def samples(self) -> int:
-        """How many evenly spaced points of a cycle resolve a waveform: the nodes."""
+        """Number of evenly spaced points that resolve a waveform: the nodes."""
         return int(self.values.shape[-1])
 
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
@@ -168,19 +168,19 @@ SMALLEST = 1e-7
 
 
 @lru_cache(maxsize=64)
-def _heard(network: type[Network], symmetry: Symmetry
+def _inputs(network: type[Network], symmetry: Symmetry
            ) -> list[tuple[bool, list[tuple[int, float]]]]:
-    """For each argument: whether it is delayed, and which row each wave hears at what shift."""
-    found = []
-    for one in equations_of(network).arguments:
-        source = range(network.cells) if one.source is None else one.source
+    """For each argument: whether it is delayed, and the row and shift of each wave's input."""
+    inputs = []
+    for argument in equations_of(network).arguments:
+        source = range(network.cells) if argument.source is None else argument.source
         places = []
         for cell in symmetry.first:
             other = source[cell]
-            places.append((int(symmetry.waves[other]) * network.variables + one.variable,
+            places.append((int(symmetry.waves[other]) * network.variables + argument.variable,
                            float(symmetry.phases[other] - symmetry.phases[cell])))
-        found.append((one.delayed, places))
-    return found
+        inputs.append((argument.delayed, places))
+    return inputs
 
 
 def rows_of(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndarray:
@@ -207,9 +207,9 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     rows, n = u.shape
     variables, tau, kind = network.variables, network.delay, equations_of(type(network))
     waves, derive = rows // variables, derivative_matrix(n)
-    rise, heard = u @ derive.T, _heard(type(network), symmetry)
+    rise, inputs = u @ derive.T, _inputs(type(network), symmetry)
     states, slopes, matrices = [], [], []
-    for delayed, places in heard:
+    for delayed, places in inputs:
         late = tau / period if delayed else 0.0
         matrices.append([None if shift == late == 0.0 else
                          shift_matrix(n, shift - late) for _, shift in places])
@@ -237,7 +237,7 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     nodes, flat = np.arange(n), np.zeros((waves, n))
     for (v, k), slope in by_argument.items():
         slope = slope + flat
-        delayed, places = heard[k]
+        delayed, places = inputs[k]
         for wave, (source, _) in enumerate(places):
             row, matrix = wave * variables + v, matrices[k][wave]
             if matrix is None:
@@ -287,7 +287,7 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
 
 
 def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-           known: Sequence[float] = ()) -> FourierOrbit | None:
+           periods: Sequence[float] = ()) -> FourierOrbit | None:
     """Newton from a guess, doubling the nodes until the waveforms are resolved.
 
     Args:
@@ -295,14 +295,14 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
         symmetry: of the gait.
         u: guess at the waveforms on the nodes, shape (rows, n).
         period: in model time.
-        known: periods of orbits to be kept off, model time.
+        periods: periods of orbits to be kept off, model time.
 
     Raises:
         NoOrbit: they would need more nodes than there may be.
 
     """
     while True:
-        for _ in range(2 * STEPS if known else STEPS):
+        for _ in range(2 * STEPS if periods else STEPS):
             residual, jacobian, point = equations(network, symmetry, u, period)
             size = float(np.abs(residual[:-1]).max())
             if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
@@ -313,8 +313,8 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
                 step = np.linalg.solve(jacobian, residual)
             except np.linalg.LinAlgError:
                 return None
-            if known:
-                step = step * deflation_factor(period, -float(step[-1]), known)
+            if periods:
+                step = step * deflation_factor(period, -float(step[-1]), periods)
             u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
             # A period that leaves the range of the delay has run away, and so has a waveform.
             if not (1e-3 * network.delay < period < 1e3 * network.delay
@@ -328,5 +328,5 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             break
         if u.shape[1] >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
-        u, known = np.array([resample(row, 2 * row.size + 1) for row in u]), ()
+        u, periods = np.array([resample(row, 2 * row.size + 1) for row in u]), ()
     return complete(network, symmetry, u, period, residual, jacobian, point)

@@ -89,8 +89,8 @@ class FourierCurve(ShortRepr):
         matrix[-1] = self._weights(z.size) * border
         right = np.zeros((z.size, 2))
         right[:-1, 0], right[-1, 1] = -residual, 1.0
-        found = np.linalg.solve(matrix, right)
-        return found[:, 0], found[:, 1]
+        solutions = np.linalg.solve(matrix, right)
+        return solutions[:, 0], solutions[:, 1]
 
     def amplitude(self, z: np.ndarray) -> float:
         """Half the range of cell 1's first variable; of an odd one its peak."""
@@ -174,9 +174,9 @@ def _describing(network: Network, symmetry: Symmetry) -> Describing:
     p = [value[0] if value.ndim else value for value in values_of(network)]
     # One row for each argument, in which all others are at rest.
     rows = np.eye(len(kind.arguments))[..., None] * cosine
-    first = [0 if one.source is None else one.source[0] for one in kind.arguments]
+    first = [0 if argument.source is None else argument.source[0] for argument in kind.arguments]
     turns = np.exp(2j * np.pi * (symmetry.phases[first] - symmetry.phases[0]))
-    late = np.array([one.delayed for one in kind.arguments])
+    late = np.array([argument.delayed for argument in kind.arguments])
     cosine = cosine * (2.0 / POINTS)
 
     def terms(amplitude: float) -> tuple[complex, complex]:
@@ -241,11 +241,11 @@ def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None
         tries += 1
         here = _delayed(network, ahead)
         guess = _guess(here, gait) if orbit is None else predicted(here, orbit)
-        found = None if guess is None else _accepted(newton(here, network.symmetry(gait), *guess))
-        if found is None:
+        solved = None if guess is None else _accepted(newton(here, network.symmetry(gait), *guess))
+        if solved is None:
             ahead = reached + 0.4 * (ahead - reached)
             continue
-        reached, orbit = ahead, found
+        reached, orbit = ahead, solved
         ahead = min(delay, reached + 1.6 * max(ahead - reached, 0.1 * (delay - onset)))
     return orbit if reached >= delay else None
 
@@ -264,18 +264,18 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
         NoOrbit: the method leads elsewhere; a shorter way may do.
 
     """
-    found = _accepted(newton(network, near.symmetry, *predicted(network, near)))
-    if found is None or not 0.5 < found.period / near.period < 2.0:
+    orbit = _accepted(newton(network, near.symmetry, *predicted(network, near)))
+    if orbit is None or not 0.5 < orbit.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
-    return found
+    return orbit
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float, known: Sequence[float] = ()) -> FourierOrbit | None:
+              period: float, periods: Sequence[float] = ()) -> FourierOrbit | None:
     """Solve for an orbit from a guess, states over times in cycles; None where none is found."""
     try:
         u = rows_of(network, symmetry, path(THETA))
-        return _accepted(newton(network, symmetry, u, period, known))
+        return _accepted(newton(network, symmetry, u, period, periods))
     except NoOrbit:
         return None
 
@@ -320,8 +320,8 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
         if orbit is None and onset is not None and delay > onset:
             orbit = _continued(network, gait, onset)
         if orbit is None and not simple:
-            found = (from_path(network, symmetry, *one) for one in find_orbit(network, gait))
-            orbit = next((one for one in found if one is not None), None)
+            orbits = (from_path(network, symmetry, *guess) for guess in find_orbit(network, gait))
+            orbit = next((candidate for candidate in orbits if candidate is not None), None)
         if orbit is not None:
             return orbit
     except NoOrbit as error:
@@ -331,7 +331,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
 
 
 def _simple(network: Network, symmetry: Symmetry) -> bool:
-    """Whether cells have one variable and swing about 0: then harmonic balance tells the onset."""
+    """Whether cells have one variable and oscillate about 0, as harmonic balance requires."""
     return symmetry.odd and network.variables == 1
 
 

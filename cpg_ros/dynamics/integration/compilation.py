@@ -128,7 +128,7 @@ def exp(x):
 
 @jit
 def fetch(lanes, source, given, out):
-    """Copy what each cell hears: of cell ``source[cell]`` all lanes."""
+    """Copy the inputs of each cell: of cell ``source[cell]`` all lanes."""
     if lanes == 1:
         for cell in range(len(source)):
             out[cell] = given[source[cell]]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The one integrator: fixed-step RK4 over a history of nodes, for real time and simulation.
+"""Fixed-step RK4 integration over a history of nodes, for real time and simulation.
 
 A history is three arrays of shape (nodes, components), used as a ring: the state x at each
 node and its slope on either side (``after`` for the interval that starts there, ``before`` for

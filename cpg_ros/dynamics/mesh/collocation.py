@@ -122,9 +122,9 @@ def places_of(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         middle = 0.5 * (low + high)
         above = (polynomial.polyval(middle, terms, tensor=False) > 0.0) == rising
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    found = np.sort(mesh[interval] + 0.5 * (low + high) * np.diff(mesh)[interval])
+    places = np.sort(mesh[interval] + 0.5 * (low + high) * np.diff(mesh)[interval])
     # Cells that are in phase, and ends that a kink lies on, are met twice.
-    return found[np.diff(found, prepend=-1.0) > 1e-9]
+    return places[np.diff(places, prepend=-1.0) > 1e-9]
 
 
 def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
@@ -140,7 +140,7 @@ def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
         return None
     fixed = [0.0, 1.0, *(kink for kink in kinks if ON < kink < 1.0 - ON)]
     free = [end for k, end in enumerate(mesh[1:-1], 1) if not any(
-        abs(end - one) < NEAR * min(end - mesh[k - 1], mesh[k + 1] - end) for one in fixed)]
+        abs(end - place) < NEAR * min(end - mesh[k - 1], mesh[k + 1] - end) for place in fixed)]
     return np.array(sorted({*fixed, *free}))
 
 

@@ -135,13 +135,13 @@ def _round(factors, columns, whole):
         upper[:] = 0.0
         for j in range(d):
             for _ in range(2):
-                for one in range(j):
+                for column in range(j):
                     along = 0.0
                     for i in range(d):
-                        along += moved[i, one] * moved[i, j]
-                    upper[one, j] += along
+                        along += moved[i, column] * moved[i, j]
+                    upper[column, j] += along
                     for i in range(d):
-                        moved[i, j] -= along * moved[i, one]
+                        moved[i, j] -= along * moved[i, column]
             size = 0.0
             for i in range(d):
                 size += moved[i, j]**2
@@ -199,8 +199,8 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
 
 def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
     """Return the multipliers within the gait's class but the trivial one, and that."""
-    found, _, trivial = multipliers(orbit)
-    return found, complex(trivial)
+    roots, _, trivial = multipliers(orbit)
+    return roots, complex(trivial)
 
 
 def transverse(orbit: MeshOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
@@ -233,14 +233,14 @@ def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], f
     inner = across[1:].transpose(0, 2, 1) @ steps @ across[:-1]
     back = across[0].T @ change.T @ across[-1]
     # After T/m the cells have changed places; m of these make a period.
-    found = eigenvalues(np.concatenate([inner, back[None]] * m))
+    roots = eigenvalues(np.concatenate([inner, back[None]] * m))
     others = []
     for columns in outside:
         steps, change = linear.on(columns)
         # After m changes a cell is another one of its class.
         again = np.linalg.matrix_power(change, m)
         others.append(eigenvalues(np.concatenate([*[steps, change.T[None]] * m, again[None]])))
-    return found, tuple(others), float(np.prod(kept)**m)
+    return roots, tuple(others), float(np.prod(kept)**m)
 
 
 class Flow:
@@ -249,8 +249,8 @@ class Flow:
     def __init__(self, orbit: MeshOrbit) -> None:
         """Linearise about an orbit."""
         symmetry, network = orbit.symmetry, orbit.network
-        place = Reduced(network, symmetry).place
-        self._jacobians = network.jacobian(orbit.stages[..., place])
+        index = Reduced(network, symmetry).place
+        self._jacobians = network.jacobian(orbit.stages[..., index])
         #: Lengths of the intervals, model time.
         self.lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
         self._turn = (symmetry.turn
@@ -409,7 +409,7 @@ class Variational:
 
     @property
     def flaw(self) -> str:
-        """Why derivatives of the rates do not tell how disturbances interact, or ''."""
+        """Reason why derivatives of the rates do not describe disturbances, or ''."""
         met = bool(self._orbit.network.kinks) and kinks(self._reduced, self._orbit.solution).size
         return 'the rates have kinks' if met else ''
 

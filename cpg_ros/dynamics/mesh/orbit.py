@@ -67,7 +67,7 @@ class Reduced(Field):
 
 @dataclass(eq=False, repr=False)
 class Solution(ShortRepr):
-    """What Newton's method works on: values at mesh points, at nodes, and L = T/m."""
+    """Unknowns of Newton's method: values at mesh points and at nodes, and L = T/m."""
 
     mesh: np.ndarray
     points: np.ndarray
@@ -114,27 +114,27 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
     return matrix
 
 
-def newton(reduced: Reduced, now: Solution, known: Sequence[float] = ()) -> bool:
+def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bool:
     """Solve on a fixed mesh, in place; tell whether it converged.
 
     Args:
         reduced: the network in a gait.
         now: the guess, and then the solution.
-        known: lengths T/m, model time, of orbits to be kept off.
+        periods: lengths T/m, model time, of orbits to be kept off.
 
     """
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
-    for _ in range(2 * STEPS if known else STEPS):
+    for _ in range(2 * STEPS if periods else STEPS):
         try:
             p, r, by_start, by_source = linearised(reduced, now)
             right = np.empty(d + 1)
             right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
             right[d] = -reduced.rates(now.points[0])[0]
-            found = np.linalg.solve(bordered(reduced, now, p, r), right)
+            solution = np.linalg.solve(bordered(reduced, now, p, r), right)
         except np.linalg.LinAlgError:
             return False
-        start, length = found[:d], found[d]
+        start, length = solution[:d], solution[d]
         moved = p @ start + r[..., 0] * length + r[..., 1]
         inner = (np.einsum('nsij,nj->nsi', by_start, moved[:-1]) + by_source[..., 0] * length
                  + by_source[..., 1])
@@ -144,8 +144,8 @@ def newton(reduced: Reduced, now: Solution, known: Sequence[float] = ()) -> bool
             return False
         # A long first step would leave the range where cosh is tame.
         fraction = min(1.0, 0.5 / max(size, 1e-300))
-        if known and size > TOLERANCE:
-            fraction *= deflation_factor(now.length, float(length), known)
+        if periods and size > TOLERANCE:
+            fraction *= deflation_factor(now.length, float(length), periods)
         now.points += fraction * moved
         now.stages += fraction * inner
         now.length += fraction * float(length)
@@ -197,11 +197,11 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     ends = collocation.last_share(slopes) * now.length * h / np.abs(now.points).max()
     if ends.max() <= RESOLVED:
         return None
-    wanted = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
+    needed = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
     # Not a number where the solution is not finite.
-    if not max(fewest, wanted) <= MOST_INTERVALS:
+    if not max(fewest, needed) <= MOST_INTERVALS:
         raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
-    return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(wanted)))
+    return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(needed)))
 
 
 def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
@@ -226,10 +226,10 @@ def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray
     try:
         p, r, by_start, by_source = linearised(reduced, now, extra)
         right = np.vstack([-r[-1, :, 2:], -reduced.by_parameter(now.points[0])[0]])
-        found = np.linalg.solve(bordered(reduced, now, p, r), right)
+        solution = np.linalg.solve(bordered(reduced, now, p, r), right)
     except np.linalg.LinAlgError as error:
         raise NoOrbit('the orbit is not isolated: it has no derivatives') from error
-    start, d_length = found[:-1], found[-1]
+    start, d_length = solution[:-1], solution[-1]
     moved = p @ start + r[..., :1] * d_length + r[..., 2:]
     inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])
     h = np.diff(now.mesh)
@@ -310,12 +310,12 @@ class MeshOrbit(Orbit):
 
     @property
     def samples(self) -> int:
-        """How many evenly spaced points of a cycle resolve a waveform."""
+        """Number of evenly spaced points that resolve a waveform."""
         return SAMPLES
 
 
 def _columns(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
-    """Where u_wave is found in the reduced state, in each m-th of the cycle."""
+    """Return the columns of the reduced state that hold u_wave, in each m-th of the cycle."""
     columns, cell = [], int(symmetry.first[wave])
     for _ in range(symmetry.order):
         columns.append(int(symmetry.classes[cell] + variable * (symmetry.classes.max() + 1)))

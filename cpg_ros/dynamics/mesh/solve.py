@@ -66,7 +66,7 @@ BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float, known: Sequence[float] = ()) -> MeshOrbit | None:
+              period: float, periods: Sequence[float] = ()) -> MeshOrbit | None:
     """Solve for an orbit from a guess; None where Newton's method leads to none.
 
     Args:
@@ -74,7 +74,7 @@ def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
         symmetry: of the gait.
         path: states, shape (m, components), as a function of times in cycles, shape (m,).
         period: in model time.
-        known: periods of orbits that Newton's method is to be kept off, model time.
+        periods: periods of orbits that Newton's method is to be kept off, model time.
 
     """
     reduced = Reduced(network, symmetry)
@@ -82,11 +82,11 @@ def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
     def guess(places: np.ndarray) -> np.ndarray:
         return path(places / symmetry.order)[:, reduced.kept]
 
-    for intervals in (FEW,) if known else (FEW, MORE * FEW):
+    for intervals in (FEW,) if periods else (FEW, MORE * FEW):
         start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
-        found = _refined(reduced, start, [one / symmetry.order for one in known])
-        if found is not None:
-            return found
+        orbit = _refined(reduced, start, [excluded / symmetry.order for excluded in periods])
+        if orbit is not None:
+            return orbit
     return None
 
 
@@ -113,13 +113,13 @@ def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
     return _refined(Reduced(network, near.symmetry), Solution(near.mesh, points, stages, length))
 
 
-def _refined(reduced: Reduced, now: Solution, known: Sequence[float] = ()
+def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()
              ) -> MeshOrbit | None:
     """Solve, remesh and solve again until the mesh is fine enough; None as in from_path."""
     fewest = FEWEST
     while True:
         with np.errstate(all='ignore'):
-            converged = newton(reduced, now, known)
+            converged = newton(reduced, now, periods)
         if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
             return None
         if not _on_kinks(reduced, now):
@@ -130,7 +130,7 @@ def _refined(reduced: Reduced, now: Solution, known: Sequence[float] = ()
                 return completed(reduced, now)
         except NoOrbit:
             return None
-        now, known = sampled(path_of(reduced, now), mesh, now.length), ()
+        now, periods = sampled(path_of(reduced, now), mesh, now.length), ()
         # Finer every time: equal shares of the error alone may stay short of the goal for ever.
         fewest = finer(mesh)
 
@@ -202,7 +202,7 @@ class MeshCurve(ShortRepr):
                                  stages.reshape(n, -1, d), float(z[-2]))
 
     def _weights(self, size: int) -> np.ndarray:
-        """Of points, by the trapezoidal rule, L and value; nodes between points do not count."""
+        """Return trapezoidal weights of points, L and value; nodes between points have none."""
         d = len(self.symmetry.basis)
         ends = np.zeros(self.mesh.size)
         ends[:-1] += 0.5 * np.diff(self.mesh)
@@ -236,15 +236,15 @@ class MeshCurve(ShortRepr):
         right[d, 0] = -reduced.rates(now.points[0])[0]
         right[d + 1] = -(row * r[..., 1]).sum(), 1.0
         answers = []
-        for found, residual in zip(np.linalg.solve(matrix, right).T, (1.0, 0.0), strict=True):
-            source = np.array([found[d], residual, found[d + 1]])
-            moved = p @ found[:d] + r @ source
+        for solution, residual in zip(np.linalg.solve(matrix, right).T, (1.0, 0.0), strict=True):
+            source = np.array([solution[d], residual, solution[d + 1]])
+            moved = p @ solution[:d] + r @ source
             inner = np.einsum('nsij,nj->nsi', by_start, moved[:-1]) + by_source @ source
-            answers.append(np.concatenate([moved.ravel(), inner.ravel(), found[d:]]))
+            answers.append(np.concatenate([moved.ravel(), inner.ravel(), solution[d:]]))
         return answers[0], answers[1]
 
     def _columns(self, reduced: Reduced) -> list[int]:
-        """Where the reduced state has cell 1's first variable in each m-th of the cycle."""
+        """Return the columns of cell 1's first variable, in each m-th of the cycle."""
         columns = [0]
         for _ in range(self.symmetry.order - 1):
             columns.append(int(reduced.turn[columns[-1]]))
@@ -271,12 +271,12 @@ class MeshCurve(ShortRepr):
             return np.stack([np.interp(places, now.mesh, column) for column in points.T], -1)
 
         curve = replace(self, mesh=mesh)
-        moved = [curve.pack(sampled(self._turned(reduced, one, start), mesh, 1.0), *ends)
-                 for one, ends in ((path, z[-2:]), (slanted, border[-2:]))]
+        moved = [curve.pack(sampled(self._turned(reduced, states, start), mesh, 1.0), *ends)
+                 for states, ends in ((path, z[-2:]), (slanted, border[-2:]))]
         return curve, moved[0], moved[1]
 
     def _highest(self, reduced: Reduced, now: Solution, path: Callable) -> float:
-        """Where cell 1 is higher than at the start, in m-ths of the cycle, or 0."""
+        """Return when cell 1 is higher than at the start, in m-ths of the cycle, or 0."""
         columns = self._columns(reduced)
         peaks = now.points[:, columns]
         node, part = divmod(int(peaks.argmax()), len(columns))
@@ -380,15 +380,15 @@ def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period:
 
 def _stated(network: Network, gait: str) -> MeshOrbit | None:
     """The orbit near which the network knows a state; None where it knows none."""
-    known = network.on_orbit(gait)
-    if known is None:
+    state = network.on_orbit(gait)
+    if state is None:
         return None
     symmetry = network.symmetry(gait)
-    found = _from_state(network, symmetry, *known)
+    orbit = _from_state(network, symmetry, *state)
     # Phase 0 is the highest peak, to which a state that is only near need not lead.
-    if found is None or found.peak - found.waveform(np.zeros(1))[0] > SAME * found.peak:
-        return _by_itself(network, symmetry, *known)
-    return found
+    if orbit is None or orbit.peak - orbit.waveform(np.zeros(1))[0] > SAME * orbit.peak:
+        return _by_itself(network, symmetry, *state)
+    return orbit
 
 
 def _sought(network: Network, gait: str) -> MeshOrbit:
@@ -404,9 +404,9 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
     """Return what the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
-        found = (_accepted(from_path(network, symmetry, *one)) for one in find_orbit(network,
-                                                                                     gait))
-        return next((orbit for orbit in found if orbit is not None), None)
+        orbits = (_accepted(from_path(network, symmetry, *guess)) for guess in find_orbit(network,
+                                                                                          gait))
+        return next((orbit for orbit in orbits if orbit is not None), None)
     except NoEquilibrium:
         return None
 
@@ -421,21 +421,21 @@ def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:
     return lambda theta: orbit(theta * orbit.period)
 
 
-def _continue_orbit(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
+def _continue_orbit(near: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
     """Follow an orbit along the line to other parameters; also return the share reached."""
-    start, end = known.network.as_dict(), network.as_dict()
-    orbit, reached, step = known, 0.0, 0.25
+    start, end = near.network.as_dict(), network.as_dict()
+    orbit, reached, step = near, 0.0, 0.25
     # A failure costs more than a success, so steps shrink fast.
     while reached < 1.0 and step > 0.003:
         fraction = min(1.0, reached + step)
         here = replace(network, **{key: start[key] + fraction * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
-        found = _accepted(from_path(here, known.symmetry, _on_cycles(orbit), orbit.period))
+        ahead = _accepted(from_path(here, near.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
-        if found is None or not 0.5 < found.period / orbit.period < 2.0:
+        if ahead is None or not 0.5 < ahead.period / orbit.period < 2.0:
             step *= 0.25
             continue
-        orbit, reached, step = found, fraction, 1.5 * step
+        orbit, reached, step = ahead, fraction, 1.5 * step
     return (orbit if reached >= 1.0 else None), reached
 
 
@@ -446,12 +446,12 @@ def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
         NoOrbit: the method leads elsewhere; a shorter way may do.
 
     """
-    found = _accepted(predicted(network, near))
-    if found is None:
-        found = _accepted(from_path(network, near.symmetry, _on_cycles(near), near.period))
-    if found is None or not 0.5 < found.period / near.period < 2.0:
+    orbit = _accepted(predicted(network, near))
+    if orbit is None:
+        orbit = _accepted(from_path(network, near.symmetry, _on_cycles(near), near.period))
+    if orbit is None or not 0.5 < orbit.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
-    return found
+    return orbit
 
 
 def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrbit:
@@ -494,9 +494,9 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         if orbit is not None:
             return orbit
         changed = ', '.join(
-            f'{name} {known + reached * (value - known):.4g}' for (name, value), known
+            f'{name} {old + reached * (value - old):.4g}' for (name, value), old
             in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
-            if value != known)
+            if value != old)
         raise NoOrbit(f'no {gait} at these parameters: on the way to them from its preset it ends '
                       f'at {changed}')
     raise NoOrbit(f'no {gait} at these parameters')
@@ -504,12 +504,12 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
 
 def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
     """Return the orbit of the gait's preset, if it has one."""
-    known = network.presets().get(gait)
+    preset = network.presets().get(gait)
     # One without a start is sought, as the gait of the network itself is.
-    if known is None or (known.start is None and known.network == network):
+    if preset is None or (preset.start is None and preset.network == network):
         return None
     try:
-        return from_preset(known)
+        return from_preset(preset)
     except NoOrbit:
         return None
 

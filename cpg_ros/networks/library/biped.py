@@ -139,9 +139,9 @@ class Biped(Network):
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
         """Weights that H of a gait carries into one another: w(g j -> g i) and w(j -> i)."""
         elements = [D2.elements[name] for name in symmetry.h]
-        found: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
+        members: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
         for name in (name for names in WEIGHTS.values() for name in names):
             j, i = int(name[2]) - 1, int(name[3]) - 1
             family = tuple(dict.fromkeys(f'w_{g[j] + 1}{g[i] + 1}' for g in elements))
-            found.setdefault(min(family), family)
-        return tuple(found.values())
+            members.setdefault(min(family), family)
+        return tuple(members.values())

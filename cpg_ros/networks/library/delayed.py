@@ -124,8 +124,8 @@ class Delayed(Network):
         """Say what in c rules a gait out: its sign, or that no delay makes it oscillate."""
         j, k = self.modes()[gait]
         if 2 * j % leg_count(type(self)) == 0 and self.c * (-1) ** k >= 0.0:
-            wanted = 'positive' if k else 'negative'
-            return f'c {self.c:g} gives no {gait}: c must be {wanted}'
+            sign = 'positive' if k else 'negative'
+            return f'c {self.c:g} gives no {gait}: c must be {sign}'
         text, value, least = self.least_coupling(gait)
         if value <= least:
             return f'{text} {value:g} gives no {gait} at any delay: it must be above {least:.4f}'
@@ -161,15 +161,15 @@ def _presets(network: type[Delayed]) -> dict[str, Preset]:
     Two waves can run round; d makes the wanted one the faster one (Im A > 0), which attracts;
     a gives all waves the same Re A, but for rounding.
     """
-    found = {}
+    presets = {}
     for gait, (j, k) in network.modes().items():
         turn = 2.0 * math.pi * j / leg_count(network)
         d = -1.0 if j > 0 else 1.0
         a = round(-3.5 - d * math.cos(turn), 1)
         if 2 * j % leg_count(network) == 0:
             a, d = -4.5, 2.0 * d
-        found[gait] = Preset(gait, network(a, 1.0, 6.5 if k else -6.5, d, 0.4))
-    return found
+        presets[gait] = Preset(gait, network(a, 1.0, 6.5 if k else -6.5, d, 0.4))
+    return presets
 
 
 # Ours share one time scale: trot, pace, bound and pronk have one waveform (T = 1.2783), walk

@@ -114,17 +114,17 @@ GAITS_OF_FOUR = {'trot': (0, 2, 2, 0), 'pace': (0, 2, 0, 2), 'bound': (0, 0, 2, 
 
 
 def partners(legs: int) -> dict[str, tuple[int, ...]]:
-    """Return name of weights -> the leg that each leg hears with them, from 0.
+    """Return name of weights -> the leg that is the input of each leg, from 0.
 
     The other one of the pair; and of a pair further on that of the same side, and of the other.
     """
-    found = {'k_side': tuple(i ^ 1 for i in range(legs))}
+    inputs = {'k_side': tuple(i ^ 1 for i in range(legs))}
     for m in range(1, legs // 2):
         number = '' if legs == 4 else str(m)
         ahead = tuple((i + 2 * m) % legs for i in range(legs))
-        found[f'k_girdle{number}'] = ahead
-        found[f'k_diagonal{number}'] = tuple(i ^ 1 for i in ahead)
-    return found
+        inputs[f'k_girdle{number}'] = ahead
+        inputs[f'k_diagonal{number}'] = tuple(i ^ 1 for i in ahead)
+    return inputs
 
 
 @cache
@@ -141,7 +141,7 @@ def gait_phases(legs: int) -> dict[str, tuple[Fraction, ...]]:
 
 
 def _even(phases: tuple[Fraction, ...]) -> bool:
-    """Whether as many legs have each of the phases, evenly spread: a cycle takes them round."""
+    """Whether the phases are evenly spread, with equally many legs at each."""
     different = sorted(set(phases))
     return (different == [Fraction(n, len(different)) for n in range(len(different))]
             and len({phases.count(phase) for phase in different}) == 1)
@@ -155,7 +155,7 @@ def symmetry_of(phases: tuple[Fraction, ...], variables: int = 2, each: int = 1)
     shifts = {'side': phases[1], 'girdle': phases[2]} if legs == 4 else {}
     if legs != 4 or different > 2:
         # From each leg to one whose phase is the next.
-        waiting = {one: [leg for leg in range(legs) if phases[leg] == one] for one in phases}
+        waiting = {phase: [leg for leg in range(legs) if phases[leg] == phase] for phase in phases}
         order = [waiting[Fraction(n % different, different)].pop(0) for n in range(legs)]
         after = dict(zip(order, order[1:] + order[:1], strict=True))
         steps = {'cycle': tuple(after[leg] for leg in range(legs))}
@@ -183,9 +183,9 @@ class LegPairs(Network):
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
         """Return what the network has for this many legs; InputError for an odd number."""
-        names, heard = leg_names(legs), partners(legs)
+        names, inputs = leg_names(legs), partners(legs)
         groups = {kind: tuple(f'k_{names[j]}_{names[i]}' for i, j in enumerate(sources))
-                  for kind, sources in heard.items()}
+                  for kind, sources in inputs.items()}
         weights = tuple(name for members in groups.values() for name in members)
         return {
             'cells': cls.each * legs, **places(legs), 'groups': groups, 'couplings': weights,
@@ -200,8 +200,8 @@ class LegPairs(Network):
             'usual_gait': next(iter(gait_phases(legs))), 'fields': weights}
 
     @classmethod
-    def heard(cls) -> dict[str, tuple[int, ...]]:
-        """Return name of weights -> the cell that each cell hears with them, from 0."""
+    def inputs(cls) -> dict[str, tuple[int, ...]]:
+        """Return name of weights -> the cell that is the input of each cell, from 0."""
         count = leg_count(cls)
         return {kind: tuple(j + m * count for m in range(cls.each) for j in sources)
                 for kind, sources in partners(count).items()}
@@ -231,26 +231,26 @@ class LegPairs(Network):
         count = leg_count(cls)
         names = leg_names(count)
         elements = [symmetry.group.elements[name] for name in symmetry.h]
-        found: dict[str, tuple[str, ...]] = {
+        members: dict[str, tuple[str, ...]] = {
             name: (name,) for name in cls.parameters() if name not in cls.couplings}
         for sources in partners(count).values():
             for i, j in enumerate(sources):
                 family = tuple(dict.fromkeys(f'k_{names[g[j] % count]}_{names[g[i] % count]}'
                                              for g in elements))
-                found.setdefault(min(family), family)
-        return tuple(found.values())
+                members.setdefault(min(family), family)
+        return tuple(members.values())
 
     @classmethod
     def weights(cls, gait: str, size: float = 1.0, quarter: float = -1.0) -> Mapping[str, float]:
-        """Return weights that choose a gait: cos + quarter * sin of the lead of the leg heard.
+        """Return weights that choose a gait: cos + quarter * sin of the lead of the input leg.
 
         So 1 between legs in phase and -1 between legs half a cycle apart; on the walk quarter from
         the leg a quarter ahead, and -quarter from that a quarter behind.
         """
-        names, phases, found = leg_names(leg_count(cls)), cls.phases(gait), {}
+        names, phases, couplings = leg_names(leg_count(cls)), cls.phases(gait), {}
         for sources in partners(leg_count(cls)).values():
             for i, j in enumerate(sources):
                 ahead = 2.0 * math.pi * float((phases[j] - phases[i]) % 1)
-                found[f'k_{names[j]}_{names[i]}'] = size * round(
+                couplings[f'k_{names[j]}_{names[i]}'] = size * round(
                     math.cos(ahead) + quarter * math.sin(ahead), 12)
-        return found
+        return couplings

@@ -76,7 +76,7 @@ class HopfOscillators(LegPairs):
         omega = math.pi * p.nu * (stance / p.duty + (1.0 - stance) / (1.0 - p.duty))
         left = p.mu - x**2 - y**2
         dx, dy = p.alpha * left * x - omega * y, p.beta * left * y + omega * x
-        for kind, sources in cls.heard().items():
+        for kind, sources in cls.inputs().items():
             _, y_j = cell.now(sources)
             dy = dy + getattr(p, kind) * y_j
         return dx, dy
@@ -85,7 +85,7 @@ class HopfOscillators(LegPairs):
         """Return a state near the gait's orbit, and the period of an uncoupled oscillator."""
         if self.mu <= 0.0:
             return None
-        phase = np.array([float(one) for one in self.phases(gait)])
+        phase = np.array([float(shift) for shift in self.phases(gait)])
         # Stance is half a turn, and so is swing.
         angle = np.interp(phase, [0.0, self.duty, 1.0], [0.0, 0.5 * TURN, TURN])
         size = math.sqrt(self.mu)

@@ -78,7 +78,7 @@ class MatsuokaOscillators(LegPairs):
         u, v = cell.now()
         u_e, _ = cell.now(antagonist)
         drive: Number = p.c - p.a * positive(u_e)
-        for kind, sources in cls.heard().items():
+        for kind, sources in cls.inputs().items():
             u_j, _ = cell.now(sources)
             u_f, _ = cell.now(tuple(antagonist(j) for j in sources))
             drive = drive + getattr(p, kind) * (positive(u_j) - positive(u_f))
@@ -94,7 +94,7 @@ class MatsuokaOscillators(LegPairs):
         """Return a state near the gait's orbit, and the period of two neurons alone."""
         if not self.omega:
             return None
-        phase = np.array([float(one) for one in self.phases(gait)])
+        phase = np.array([float(shift) for shift in self.phases(gait)])
         theta = 2.0 * np.pi * np.concatenate([phase, phase + 0.5])
         delay = np.arctan(self.omega * self.tau_v)
         half = 0.3 * self.c

@@ -35,7 +35,7 @@ CURRENT, PHI = 1.0, 0.2
 CELL = MorrisLecar(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
                    v1=0.2, v2=0.4, v3=0.3, v4=0.2, base=0.0)
 
-#: Which cell cell i hears: i - 2 behind it, s(i) on the other side, i + 4 across its ring.
+#: The inputs of cell i: i - 2 behind it, s(i) on the other side, i + 4 across its ring.
 BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))
 ACROSS = tuple(i ^ 1 for i in range(CELLS))
 OPPOSITE = tuple((i + 4) % CELLS for i in range(CELLS))
@@ -103,7 +103,7 @@ class Quadruped(Network):
     def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry.
 
-        The wave of walk and jump runs so that each cell follows the one it hears for
+        The wave of walk and jump runs so that each cell follows its input for
         alpha >= 0 (LH leads LF), and the other way round for alpha < 0.
 
         Raises:

@@ -253,7 +253,7 @@ class BridgeNode(StartedNode):
 
     @property
     def title(self) -> str:
-        """What the robot is called in the log."""
+        """Name of the robot in the log."""
         return self.robot.name
 
     def prepare(self, wait: Wait) -> None:
@@ -402,13 +402,13 @@ class BridgeNode(StartedNode):
         wait(DISCOVERY)
 
     def _rise(self, wait: Wait) -> None:
-        """Let the thread that commands begin to rise."""
+        """Request the robot to stand up, on the thread that commands."""
         answer: deque[str] = deque()
         start = self._start
 
         def rise(now: float) -> None:
-            wanted = start is not None and not start.cancelled and not self._ending
-            answer.append(self.supervisor.rise(now) if wanted else 'it is stopped')
+            standing = start is not None and not start.cancelled and not self._ending
+            answer.append(self.supervisor.rise(now) if standing else 'it is stopped')
 
         self._requests.append(rise)
         while not answer:

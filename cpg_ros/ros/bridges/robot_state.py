@@ -238,5 +238,5 @@ def settings_for(robot: Robot, places: np.ndarray, *, kp: np.ndarray, kd: np.nda
     order = robot.places[places]
     lower, upper, velocity, stand = (robot.column(name)[order] for name in (
         'lower', 'upper', 'velocity', 'offset'))
-    return BridgeSettings(tuple(robot.order[place] for place in places), kp, kd, torque, lower,
+    return BridgeSettings(tuple(robot.order[index] for index in places), kp, kd, torque, lower,
                           upper, velocity, stand, np.clip(lying, lower, upper), **others)

@@ -176,7 +176,7 @@ class TrackingMonitor:
 
 
 class BridgeState(Enum):
-    """What the bridge makes the robot do."""
+    """State of a bridge."""
 
     IDLE = 'idle'
     RISING = 'rising'

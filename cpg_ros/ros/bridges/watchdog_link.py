@@ -97,8 +97,8 @@ def peer(line: socket.socket) -> str:
 
 def _peer(line: socket.socket) -> tuple[int, int]:
     """Return process and user of the other end, as they were when it connected or listened."""
-    found = line.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-    return _CREDENTIALS.unpack(found)[:2]
+    credentials = line.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+    return _CREDENTIALS.unpack(credentials)[:2]
 
 
 def _holder(name: str) -> str:

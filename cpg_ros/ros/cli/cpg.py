@@ -93,8 +93,8 @@ def _of_node(args: Namespace, look: Callable[['NodeClient'], Coroutine[Any, Any,
 
 def _choices(args: Namespace, name: str) -> list[str]:
     from cpg_ros.ros.node.parameters import choices
-    return [word for one in _of_node(args, lambda other: other.descriptors([name]))
-            for word in choices(one.additional_constraints)]
+    return [word for value in _of_node(args, lambda other: other.descriptors([name]))
+            for word in choices(value.additional_constraints)]
 
 
 def complete_parameters(parsed_args: Namespace, **_: Any) -> list[str]:
@@ -169,11 +169,11 @@ def parser() -> Parser:
         return group.add_parser(name, help=text, description=text.capitalize() + '.',
                                 parents=[] if name in ('run', 'completion') else [anywhere])
 
-    one = add(actions, 'run', 'run an executable of the package')
-    one.add_argument('executable', choices=[name for name in EXECUTABLES if name != 'cpg'],
-                     metavar='EXECUTABLE')
-    one.add_argument('arguments', nargs=REMAINDER, metavar='...',
-                     help='arguments of the executable')
+    action = add(actions, 'run', 'run an executable of the package')
+    action.add_argument('executable', choices=[name for name in EXECUTABLES if name != 'cpg'],
+                        metavar='EXECUTABLE')
+    action.add_argument('arguments', nargs=REMAINDER, metavar='...',
+                        help='arguments of the executable')
     gait = add(actions, 'gait', 'switch the gait')
     gait.add_argument('gait', metavar='NAME').completer = gaits
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
@@ -186,10 +186,10 @@ def parser() -> Parser:
     parameters = add(actions, 'param', "a node's parameters").add_subparsers(
         dest='what', required=True, metavar='{set,get,list}')
     for name, text in (('set', 'set a parameter'), ('get', 'print a parameter')):
-        one = add(parameters, name, text)
-        one.add_argument('parameter', metavar='PARAMETER').completer = complete_parameters
+        action = add(parameters, name, text)
+        action.add_argument('parameter', metavar='PARAMETER').completer = complete_parameters
         if name == 'set':
-            value = one.add_argument('value', metavar='VALUE', type=parameter_value)
+            value = action.add_argument('value', metavar='VALUE', type=parameter_value)
             value.completer = values
     add(parameters, 'list', 'print all parameters and their descriptions')
 
@@ -198,8 +198,8 @@ def parser() -> Parser:
     add(topics, 'list', 'print all topics and their types')
     echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
     echo.add_argument('--once', action='store_true', help='print the next message only')
-    for one in (echo, add(topics, 'hz', 'measure the message rate of a topic for 3 s')):
-        one.add_argument('topic', metavar='TOPIC').completer = complete_topics
+    for action in (echo, add(topics, 'hz', 'measure the message rate of a topic for 3 s')):
+        action.add_argument('topic', metavar='TOPIC').completer = complete_topics
 
     record = add(actions, 'record', 'record topics into a bag until Ctrl-C')
     record.add_argument('bag', type=Path, metavar='BAG', help='folder to create')
@@ -284,8 +284,8 @@ async def _call(args: Namespace, other: 'NodeClient') -> str:
         return str(value)
     else:
         names = await other.parameters()
-        return '\n'.join(f'{one.name}  {one.description}'
-                         for one in await other.descriptors(names))
+        return '\n'.join(f'{descriptor.name}  {descriptor.description}'
+                         for descriptor in await other.descriptors(names))
     return ''
 
 
@@ -337,8 +337,8 @@ def _graph() -> Iterator['Node']:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import try_shutdown
     # A shell makes processes in the background ignore Ctrl-C.
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, signal.default_int_handler)
+    for ending in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ending, signal.default_int_handler)
     try:
         # The context stays valid while a signal ends the action.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)

@@ -46,13 +46,13 @@ import yaml
 PATIENCE = 1.0
 
 
-def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
+def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
     """Publish a bag's messages at the pace at which they were received.
 
     Args:
         node: publishes.
         path: of the bag.
-        wanted: topics; all, if empty.
+        topics: topics; all, if empty.
         rate: recorded seconds per second.
 
     Returns:
@@ -64,15 +64,15 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
     """
     counts: Counter[str] = Counter()
     with opened(path) as bag:
-        there = {one.topic: one for one in bag.connections}
-        names = [node.resolve_topic_name(one) for one in wanted] or list(there)
+        there = {connection.topic: connection for connection in bag.connections}
+        names = [node.resolve_topic_name(name) for name in topics] or list(there)
         for topic in names:
             if topic not in there:
                 raise RecordingError(f'{path}: no topic {topic!r}; there are {", ".join(there)}')
         publishers = {topic: _publisher(node, there[topic]) for topic in names}
         _wait_for_listeners(node, list(publishers.values()))
         expected = bag.expected()
-        with progress_bar(f'playing {path.name}', max(1, sum(expected[one] for one in names))
+        with progress_bar(f'playing {path.name}', max(1, sum(expected[name] for name in names))
                           ) as bar:
             start, began = None, time.monotonic()
             for done, (topic, received, message) in enumerate(bag.messages(names)):
@@ -88,13 +88,14 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
 def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
     """Wait briefly for subscribers, so that they receive the first messages."""
     end = time.monotonic() + PATIENCE
-    while time.monotonic() < end and not all(one.get_subscription_count() for one in publishers):
+    while time.monotonic() < end and not all(
+            publisher.get_subscription_count() for publisher in publishers):
         rclpy.spin_once(node, timeout_sec=0.02)
 
 
 def _publisher(node: Node, connection: Connection) -> Publisher:
     offered = getattr(connection.ext, 'offered_qos_profiles', ())
-    kept = any(one.durability == QosDurability.TRANSIENT_LOCAL for one in offered)
+    kept = any(profile.durability == QosDurability.TRANSIENT_LOCAL for profile in offered)
     return node.create_publisher(message_class(connection.msgtype), connection.topic, QoSProfile(
         depth=1 if kept else 100, durability=DurabilityPolicy.TRANSIENT_LOCAL if kept
         else DurabilityPolicy.VOLATILE))
@@ -108,20 +109,20 @@ SEARCH_PERIOD = 0.5
 USUAL = ('/rosout', '/parameter_events')
 
 
-def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
+def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
     """Record until Ctrl-C.
 
     Args:
         node: subscribes.
         path: of the bag, a folder that does not exist yet.
-        wanted: topics; if empty, all that exist or appear.
+        topics: topics; if empty, all that exist or appear.
 
     Raises:
         BagError: something is there already, or the folder cannot be written to.
 
     """
     recorder, looked = BagRecorder(node, path), 0.0
-    names = [node.resolve_topic_name(one) for one in wanted]
+    names = [node.resolve_topic_name(name) for name in topics]
     try:
         while True:
             if time.monotonic() > looked + SEARCH_PERIOD:
@@ -137,11 +138,11 @@ def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
     return recorder
 
 
-def _subscribed(node: Node, recorder: BagRecorder, wanted: Sequence[str]) -> list[str]:
+def _subscribed(node: Node, recorder: BagRecorder, topics: Sequence[str]) -> list[str]:
     """Record topics that are new on the graph; return them."""
     return [topic for topic, kinds in node.get_topic_names_and_types()
             if topic not in recorder.counts and topic not in recorder.passed_over
-            and (topic in wanted if wanted else topic not in USUAL)
+            and (topic in topics if topics else topic not in USUAL)
             and node.count_publishers(topic) and recorder.subscribe(topic, kinds[0])]
 
 
@@ -288,4 +289,4 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, bytes):  # one octet; those of a list are integers, too
         return value[0]
-    return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value

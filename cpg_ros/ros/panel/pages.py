@@ -106,29 +106,29 @@ def read(text: str | bytes) -> Request:
     if not isinstance(text, str):
         raise RequestError('a request must be text')
     try:
-        found = json.loads(text, parse_constant=_constant)
+        message = json.loads(text, parse_constant=_constant)
     except RequestError:
         raise
     except (ValueError, RecursionError) as error:
         raise RequestError('the request is not JSON') from error
-    if not isinstance(found, dict):
+    if not isinstance(message, dict):
         raise RequestError('a request must be a JSON object')
-    action = found.pop('do', None)
+    action = message.pop('do', None)
     if not isinstance(action, str) or action not in ACTIONS:
         raise RequestError(f"'do' is not one of {', '.join(ACTIONS)}")
-    wanted = ACTIONS[action]
-    stamp = found.pop('stamp', None)
+    fields = ACTIONS[action]
+    stamp = message.pop('stamp', None)
     if stamp is not None:
         try:
             stamp = _number(0.0, 1e12)(stamp)
         except RequestError as error:
             raise RequestError(f'{action}: stamp {error}') from error
-    if set(found) != set(wanted):
-        raise RequestError(f"'{action}' takes {', '.join(wanted) or 'nothing'}")
+    if set(message) != set(fields):
+        raise RequestError(f"'{action}' takes {', '.join(fields) or 'nothing'}")
     values = {}
-    for name, check in wanted.items():
+    for name, check in fields.items():
         try:
-            values[name] = check(found[name])
+            values[name] = check(message[name])
         except RequestError as error:
             raise RequestError(f'{action}: {name} {error}') from error
     return Request(action, values, stamp)

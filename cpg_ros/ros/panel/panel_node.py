@@ -513,8 +513,8 @@ class Panel(StartedNode):
         A panel without a namespace shows any.
         """
         own = self.get_namespace().rstrip('/')
-        found = self._graph.beside(f'{own}/', self._graph.generators)
-        return found or ('' if own else next(iter(self._graph.generators), ''))
+        name = self._graph.beside(f'{own}/', self._graph.generators)
+        return name or ('' if own else next(iter(self._graph.generators), ''))
 
     def _gone(self, page: Page) -> None:
         for view in self._views.values():
@@ -531,7 +531,7 @@ class Panel(StartedNode):
             return
         for message in view.messages():
             self._pages.send([page], message)
-        view.listen(self._graph, wanted=True)
+        view.listen(self._graph, listening=True)
 
     async def _on_request(self, page: Page, text: str | bytes) -> None:
         try:

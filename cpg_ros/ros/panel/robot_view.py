@@ -58,8 +58,8 @@ COMMON = ('qos_overrides.', 'start_type_description_service', 'use_sim_time')
 
 def unit(text: str) -> str:
     """Return the unit in a description, as in ``rate [Hz]``; '' if it has none."""
-    found = re.search(r'\[([^\]]+)\]', text)
-    return found[1] if found else ''
+    match = re.search(r'\[([^\]]+)\]', text)
+    return match[1] if match else ''
 
 
 class Controls:
@@ -86,26 +86,26 @@ class Controls:
         """
         names = [name for name in await self._node.parameters() if not name.startswith(COMMON)]
         described, values = await self._node.descriptors(names), await self._node.values(names)
-        known = {}
+        controls = {}
         for name, about, value in zip(names, described, values, strict=True):
             if about.type not in KINDS:
                 continue
             (span,) = (*about.floating_point_range, *about.integer_range)[:1] or (None,)
-            known[name] = {
+            controls[name] = {
                 'name': name, 'kind': KINDS[about.type], 'text': about.description,
                 'unit': unit(about.description), 'fixed': about.read_only,
                 'choices': choices(about.additional_constraints),
                 'presets': presets_among(about.additional_constraints),
                 'value': value,
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
-        self.known = known
+        self.known = controls
 
     def update(self, event: ParameterEvent) -> dict[str, Any]:
         """Store the changes of an event; return name -> value if they are this node's."""
         if event.node != self._node.name:
             return {}
-        values = {one.name: parameter_value_to_python(one.value)
-                  for one in event.changed_parameters if one.name in self.known}
+        values = {parameter.name: parameter_value_to_python(parameter.value)
+                  for parameter in event.changed_parameters if parameter.name in self.known}
         for name, value in values.items():
             self.known[name]['value'] = value
         return values
@@ -222,17 +222,17 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.known.values())})
-            known = await shape.ask(
+            info = await shape.ask(
                 self._watch, self._services, self.graph, self.name,
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
-            drawn = await asyncio.to_thread(shape.find, known, doubts.append)
+            drawn = await asyncio.to_thread(shape.find, info, doubts.append)
             doubts = list(dict.fromkeys(doubts))[:5]
             for doubt in doubts:
                 self._node.get_logger().warning(doubt)
             # A page sees folders only of files that the graph names, not of the panel's own.
-            named = ' '.join((known.robot, known.model, known.description))
-            doubts = [FOLDER.sub(lambda found: found[0] * (found[0] in named), doubt)
+            named = ' '.join((info.robot, info.model, info.description))
+            doubts = [FOLDER.sub(lambda names: names[0] * (names[0] in named), doubt)
                       for doubt in doubts]
             self._keep({**drawn.message(), 'doubts': doubts})
         except CallError as error:
@@ -249,7 +249,7 @@ class RobotView:
 
     # -- topics -----------------------------------------------------------------------------
 
-    def listen(self, graph: Graph, wanted: bool) -> None:
+    def listen(self, graph: Graph, listening: bool) -> None:
         """Subscribe to the topics on the graph, or to none if no page shows the generator."""
         self.graph = graph
         space, floats = self._space, 'std_msgs/msg/Float64MultiArray'
@@ -269,7 +269,7 @@ class RobotView:
                        if (name, floats) in graph.topics})
         if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
             topics[f'{space}/odom'] = Odometry, best_effort()
-        topics = topics if wanted else {}
+        topics = topics if listening else {}
         for name in set(self._topics) - set(topics):
             self._topics.pop(name).close()
         for name, (kind, quality) in topics.items():
@@ -283,16 +283,16 @@ class RobotView:
 
     def frame(self) -> dict[str, Any]:
         """Return what has changed since the last frame."""
-        found: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         fresh = False
         for name in [name for name in self._topics if name.endswith('/joint_states')]:
             if (joints := self._newest(name)) is not None:
                 self._joints.update(zip(joints.name, joints.position, strict=False))
-                found['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
+                values['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
                 fresh = True
         if fresh:
             self._names_message('joints', list(self._joints))
-            found['angles'] = _short(self._joints.values())
+            values['angles'] = _short(self._joints.values())
         for key, name in (('phases', f'{self.name}/phase'), ('cells', f'{self.name}/cells'),
                           ('forces', f'{self._space}/foot_contacts')):
             if (message := self._newest(name)) is not None:
@@ -302,15 +302,16 @@ class RobotView:
                                         if key != 'cells' else
                                         [f'{dimension.label}:{dimension.size}'
                                          for dimension in dimensions])
-                found[key] = _short(message.data)
+                values[key] = _short(message.data)
         if (moved := self._newest(f'{self._space}/odom')) is not None:
-            place, turn = moved.pose.pose.position, moved.pose.pose.orientation
+            position, turn = moved.pose.pose.position, moved.pose.pose.orientation
             speed = moved.twist.twist
-            found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
-            found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
+            values['base'] = _short((position.x, position.y, position.z,
+                                     turn.w, turn.x, turn.y, turn.z))
+            values['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
         if self.teleop.target != (0.0, 0.0):
-            found['steered'] = _short(self.teleop.target)
-        return found
+            values['steered'] = _short(self.teleop.target)
+        return values
 
     def _names_message(self, key: str, names: list[str]) -> None:
         """Send the pages the names of the numbers under a key, if they have changed."""
@@ -366,7 +367,7 @@ class RobotView:
 
     def close(self) -> None:
         """End subscriptions, publishers and clients."""
-        self.listen(self.graph, wanted=False)
+        self.listen(self.graph, listening=False)
         self.teleop.close()
         if self._pushes is not None:
             self._node.destroy_publisher(self._pushes)
@@ -412,7 +413,7 @@ class BridgeViews:
         self.message: dict[str, Any] = {}
         self._update()
 
-    def update(self, names: Iterable[str], wanted: bool) -> None:
+    def update(self, names: Iterable[str], listening: bool) -> None:
         """Subscribe to these bridges, or to none if no page is open."""
         names = set(names)
         for name in set(self._shown) - names:
@@ -425,7 +426,7 @@ class BridgeViews:
             # A client that the bridge does not know yet would delay a stop.
             for service in STOPS.values():
                 self._services.client(Trigger, f'{name}/{service}')
-        followed = names if wanted else set()
+        followed = names if listening else set()
         for name in set(self._states) - followed:
             self._states.pop(name).close()
         for name in followed - set(self._states):
@@ -465,8 +466,8 @@ class BridgeViews:
 
 def _read(status: DiagnosticStatus) -> dict[str, Any]:
     """Return what pages show of a bridge's status."""
-    found: dict[str, Any] = {'level': level(status),
-                             'text': status.message[:LONGEST], 'battery': None, 'hottest': None}
+    bridge: dict[str, Any] = {'level': level(status),
+                              'text': status.message[:LONGEST], 'battery': None, 'hottest': None}
     heat: list[tuple[float, str]] = []
     for pair in status.values:
         try:
@@ -476,9 +477,9 @@ def _read(status: DiagnosticStatus) -> dict[str, Any]:
         if not math.isfinite(value):
             continue
         if pair.key == 'battery [%]':
-            found['battery'] = value
+            bridge['battery'] = value
         elif pair.key.endswith('[deg C]'):
             heat.append((value, pair.key.removesuffix('[deg C]').strip()[:LONGEST]))
     if heat:
-        found['hottest'] = max(heat)
-    return found
+        bridge['hottest'] = max(heat)
+    return bridge

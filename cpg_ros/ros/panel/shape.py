@@ -87,10 +87,10 @@ class Link:
     colours: list[np.ndarray] = field(default_factory=list)
 
     def add(self, triangles: np.ndarray, colour: tuple[float, ...] = GREY,
-            place: np.ndarray | None = None, pose: np.ndarray | None = None) -> None:
+            offset: np.ndarray | None = None, pose: np.ndarray | None = None) -> None:
         """Add triangles, shape (n, 3, 3), m, in a frame within the link, in a colour."""
         turned = triangles if pose is None else triangles @ pose.T
-        self.vertices.append(turned if place is None else turned + place)
+        self.vertices.append(turned if offset is None else turned + offset)
         self.colours.append(np.broadcast_to(np.asarray(colour[:3]), (len(triangles), 3)))
 
 
@@ -128,8 +128,8 @@ class Shape:
         limits = {joint: [value if math.isfinite(value) else None for value in span]
                   for joint, span in self.limits.items()}
         return {'type': 'shape', 'source': self.source, 'links': links, 'limits': limits,
-                'feet': {leg: [index, *np.round(place, 5).tolist()]
-                         for leg, (index, place) in self.feet.items()}}
+                'feet': {leg: [index, *np.round(position, 5).tolist()]
+                         for leg, (index, position) in self.feet.items()}}
 
 
 def _base64(values: np.ndarray) -> str:
@@ -150,9 +150,9 @@ def box(half: np.ndarray) -> np.ndarray:
     faces = []
     for axis in range(3):
         for side in (-1.0, 1.0):
-            one, other = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+            across, other = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
             middle = side * np.eye(3)[axis]
-            a, b, c, d = (middle + s * one + t * other
+            a, b, c, d = (middle + s * across + t * other
                           for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
             faces += [(a, b, c), (a, c, d)]
     return np.array(faces) * np.asarray(half)
@@ -164,10 +164,11 @@ def turned(profile: np.ndarray) -> np.ndarray:
     ring = np.stack([profile[:, :1] * np.cos(angles), profile[:, :1] * np.sin(angles),
                      np.broadcast_to(profile[:, 1:], (len(profile), ROUND + 1))], -1)
     a, b, c, d = ring[:-1, :-1], ring[:-1, 1:], ring[1:, 1:], ring[1:, :-1]
-    found = np.concatenate([np.stack([a, b, c], -2).reshape(-1, 3, 3),
-                            np.stack([a, c, d], -2).reshape(-1, 3, 3)])
-    area = np.linalg.norm(np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]), axis=1)
-    return found[area > 1e-12]
+    triangles = np.concatenate([np.stack([a, b, c], -2).reshape(-1, 3, 3),
+                                np.stack([a, c, d], -2).reshape(-1, 3, 3)])
+    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0],
+                                   triangles[:, 2] - triangles[:, 0]), axis=1)
+    return triangles[area > 1e-12]
 
 
 def cylinder(radius: float, half: float) -> np.ndarray:
@@ -227,11 +228,11 @@ def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tupl
     shape = Shape(f"stick figure of '{name}'", [base], dict(limits or {}))
     for (leg, joints), end in zip(legs.items(), ends, strict=True):
         base.add(along(np.array([end[0], 0.0, 0.0]), end, 0.025), BODY)
-        parent, place = 0, end
+        parent, position = 0, end
         down = [k for k in range(len(joints)) if not (len(joints) >= 3 and k == 0)]
         length = LEG / max(len(down), 1)
         for k, joint in enumerate(joints):
-            link = Link(joint, parent, joint, place=place,
+            link = Link(joint, parent, joint, place=position,
                         axis=np.eye(3)[1 if k in down else 0])
             if k in down:
                 tip = np.array([0.0, 0.0, -length])
@@ -241,9 +242,9 @@ def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tupl
                 tip = np.array([0.0, 0.3 * np.sign(end[1]) * WIDE, 0.0])
                 link.add(along(np.zeros(3), tip, 0.025), BODY)
             shape.links.append(link)
-            parent, place = len(shape.links) - 1, tip
-        shape.links[parent].add(sphere(0.026), FOOT, place)
-        shape.feet[leg] = parent, place
+            parent, position = len(shape.links) - 1, tip
+        shape.links[parent].add(sphere(0.026), FOOT, position)
+        shape.feet[leg] = parent, position
     return shape
 
 
@@ -284,20 +285,20 @@ def from_model(name: str, robot: Robot) -> Shape:
 def _links(mujoco: Any, model: Any, body: int, parent: int, shape: Shape) -> int:
     """Add a body, as a link for each of its joints; return the index of the last one."""
     frame = _matrix(mujoco, model.body_quat[body])
-    place, last, name = model.body_pos[body], parent, model.body(body).name
+    position, last, name = model.body_pos[body], parent, model.body(body).name
     first = model.body_jntadr[body]
     for k in range(first, first + model.body_jntnum[body]) if parent >= 0 else ():
         joint, anchor = model.joint(k), model.jnt_pos[k]
         # To the joint's point; the next link goes back from there to the body's own frame.
         shape.links.append(Link(name, last, joint.name,
                                 model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE,
-                                model.jnt_axis[k].copy(), place + frame @ anchor, frame,
+                                model.jnt_axis[k].copy(), position + frame @ anchor, frame,
                                 float(model.qpos0[model.jnt_qposadr[k]])))
         if model.jnt_limited[k]:
             shape.limits[joint.name] = tuple(model.jnt_range[k])
-        last, frame, place = len(shape.links) - 1, np.eye(3), -anchor
-    if last == parent or np.any(place):
-        where = (np.zeros(3), np.eye(3)) if parent < 0 else (place.copy(), frame)
+        last, frame, position = len(shape.links) - 1, np.eye(3), -anchor
+    if last == parent or np.any(position):
+        where = (np.zeros(3), np.eye(3)) if parent < 0 else (position.copy(), frame)
         shape.links.append(Link(name, last, place=where[0], pose=where[1]))
     return len(shape.links) - 1
 
@@ -430,10 +431,10 @@ def _held(joint: JointDescription, parent: int) -> Link:
 def _numbers(text: str | None, default: str) -> np.ndarray:
     """Return as many numbers as the default has."""
     count = len(default.split())
-    found = np.array(numbers(text or default, count))
-    if not len(found) or not (np.abs(found) < FURTHEST).all():
+    values = np.array(numbers(text or default, count))
+    if not len(values) or not (np.abs(values) < FURTHEST).all():
         raise MeshError(f"'{(text or '')[:40]}' is not {count} numbers below {FURTHEST:g}")
-    return found
+    return values
 
 
 class _Drawing:
@@ -441,7 +442,8 @@ class _Drawing:
 
     def __init__(self, tree: Xml.Element, path: Path | None) -> None:
         self._path, self._folder = path, mesh_folder(tree)
-        self._colours = {one.get('name', ''): one for one in tree.findall('material')}
+        self._colours = {material.get('name', ''): material
+                         for material in tree.findall('material')}
         self._meshes: dict[Path, np.ndarray] = {}
         self._bytes, self._left = 0, TRIANGLES
 
@@ -453,19 +455,19 @@ class _Drawing:
 
         """
         origin, material = visual.find('origin'), visual.find('material')
-        place = _numbers(None if origin is None else origin.get('xyz'), '0 0 0')
+        position = _numbers(None if origin is None else origin.get('xyz'), '0 0 0')
         pose = rotation(tuple(_numbers(None if origin is None else origin.get('rpy'), '0 0 0')))
         colour = GREY if material is None else self._colour(material)
-        for one in visual.iterfind('geometry/*'):
-            found = self._solid(one)
-            if len(found) > self._left:
+        for solid in visual.iterfind('geometry/*'):
+            triangles = self._solid(solid)
+            if len(triangles) > self._left:
                 raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
-            self._left -= len(found)
-            link.add(found, colour, place, pose)
+            self._left -= len(triangles)
+            link.add(triangles, colour, position, pose)
 
     def _colour(self, material: Xml.Element) -> tuple[float, ...]:
-        for one in (material, self._colours.get(material.get('name', ''))):
-            if one is not None and (colour := one.find('color')) is not None:
+        for element in (material, self._colours.get(material.get('name', ''))):
+            if element is not None and (colour := element.find('color')) is not None:
                 return tuple(_numbers(colour.get('rgba'), '0.6 0.6 0.6 1'))
         return GREY
 
@@ -483,10 +485,10 @@ class _Drawing:
         if solid.tag != 'mesh':
             raise MeshError(f'<{solid.tag}> is not a URDF shape')
         name = solid.get('filename', '')
-        found = self._mesh(name) * _numbers(solid.get('scale'), '1 1 1')
-        if not (np.abs(found) < FURTHEST).all():
+        triangles = self._mesh(name) * _numbers(solid.get('scale'), '1 1 1')
+        if not (np.abs(triangles) < FURTHEST).all():
             raise MeshError(f'{name}: a vertex is further than {FURTHEST:g} m away')
-        return coarse(found)
+        return coarse(triangles)
 
     def _mesh(self, name: str) -> np.ndarray:
         path = find_mesh(name, self._path, self._folder)
@@ -494,11 +496,11 @@ class _Drawing:
             mesh = read_mesh(path)
             if not len(mesh.triangles):
                 raise MeshError(f'{path}: it has no triangles')
-            found = mesh.points[mesh.triangles]
-            self._bytes += found.nbytes
+            triangles = mesh.points[mesh.triangles]
+            self._bytes += triangles.nbytes
             if self._bytes > MESHES:
                 raise MeshError(f'{name}: the meshes have more than {MESHES / 1e6:g} MB')
-            self._meshes[path] = found
+            self._meshes[path] = triangles
         return self._meshes[path]
 
 
@@ -514,7 +516,7 @@ class ShapeError(CpgError):
 
 @dataclass(frozen=True)
 class RobotInfo:
-    """What the graph and the user specify about a robot.
+    """Data on a robot from the graph and the user.
 
     Attributes:
         urdf: file that the user names, '' for none.
@@ -596,18 +598,18 @@ async def _once(watch: Node, kind: type, name: str) -> Any:
         topic.close()
 
 
-def find(known: RobotInfo, report: Callable[[str], None]) -> Shape:
+def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 
     Args:
-        known: of the robot.
+        info: of the robot.
         report: takes a line about each better shape that is not available.
 
     """
-    robot = shipped_robot(known.robot)
+    robot = shipped_robot(info.robot)
     for make in (_from_urdf, _from_description, _from_model):
         try:
-            shape = make(known, robot, report)
+            shape = make(info, robot, report)
             if shape is not None and (size := len(json.dumps(shape.message()))) > LONGEST:
                 raise ShapeError(f'{shape.source} is not drawn: its shape has {size / 1e6:.3g} '
                                  f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
@@ -617,39 +619,39 @@ def find(known: RobotInfo, report: Callable[[str], None]) -> Shape:
         if shape is not None:
             # The generator respects the robot file's limits.
             shape.limits.update(_limits(robot))
-            _with_feet(shape, known, robot)
+            _with_feet(shape, info, robot)
             return shape
-    if robot is None and known.robot:
-        report(one_line(f"drawn as a stick figure: '{known.robot[:200]}' is not one of the "
+    if robot is None and info.robot:
+        report(one_line(f"drawn as a stick figure: '{info.robot[:200]}' is not one of the "
                         f"shipped "
                         'robots, and the panel opens no file that a node names; publish '
                         'robot_description, or start the panel with -p urdf:=FILE'))
-    return _sticks(known, robot)
+    return _sticks(info, robot)
 
 
-def _from_urdf(known: RobotInfo, _: Robot | None, report: Callable[[str], None]) -> Shape | None:
-    return from_file(Path(known.urdf).expanduser(), report) if known.urdf else None
+def _from_urdf(info: RobotInfo, _: Robot | None, report: Callable[[str], None]) -> Shape | None:
+    return from_file(Path(info.urdf).expanduser(), report) if info.urdf else None
 
 
-def _from_description(known: RobotInfo, _: Robot | None, report: Callable[[str], None]
+def _from_description(info: RobotInfo, _: Robot | None, report: Callable[[str], None]
                       ) -> Shape | None:
-    if not known.description:
+    if not info.description:
         return None
-    return from_text(known.description, 'robot_description', report)
+    return from_text(info.description, 'robot_description', report)
 
 
-def _from_model(known: RobotInfo, robot: Robot | None,
+def _from_model(info: RobotInfo, robot: Robot | None,
                 report: Callable[[str], None]) -> Shape | None:
     if robot is None:
         return None
-    model = known.model
+    model = info.model
     if '/' in model or model.endswith(('.xml', '.urdf')):
         report(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
                         'node names; publish robot_description, or start the panel with '
                         '-p urdf:=FILE'))
         model = ''
     shipped = not model
-    model = model or SHIPPED.get(known.robot, '')
+    model = model or SHIPPED.get(info.robot, '')
     if not model:
         return None
     if shipped and model.endswith('.urdf'):
@@ -661,38 +663,38 @@ def _limits(robot: Robot | None) -> dict[str, tuple[float, float]]:
     return {joint.name: (joint.lower, joint.upper) for joint in robot.joints} if robot else {}
 
 
-def _legs(known: RobotInfo, robot: Robot | None) -> dict[str, list[str]]:
+def _legs(info: RobotInfo, robot: Robot | None) -> dict[str, list[str]]:
     if robot is None:
-        return known.legs
+        return info.legs
     return {leg: [joint.name for joint in joints] for leg, joints in robot.legs.items()}
 
 
-def _with_feet(shape: Shape, known: RobotInfo, robot: Robot | None) -> None:
+def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
     index = {link.joint: k for k, link in enumerate(shape.links) if link.joint}
-    for leg, joints in _legs(known, robot).items():
+    for leg, joints in _legs(info, robot).items():
         ends = [index[joint] for joint in joints if joint in index]
         if not ends or leg in shape.feet:
             continue
         end = max(ends)
         # What is fixed to the last joint's link is the foot.
-        place = shape.links[end].place * 0.0
+        position = shape.links[end].place * 0.0
         tips = [link for link in shape.links if link.parent == end and not link.joint]
         if tips:
-            place = tips[-1].place
+            position = tips[-1].place
         elif shape.links[end].vertices:
             corners = shape.links[end].vertices[-1].reshape(-1, 3)
-            place = corners.mean(axis=0)
-        shape.feet[leg] = end, place
+            position = corners.mean(axis=0)
+        shape.feet[leg] = end, position
 
 
-def _sticks(known: RobotInfo, robot: Robot | None) -> Shape:
+def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
     if robot is None:
-        legs, name = known.legs, known.robot or 'a robot'
+        legs, name = info.legs, info.robot or 'a robot'
         # Of legs that are called as those of the shipped networks: lh rh lf rf, left right.
         places = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
                   for leg in legs}
     else:
-        legs, name = _legs(known, robot), robot.name
+        legs, name = _legs(info, robot), robot.name
         places = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
                         -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
     return draw(name, legs, places, _limits(robot))

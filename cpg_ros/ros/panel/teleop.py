@@ -249,8 +249,9 @@ class Teleop:
         if self._publisher is not None and not self._own:
             self._own = self._named() - self._before
         self.others = {
-            gid: node_of(one) for one in self._node.get_publishers_info_by_topic(self._topic)
-            if (gid := bytes(one.endpoint_gid)) not in self._own}
+            gid: node_of(publisher)
+            for publisher in self._node.get_publishers_info_by_topic(self._topic)
+            if (gid := bytes(publisher.endpoint_gid)) not in self._own}
 
     def _open(self) -> None:
         self._before = self._named()
@@ -259,10 +260,10 @@ class Teleop:
 
     def _named(self) -> set[bytes]:
         """Return the ids of publishers of nodes with this name, which others may have, too."""
-        return {bytes(one.endpoint_gid)
-                for one in self._node.get_publishers_info_by_topic(self._topic)
-                if (one.node_name, one.node_namespace) == (self._node.get_name(),
-                                                           self._node.get_namespace())}
+        return {bytes(publisher.endpoint_gid)
+                for publisher in self._node.get_publishers_info_by_topic(self._topic)
+                if (publisher.node_name, publisher.node_namespace) == (self._node.get_name(),
+                                                                       self._node.get_namespace())}
 
     def close(self) -> None:
         """Destroy the publisher."""

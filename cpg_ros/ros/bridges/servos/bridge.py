@@ -82,7 +82,7 @@ class ServoBridge(BridgeNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    return run(ServoBridge, NAME, 'Leads a robot of servos by what a generator publishes.', SPECS,
+    return run(ServoBridge, NAME, "Drives a robot with servos from a generator's output.", SPECS,
                args)
 
 

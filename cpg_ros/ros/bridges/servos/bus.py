@@ -214,7 +214,7 @@ class ServoBus(StartedNode):
 
     def _take(self, sender: str, angles: np.ndarray, now: float) -> None:
         """Apply a command, or disable torque if it has no angles or cannot be used."""
-        wanted, owner = len(self._calibration.joints), self._owner
+        count, owner = len(self._calibration.joints), self._owner
         if not angles.size:
             if owner.may_release(sender):
                 self._release('as commanded', owner.blocked)
@@ -227,8 +227,8 @@ class ServoBus(StartedNode):
             self._refuse(f'commands of {sender or self._others or "a nameless sender"}: ' + (
                 'servo torque was disabled in its absence' if owner.sender is None else
                 f'the servos are driven by {owner.sender or "a nameless sender"}'), now)
-        elif len(angles) != wanted:
-            self._release(f'a command has {len(angles)} angles for {wanted} servos', sender)
+        elif len(angles) != count:
+            self._release(f'a command has {len(angles)} angles for {count} servos', sender)
         elif not np.isfinite(angles).all():
             self._release('a command is not a number', sender)
         else:

@@ -30,7 +30,7 @@ class CalibrationError(CpgError):
 
 @dataclass(frozen=True)
 class Kind:
-    """What a kind of board allows.
+    """Limits of a kind of board.
 
     Attributes:
         last: largest channel or identity.
@@ -84,8 +84,8 @@ class Calibration(ShortRepr):
 
     def units(self, angles: np.ndarray) -> np.ndarray:
         """Return the units of angles, rad: whole numbers within the servos' limits."""
-        wanted = np.clip(self.centre + self.per_rad * angles, self.lower, self.upper)
-        return np.round(wanted).astype(int)
+        targets = np.clip(self.centre + self.per_rad * angles, self.lower, self.upper)
+        return np.round(targets).astype(int)
 
     def angles(self, units: np.ndarray) -> np.ndarray:
         """Return the angles of units, rad."""

@@ -45,7 +45,7 @@ class ServoBoard(Protocol):
         """Return the measured positions, shape (servos,); None if a servo does not answer."""
 
     def detach(self) -> None:
-        """Let all servos go: no pulses, no torque."""
+        """Disable the torque of all servos."""
 
     def close(self) -> None:
         """Give the bus back."""
@@ -66,9 +66,9 @@ class SerialPort:
         """
         speed = getattr(termios, f'B{baud}', None)
         if speed is None:
-            known = sorted(int(name[1:]) for name in dir(termios)
+            rates = sorted(int(name[1:]) for name in dir(termios)
                            if name[0] == 'B' and name[1:].isdecimal() and int(name[1:]) >= 9600)
-            raise ServoError(f'baud {baud} is not one of {", ".join(map(str, known))}')
+            raise ServoError(f'baud {baud} is not one of {", ".join(map(str, rates))}')
         self._file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         try:
             tty.setraw(self._file)
@@ -148,20 +148,20 @@ class SerialBoard(ServoBoard):
 
     def read(self) -> np.ndarray | None:
         """Ask all servos where they are; None if one does not answer within ANSWER s."""
-        found: dict[int, int] = {}
+        values: dict[int, int] = {}
         for question, count in self._protocol.questions(self._servos):
             self._port.forget()
             self._port.send(question)
             until, received = time.monotonic() + ANSWER, bytearray()
-            missing = len(found) + count
-            while len(found) < missing and (data := self._port.receive(until)):
+            missing = len(values) + count
+            while len(values) < missing and (data := self._port.receive(until)):
                 received += data
                 for reply in self._protocol.replies(received):
                     if reply.servo in self._servos:
-                        found[reply.servo] = self._value(reply)
-            if len(found) < missing:
+                        values[reply.servo] = self._value(reply)
+            if len(values) < missing:
                 return None
-        return np.array([found[servo] for servo in self._servos])
+        return np.array([values[servo] for servo in self._servos])
 
     def _value(self, reply: Reply) -> int:
         if reply.error:

@@ -130,13 +130,13 @@ class Announcements:
 
     def check(self) -> str:
         """Return which harmful participant has announced itself since the last call, or ''."""
-        found = ''
+        hazard = ''
         while self._socket.fileno() >= 0:
             try:
-                found = harmful(self._socket.recv(65536)) or found
+                hazard = harmful(self._socket.recv(65536)) or hazard
             except BlockingIOError:
                 break
-        return found
+        return hazard
 
     def close(self) -> None:
         """Close the socket."""
@@ -359,9 +359,9 @@ class UnitreeBridge(BridgeNode):
 
     def network_hazard(self) -> str:
         """Return a participant that crashes the robot's software, or ''."""
-        found = self._announcements.check()
-        return found and (f'{found} is on this network: it crashes the 0.10 in '
-                          "Unitree's firmware; stop it")
+        hazard = self._announcements.check()
+        return hazard and (f'{hazard} is on this network: it crashes the 0.10 in '
+                           "Unitree's firmware; stop it")
 
     def publish_measurements(self, stamp: int) -> None:
         """Publish ``joint_states``, ``imu`` and ``foot_contacts``."""
@@ -383,7 +383,7 @@ class UnitreeBridge(BridgeNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    return run(UnitreeBridge, NAME, 'Leads a Unitree robot by what a generator publishes.', SPECS,
+    return run(UnitreeBridge, NAME, "Drives a Unitree robot from a generator's output.", SPECS,
                args)
 
 

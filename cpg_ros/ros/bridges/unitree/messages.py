@@ -231,7 +231,7 @@ class LowState(RobotState):
 
     @property
     def charge(self) -> float:
-        """Of the battery, from 0 to 1."""
+        """Charge of the battery, from 0 to 1."""
         return self._number('soc') / 100.0
 
     @property
@@ -241,7 +241,7 @@ class LowState(RobotState):
 
     @property
     def voltage(self) -> float:
-        """Of the battery, V."""
+        """Voltage of the battery, V."""
         return self._number('voltage')
 
     @property
@@ -251,7 +251,7 @@ class LowState(RobotState):
 
     @property
     def imu_temperature(self) -> int:
-        """Of the IMU, deg C."""
+        """Temperature of the IMU, deg C."""
         return int(self._number('imu_temperature'))
 
     @property
