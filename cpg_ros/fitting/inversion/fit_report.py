@@ -20,6 +20,7 @@ from typing import Any
 
 from cpg_ros.common.command_line import table
 from cpg_ros.common.report_page import html_table, image, page
+from cpg_ros.fitting.gaits.leg_names import role_of
 from cpg_ros.fitting.inversion import stride_report
 from cpg_ros.fitting.inversion.paper_fit import PaperFit
 from cpg_ros.fitting.inversion.recording_fit import POOR, RecordingFit
@@ -85,6 +86,35 @@ def joint_figure(found: RecordingFit) -> Figure:
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
                     f'{fit.order}{": a poor fit" if found.poor else ""}', fontsize=10,
                     color=FITTED if found.poor else _text())
+    return figure
+
+
+def stride_curves(found: RecordingFit) -> Figure:
+    """Draw the joints' angles over 0 to 100 % of the stride, legs side by side."""
+    curves = stride_report.normalised(found, stride_report.strides_of(found))
+    panels: dict[str, list[tuple[str, np.ndarray, np.ndarray]]] = {}
+    for leg, name, mean, spread in curves:
+        panels.setdefault(role_of(name) or name, []).append((leg, mean, spread))
+    figure, grid = _grid(max(1, len(panels)), 2.2)
+    legs, share = list(found.stride.phases), np.linspace(0.0, 100.0, len(found.stride.theta) + 1)
+    for axes, (role, own) in zip(grid, panels.items(), strict=False):
+        for leg, *rows in own:
+            # The end of the stride is its begin.
+            mean, spread = (np.append(row, row[0]) for row in rows)
+            color = LINES[legs.index(leg) % len(LINES)]
+            if found.stride.cycles > 1:
+                axes.fill_between(share, mean - spread, mean + spread, color=color, alpha=0.2,
+                                  linewidth=0.0)
+            axes.plot(share, mean, color=color, linewidth=1.4, label=leg)
+        axes.set_title(role, fontsize=9, loc='left')
+        axes.set_ylabel('angle [deg]', fontsize=8)
+        axes.set_xlabel('stride [%]', fontsize=8)
+        axes.set_xlim(0.0, 100.0)
+        axes.legend(fontsize=7, frameon=False)
+    band = ', bands: standard deviation of strides' if found.stride.cycles > 1 else ''
+    begin = ('touchdown' if found.stride.contacts is not None
+             else 'the foremost or largest angle of each leg')
+    figure.suptitle(f'Angles over the stride, 0 % is {begin}{band}', fontsize=10)
     return figure
 
 
@@ -268,7 +298,10 @@ def _shares(found: RecordingFit) -> str:
 def as_text(found: RecordingFit) -> str:
     """Return the report for a terminal."""
     notes = [*found.recording.notes, *found.stride.notes]
-    lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
+    legs = stride_report.strides_of(found)
+    lines = [*_stride(found), '', *table(stride_report.gait_summary(found, legs), '<>'), '',
+             *table(stride_report.ranges(found), '<>>>>'), '',
+             *table(parameters(found), '<>>'), '',
              *table(joints(found), '<>>>'), _shares(found), '']
     if len(found.fit.starts) > 1:
         lines += [*table(starts(found), '<>>'), _minima(found), '']
@@ -317,9 +350,12 @@ def _warned(found: RecordingFit) -> str:
 
 
 def _strides(found: RecordingFit) -> list[str]:
-    """Return the sections on single strides, that of each stride folded."""
+    """Return the sections on the gait and its strides, that of each stride folded."""
     legs = stride_report.strides_of(found)
-    parts = ['<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
+    parts = ['<h2>Gait</h2>', _html_table(stride_report.gait_summary(found, legs)),
+             _image(stride_curves(found), 'Angles over the stride'),
+             _html_table(stride_report.ranges(found)),
+             '<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
              _html_table(stride_report.by_leg(legs))]
     if len(pairs := stride_report.symmetry(legs)) > 1:
         parts += ['<p>Symmetry index, 0 where both sides are alike:</p>', _html_table(pairs)]
@@ -333,10 +369,9 @@ def as_html(found: RecordingFit) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
 
     title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
-    parts = [_warned(found), paragraphs(_stride(found)), '<h2>Parameters</h2>',
+    parts = [_warned(found), paragraphs(_stride(found)), *_strides(found), '<h2>Parameters</h2>',
              _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
              paragraphs([_shares(found)]), _html_table(joints(found))]
-    parts += _strides(found)
     for name, draw in FIGURES:
         parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
     parts += ['<h2>Starts</h2>', _html_table(starts(found)), paragraphs([_minima(found)])]

@@ -274,6 +274,72 @@ def by_leg(legs: list[LegStrides]) -> Rows:
     return rows
 
 
+def gait_summary(found: RecordingFit, legs: list[LegStrides]) -> Rows:
+    """Rows of what a gait laboratory reports: quantity and value, with a head."""
+    periods = np.concatenate([one.periods for one in legs])
+    stride, contacts = found.stride, found.stride.contacts
+    scatter = f' +- {periods.std(ddof=1):.3f}' if len(periods) >= FEWEST else ''
+    rows: Rows = [
+        ('quantity', 'value'),
+        ('cadence [steps/min]', f'{120.0 * stride.frequency:.1f}') if len(legs) == 2 else
+        ('stride rate [strides/min]', f'{60.0 * stride.frequency:.1f}'),
+        ('stride time [s]', f'{1.0 / stride.frequency:.3f}{scatter}')]
+    for one in legs:
+        share = 100.0 * one.fractions
+        if len(share) and np.isfinite(share).all():
+            names = ('stance', 'swing') if one.by_contacts else ('retraction', 'protraction')
+            rows += [(f'{name} of {one.leg} [% of stride]', f'{value:.1f}') for name, value in zip(
+                names, (share.mean(), 100.0 - share.mean()), strict=True)]
+        else:
+            rows.append((f'retraction of {one.leg} [% of stride]', 'cannot tell'))
+    if contacts is None:
+        rows.append(('stance, swing, double support', 'not known without loads on the feet'))
+    elif len(legs) == 2:
+        rows.append(('double support [% of stride]',
+                     f'{100.0 * float(contacts.down.all(axis=1).mean()):.1f}'))
+    if contacts is not None:
+        rows.append(('flight [% of stride]', f'{100.0 * contacts.flight:.1f}'))
+    rows.append(('stride length', 'not known: joint angles do not tell how far the body travels'))
+    return rows
+
+
+def ranges(found: RecordingFit) -> Rows:
+    """Rows of the joints' mean cycles in degrees, with a head."""
+    stride = found.stride
+    rows: Rows = [('joint', 'least [deg]', 'largest [deg]', 'range [deg]',
+                   'scatter of strides [deg]')]
+    for name, mean, spread in zip(stride.joints, np.degrees(stride.mean),
+                                  np.degrees(stride.spread), strict=True):
+        scatter = f'{spread.mean():.1f}' if stride.cycles > 1 else 'one stride'
+        rows.append((name, f'{mean.min():.1f}', f'{mean.max():.1f}', f'{np.ptp(mean):.1f}',
+                     scatter))
+    return rows
+
+
+def normalised(found: RecordingFit, legs: list[LegStrides]
+               ) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
+    """Return the joints' mean cycles from the begin of their leg's stride on.
+
+    Returns:
+        Of each joint its leg, its name, and the angle and its standard deviation at the phases
+        of the mean cycle, deg, shape (m,).
+
+    """
+    stride, curves = found.stride, []
+    for one in legs:
+        if not len(one.begins):
+            continue
+        # The mean of phases that lie round the seam.
+        begin = np.angle(np.exp(2j * np.pi * stride.warp(one.begins)).mean()) / (2.0 * np.pi)
+        for name in found.legs[one.leg]:
+            if name in stride.joints:
+                k = stride.joints.index(name)
+                mean, spread = (np.interp(stride.theta + begin, stride.theta, row[k], period=1.0)
+                                for row in (stride.mean, stride.spread))
+                curves.append((one.leg, name, np.degrees(mean), np.degrees(spread)))
+    return curves
+
+
 def symmetry(legs: list[LegStrides]) -> Rows:
     """Rows of the symmetry index of left and right legs, in percent; a head alone for none.
 

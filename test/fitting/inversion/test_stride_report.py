@@ -77,5 +77,29 @@ def test_the_tool_writes_the_table_and_the_page(tmp_path, capsys):
     assert main([*command, str(page)]) == 0
     assert all(words in page.read_text() for words in (
         '<h2>Strides</h2>', 'Symmetry index', 'Every stride', 'left - right'))
+    # What a gait laboratory reads comes first: 1.1 strides, 2.2 steps a second.
+    text = page.read_text()
+    assert text.index('cadence [steps/min]') < text.index('<h2>Parameters</h2>')
+    assert '>132.0<' in text and '>0.909 +-' in text
+    assert 'not known without loads on the feet' in text
+    printed = capsys.readouterr().out
+    assert printed.index('cadence [steps/min]') < printed.index('parameter')
     assert main([*command, str(tmp_path / 'strides.xls')]) == 2
     assert 'does not end in .html or .csv' in capsys.readouterr().err
+
+
+def test_stance_swing_and_double_support_are_those_of_loads(tmp_path, capsys):
+    # Each foot stands 60 % of the stride, half a stride apart: both do in 20 % of it.
+    time = np.arange(800) / 100.0
+    flexions = angles(time)
+    loads = [((1.1 * time + phase) % 1.0 < 0.6).astype(float) for phase in (0.0, 0.5)]
+    path = tmp_path / 'walk.csv'
+    np.savetxt(path, np.column_stack([time, flexions, *loads]), delimiter=',', comments='',
+               header='time,left_hip,left_knee,left_ankle,right_hip,right_knee,right_ankle,'
+                      'left_contact,right_contact')
+    assert main(['--csv', str(path), '--network', 'phase', '--gait', 'walk']) == 0
+    rows = dict(line.rsplit(maxsplit=1) for line in capsys.readouterr().out.splitlines()
+                if '[% of stride]' in line)
+    for name, share in (('stance of left', 60.0), ('swing of right', 40.0),
+                        ('double support', 20.0), ('flight', 0.0)):
+        assert float(rows[f'{name} [% of stride]']) == pytest.approx(share, abs=1.5)
