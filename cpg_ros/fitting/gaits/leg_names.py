@@ -22,7 +22,7 @@ or more may be counted from the head on: L1_coxa ... R3_tibia. Bipeds: left, rig
 alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll: LLEG_HIP_R.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import re
 
@@ -40,7 +40,7 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
          'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
 #: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
-         'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
+         'thumb', 'hand', 'wheel', 'caster', 'rotor', 'eye', 'ear', 'camera', 'antenna'}
 UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 #: Names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
@@ -126,9 +126,9 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
     return (sides.pop() if len(sides) == 1 else '', ends.pop() if len(ends) == 1 else '')
 
 
-def no_leg(joints: Sequence[str]) -> bool:
-    """Whether the names of a limb's joints are those of an arm, a head, a tail or the like."""
-    return any(OTHER & set(_moved(words_of(name))) for name in joints[:-1] or joints)
+def no_leg(joints: Sequence[str], words: Collection[str] = OTHER) -> bool:
+    """Whether names of a limb's joints, but the last, have words of an arm, a head or the like."""
+    return any(not set(words).isdisjoint(_moved(words_of(name))) for name in joints[:-1] or joints)
 
 
 def role_of(name: str) -> str:

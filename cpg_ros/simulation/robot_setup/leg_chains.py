@@ -22,7 +22,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from cpg_ros.fitting.gaits.leg_names import Legs, legs_of, LegsError, no_leg, place_of
+from cpg_ros.fitting.gaits.leg_names import Legs, legs_of, LegsError, no_leg, place_of, UPPER
 from cpg_ros.motion.description import (
     DescriptionError,
     JointDescription,
@@ -83,8 +83,14 @@ def legs_in(known: RobotDescription, forward: str = '',
             place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
         found = {0: legs}
     if not found:
-        # Nothing has a place or a length, or no two limbs are alike: only names are left.
-        return legs_of([joint.name for joint in known.joints.values() if not joint.flaw], True)
+        names = [joint.name for joint in known.joints.values() if not joint.flaw]
+        if np.ptp([known.frame(name)[0] for name in names] or [0.0], axis=0).max() < 1e-6:
+            # Nothing has a place: only names are left.
+            return legs_of(names, True)
+        raise LegsError(
+            f'no legs are found among {", ".join(names[:6])} ...: no two limbs of two or more '
+            'joints that reach down are mirror images of each other; --legs LEG=TEXT ... states a '
+            "part of the joints' names of each leg")
     fitting = [turn for turn in found if forward or not _misnamed(found[turn])]
     if not fitting:
         raise LegsError(_contradiction(known, next(iter(found.values()))))
@@ -125,7 +131,7 @@ def _assigned(known: RobotDescription, paths: Sequence[Sequence[str]], turn: int
     ahead = np.round([np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
     pairs = _pairs(_limbs(known, paths, left), left)
-    legs = [pair for pair in pairs if not any(no_leg(chain.joints) for chain in pair)] or pairs
+    legs = [pair for pair in pairs if not any(no_leg(chain.joints) for chain in pair)]
     if not legs:
         return {}
     lowest = min(legs, key=lambda pair: pair[0].bottom)[0]
@@ -133,7 +139,7 @@ def _assigned(known: RobotDescription, paths: Sequence[Sequence[str]], turn: int
             if pair[0].bottom <= lowest.bottom + SHORTER * lowest.length
             and pair[0].anchor[2] <= lowest.anchor[2] + HIGHER * lowest.length]
     legs.sort(key=lambda pair: float(pair[0].anchor @ ahead))
-    if len(legs) > 3:
+    if len(legs) > 3 or (len(legs) == 1 and no_leg(legs[0][0].joints, UPPER)):
         return {}
     return dict(zip(leg_names(2 * len(legs)), (chain.joints for pair in legs for chain in pair),
                     strict=True))

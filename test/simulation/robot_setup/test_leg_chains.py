@@ -105,6 +105,29 @@ def test_arms_and_fingers_are_not_legs(urdf):
     assert 'left_elbow' in legs.unassigned
 
 
+@pytest.mark.parametrize('urdf', [
+    robot(*(joint(f'{side}_wheel_{end}', 'base', (x, y, 0), (0, 1, 0), kind='continuous')
+            for side, y in (('left', 0.2), ('right', -0.2)) for end, x in (('a', 0.2),
+                                                                          ('b', -0.2)))),
+    robot(*(part for side, y in (('left', 0.2), ('right', -0.2)) for part in (
+        joint(f'{side}_shoulder', 'base', (0, y, 0.3), (0, 1, 0)),
+        joint(f'{side}_elbow', f'{side}_shoulder_l', (0, 0, -0.2), (0, 1, 0)))))],
+    ids=['wheels', 'arms alone'])
+def test_what_has_no_legs_is_refused(urdf):
+    with pytest.raises(LegsError, match='--legs LEG=TEXT'):
+        legs_of(urdf)
+
+
+def test_limits_of_ros2_control_count():
+    urdf = robot(joint('knee', 'base', (0, 0, 0), (0, 1, 0))).replace('</robot>', (
+        '<ros2_control><joint name="knee"><command_interface name="position"><param name="min">'
+        '-0.5</param><param name="max">2</param></command_interface><command_interface '
+        'name="velocity"><param name="max">3</param></command_interface></joint></ros2_control>'
+        '</robot>'))
+    knee = describe(parse_tree(urdf.encode(), 'r'), 'r').joints['knee']
+    assert (knee.lower, knee.upper, knee.velocity) == (-0.5, 1.5, 3.0)
+
+
 @pytest.mark.parametrize('names', [
     {'lf': 'leg1', 'rf': 'leg2', 'lh': 'leg3', 'rh': 'leg4'},
     {'lf': 'L1', 'rf': 'R1', 'lh': 'L2', 'rh': 'R2'},
