@@ -277,7 +277,7 @@ class _Table:
     def _time(self, headers: list[str], option: str | None) -> Column:
         """Find the time column, or that of the seconds beside one of nanoseconds."""
         self.rest, self.shares = -1, False
-        found = []
+        found: list[tuple[int, str, str | None]] = []
         for k, header in enumerate(headers):
             name, unit = split(header)
             match = TIME.match(name)
@@ -297,8 +297,8 @@ class _Table:
         self.shares = not found and len(shares) == 1
         if self.shares:
             return Column(shares[0], headers[shares[0]], '', 0.01)
-        found = found or [(k, name, None) for k, name in enumerate(names)
-                          if RECEIPT.match(name)][:1]
+        if not found:
+            found += [(k, name, None) for k, name in enumerate(names) if RECEIPT.match(name)][:1]
         if len(found) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '
