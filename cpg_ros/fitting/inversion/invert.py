@@ -135,7 +135,9 @@ EVEN = 0.5
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4
 #: Relative change at which a trust region stops, and at which the last one does.
-TOLERANCE, LAST = 1e-6, 1e-8
+TOLERANCE, LAST = 1e-3, 1e-8
+#: A minimum may be as good as the best if its cost is less than this many times the least.
+NEARLY = 2.0
 #: Times that joints are weighted anew, and the relative change of a weight that is none.
 WEIGHINGS, SAME = 4, 0.02
 #: Halvings that find where the generator begins to reject the gait.
@@ -302,11 +304,16 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
         agrees = problem.readout.agreement(problem.joints.names, readouts(there))
         return agrees or problem.stance_share(there)
 
-    found = [values]
+    found, least = [values], problem.cost(values)
     for trial in trials:
         if not trial.why and all(distinct(trial.values[:-1], one[:-1]) for one in found):
-            found.append(trial.values)
-    most = problem.cost(values) + _as_good(problem, values)
+            there = trial.values
+            if problem.cost(there) <= NEARLY * least:
+                # Joints were weighted otherwise where it was found.
+                there = problem.coordinates.descend(problem, there, TOLERANCE).values
+                problem.hold(there)
+            found.append(there)
+    most = least + _as_good(problem, values)
     best = max((one for one in found if problem.cost(one) <= most), key=meant)
     turned = [one for one in found if float(np.sum(readouts(one) * readouts(values))) < 0.0]
     if any(one is best for one in turned):

@@ -105,6 +105,13 @@ def test_a_file_less_recording_says_that_stance_may_be_swing():
                for line in walk.warnings)
 
 
+def test_a_robot_file_tells_stance_from_swing_where_joints_are_weighted_anew():
+    for seed in (0, 1):
+        found = fit_recording(generated('hexapod', 'phase6', 'tripod', seed),
+                              load_robot('hexapod'), 'phase6', 'tripod')
+        assert held(found, gait_duty=0.573)
+
+
 @pytest.mark.parametrize('duty', [0.45, 0.7, 0.75, 0.8])
 @pytest.mark.parametrize('seed', [None, 1])
 def test_several_starts_find_the_duty_of_hopf(duty, seed):
