@@ -322,7 +322,8 @@ def _controlled(element: Element, joint: JointDescription) -> JointDescription:
                 limits['upper'] = min(limits['upper'], *value)
             elif value and key == ('velocity', 'max'):
                 limits['velocity'] = min(limits['velocity'], *value)
-    return replace(joint, **limits)
+    return replace(joint, lower=limits['lower'], upper=limits['upper'],
+                   velocity=limits['velocity'])
 
 
 def mesh_folder(tree: Element) -> str:
@@ -387,7 +388,7 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     """Return a link; what is no number counts as not there."""
     mass = radius = 0.0
     centre: tuple[float, ...] = ()
-    shapes = []
+    shapes: list[Shape] = []
     for part in element.iterfind('inertial/mass'):
         mass = sum(numbers(part.get('value', ''), 1))
     for collision in element.iterfind('collision'):

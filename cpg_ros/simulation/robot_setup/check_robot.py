@@ -222,7 +222,7 @@ def _bent(known: RobotDescription, names: list[str], bent: tuple[str, str], ankl
     if min(abs(upper), abs(lower)) < 1e-6:
         upper = lower = -1j
     zero, usual = float(np.angle(lower / upper)), -UPRIGHT if legs == 2 else CROUCHED
-    best: tuple[float, ...] = (inf,)
+    best = (inf, 0.0, 0.0, 1.0)
     for share in BENDS:
         knee, knee_off = _nearest_to(known.joints[bent[1]], ways[1] * (zero - share * usual))
         bend = zero - ways[1] * knee

@@ -22,6 +22,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from cpg_ros.common.errors import ShortRepr
 from cpg_ros.fitting.gaits.leg_names import Legs, legs_of, LegsError, no_leg, place_of, UPPER
 from cpg_ros.motion.description import (
     DescriptionError,
@@ -45,8 +46,8 @@ SHORTER, HIGHER = 0.35, 0.4
 CROSSWISE = 1.3
 
 
-@dataclass(frozen=True)
-class Chain:
+@dataclass(frozen=True, repr=False)
+class Chain(ShortRepr):
     """Joints of a limb, outwards; where its first one is, m, and its stretched length, m."""
 
     joints: tuple[str, ...]
@@ -84,7 +85,8 @@ def legs_in(known: RobotDescription, forward: str = '',
         found = {0: legs}
     if not found:
         names = [joint.name for joint in known.joints.values() if not joint.flaw]
-        if np.ptp([known.frame(name)[0] for name in names] or [0.0], axis=0).max() < 1e-6:
+        places = [known.frame(name)[0] for name in names] or [np.zeros(3)]
+        if np.ptp(places, axis=0).max() < 1e-6:
             # Nothing has a place: only names are left.
             return legs_of(names, True)
         raise LegsError(
