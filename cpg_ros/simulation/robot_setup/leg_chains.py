@@ -46,7 +46,7 @@ SHORTER, HIGHER = 0.35, 0.4
 CROSSWISE = 1.3
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Chain(ShortRepr):
     """Joints of a limb, outwards; where its first one is, m, and its stretched length, m."""
 
