@@ -69,10 +69,6 @@ class InputMonitor:
         """Whether messages have come, none of them valid."""
         return self.believed == -math.inf and bool(self._wrong)
 
-    def latency(self, now: float) -> float:
-        """Time since the last valid measurement by its stamp, s; 0 without stamps."""
-        return 0.0 if self._measured == -math.inf else max(now - self._measured, 0.0)
-
     def gap(self, now: float) -> float:
         """Time since the last valid message, s, at most 1."""
         return min(now - self.believed, 1.0)

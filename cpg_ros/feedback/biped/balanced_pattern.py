@@ -20,14 +20,7 @@ from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import STAND, WALK
 from cpg_ros.feedback.biped.stepping import swing_share, WALKS
-from cpg_ros.feedback.biped.substitutes import (
-    ADOPTED,
-    EXTRAPOLATED,
-    FEET,
-    IMU,
-    JOINTS,
-    Substitutes,
-)
+from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, FEET, IMU, JOINTS, Substitutes
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
@@ -53,11 +46,6 @@ SETTLED, PATIENCE = 0.3, 4.0
 PASSING = 0.38, 0.6
 #: A foot in the middle of its swing that bears so many times the other's load contradicts.
 CONTRARY = 4.0
-#: While both feet stand, each with this share of the weight for a time in s, soles are level: by
-#: the joints alone they may not differ by more, and by the IMU, too, not lean by more, rad.
-PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.12, 0.12, 0.06
-#: A robot that leans more than this while it holds the stand, rad, topples.
-TOPPLES = 0.05
 #: Inputs that failed count as valid again after this time, s.
 GOOD = 0.3
 #: Joints that move further than this from tick to tick, rad and rad/s, were moved by hand.
@@ -88,8 +76,7 @@ class BalancedPattern(Pattern):
         balancing: whether the feedback bears the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
         falls: how often it fell.
-        ages: of inertial unit, joints and feet, s, shape (3,): since the last valid values came.
-        latencies: the same since they were measured.
+        ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
         failed: whether an input is out.
         doubts: input -> how it contradicts the others, until the pattern is enabled
             anew, or the robot falls.
@@ -107,11 +94,9 @@ class BalancedPattern(Pattern):
         self.wish = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
-        self.ages, self.latencies = np.zeros(3), np.zeros(3)
-        self.failed, self.refused, self.crouching = False, False, False
+        self.ages, self.failed, self.refused, self.crouching = np.zeros(3), False, False, False
         self.doubts: dict[int, str] = {}
         self._contrary, self._gap, self._measured = 0.0, math.inf, np.zeros(1)
-        self._uneven, self._unchanged = 0.0, np.zeros(1)
         self._good, self._blind = GOOD, False
         self._held, self._still = False, np.zeros_like(self._offset)
         self._start, self._pose = self._offset.copy(), self._offset
@@ -201,8 +186,7 @@ class BalancedPattern(Pattern):
         if sensors is not None:
             assert self._substitutes is not None
             self._doubt(balance, sensors, dt)
-            sensors = self._substitutes.fill(sensors, self.ages, self.latencies,
-                                             balance.memory, dt)
+            sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
             self._watch(balance, sensors, dt)
         self._good = 0.0 if self.failed or self.doubts else self._good + dt
         if self.balancing and self._gives_up(balance, sensors, dt):
@@ -227,20 +211,16 @@ class BalancedPattern(Pattern):
         self._crouch, self._depth = crouch_pose(self.robot, balance.links) or (self._offset, 0.0)
 
     def _gives_up(self, balance: BipedFeedback, sensors: SensorData | None, dt: float) -> bool:
-        """Return whether to crouch now instead of balancing any longer.
-
-        A crouch that begins in a walk waits for the moment at which the body is over the foot
-        that stands.
-        """
+        """Return whether to crouch now instead of balancing any longer."""
         if not (self._stops or self._lowers):
             self._waited = self._failing = 0.0
             self._blind = False
             return sensors is None
         self._failing += dt
         self._waited = self._waited + dt if balance.mode == STAND else 0.0
-        self._blind = (self._blind or min(self.ages[IMU], self.ages[JOINTS]) > EXTRAPOLATED
-                       or (self._stops and self._failing > PATIENCE))
+        self._blind = self._blind or min(self.ages[IMU], self.ages[JOINTS]) > EXTRAPOLATED
         return (sensors is None or self._waited > SETTLED
+                or (self._stops and self._failing > PATIENCE)
                 or (self._blind and (balance.mode != WALK or self._passes(balance))))
 
     @property
@@ -303,59 +283,22 @@ class BalancedPattern(Pattern):
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Count inputs as out that contradict the others while it balances."""
-        if self.balancing:
-            self._doubt_joints(balance, sensors, dt)
-            self._doubt_soles(balance, dt)
+        memory = balance.memory
+        joints = sensors.joint_positions[0]
+        jumps = np.abs(joints - self._measured) > JUMP + FASTEST * (self._gap + dt)
+        self._measured, self._gap = joints.copy(), self.ages[JOINTS]
+        # Somebody who moves the robot moves more than one joint.
+        if self.balancing and jumps.sum() == 1:
+            self.doubts.setdefault(JOINTS, f'{balance.order[int(jumps.argmax())]} jumped')
         if self.balancing and balance.mode == WALK and balance.kind == WALKS:
-            loads, swings = sensors.foot_forces[0], balance.memory.swinging
+            loads, swings = sensors.foot_forces[0], memory.swinging
             contrary = (self.ages[FEET] < EXTRAPOLATED and self._passes(balance)
                         and loads[swings].sum() > CONTRARY * loads[~swings].sum())
             self._contrary = self._contrary + dt if contrary else 0.0
             if self._contrary > STEADY:
                 self.doubts.setdefault(FEET, 'the contacts do not go with the gait')
-        self._measured, self._gap = sensors.joint_positions[0].copy(), self.ages[JOINTS]
-        assert self._substitutes is not None
-        if not self.doubts:
-            self._substitutes.suspect = None
-        for doubted in self.doubts:
-            if doubted != JOINTS or self._substitutes.suspect is None:
-                self.ages[doubted] = max(self.ages[doubted], EXTRAPOLATED + ADOPTED)
-
-    def _doubt_joints(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
-        """Doubt a single joint that jumps, or that stays the same in a walk."""
-        joints = sensors.joint_positions[0]
-        moved = np.abs(joints - self._measured)
-        wrong, reason = moved > JUMP + FASTEST * (self._gap + dt), 'jumped'
-        if self._unchanged.size != joints.size or balance.mode != WALK:
-            self._unchanged = np.zeros(joints.size)
-        self._unchanged = np.where(moved > 0.0, 0.0, self._unchanged + dt)
-        if not wrong.any():
-            wrong, reason = np.zeros(joints.size, dtype=bool), 'is stuck'
-            wrong[balance.rows] = self._unchanged[balance.rows] > STEADY
-        # Somebody who moves the robot moves more than one joint.
-        if wrong.sum() == 1 and JOINTS not in self.doubts:
-            assert self._substitutes is not None
-            self._substitutes.suspect = int(wrong.argmax())
-            self.doubts[JOINTS] = f'{balance.order[self._substitutes.suspect]} {reason}'
-
-    def _doubt_soles(self, balance: BipedFeedback, dt: float) -> None:
-        """Doubt joints or IMU where the soles are not level while both feet stand."""
-        memory = balance.memory
-        tilts = memory.pose.turns[balance.links.chains[:, -1], :2, 2]
-        apart = float(np.linalg.norm(tilts[0] - tilts[1]))
-        leaning = float(np.linalg.norm(tilts.mean(axis=0)))
-        stands = balance.mode != WALK and bool((memory.loads > LOADED).all())
-        self._uneven = (self._uneven + dt if stands and (apart > PARALLEL or leaning > FLAT)
-                        else 0.0)
-        if self._uneven <= COMPARED or self.doubts:
-            return
-        if apart > PARALLEL:
-            self.doubts[JOINTS] = (f'the soles are {apart:.2f} rad from parallel by the joints '
-                                   'while both feet stand: encoder offsets or names of joints')
-        else:
-            self.doubts[IMU] = (f'the soles lean by {leaning:.2f} rad by IMU and joints while '
-                                'both feet stand: the mounting of the IMU, its signs, or ground '
-                                'too steep to walk')
+        for one in self.doubts:
+            self.ages[one] = max(self.ages[one], EXTRAPOLATED + dt)
 
     def _watch(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Find out whether the robot has fallen, was moved, or stands on its feet again."""
@@ -374,9 +317,6 @@ class BalancedPattern(Pattern):
         if self._stops or self._lowers:
             self._stood = 0.0
             return
-        if not (self.fallen or self.crouching) and TOPPLES < lean < UPRIGHT:
-            # Its feet do not show that it stands.
-            self.crouching = True
         off = np.abs(joints[balance.rows] - self._pose[self._places]).max()
         weight = GRAVITY * balance.links.masses.sum()
         stands = (lean < (CROUCHED if self.crouching else UPRIGHT) and off < NEAR

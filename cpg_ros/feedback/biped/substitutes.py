@@ -31,8 +31,6 @@ import numpy as np
 IMU, JOINTS, FEET = range(3)
 #: Measurements this old go on as their rates say, s; older ones are replaced.
 EXTRAPOLATED = 0.05
-#: Measurements that took longer than this to arrive go on by their rates, too, s.
-PROMPT = 0.008
 #: Rate at which a predicted sole approaches its path, 1/s, and damping of the prediction's rates.
 FOLLOWED, DAMPED = 20.0, 1e-3
 #: Largest rate of a predicted joint, rad/s.
@@ -46,8 +44,6 @@ class Substitutes:
 
     Attributes:
         sensors: measurements with the gaps filled, overwritten by ``fill``.
-        suspect: the joint whose own measurement is not to be used, in the links' order; None for
-            none.
 
     """
 
@@ -55,7 +51,6 @@ class Substitutes:
         """Prepare for a robot's links."""
         joints = len(links.masses) - 1
         self._links, self._pose = links, blank_pose(links)
-        self.suspect: int | None = None
         self.sensors = SensorData.zeros(1, len(links.chains), joints)
         self._still, self._angles = np.zeros(3), np.zeros(joints)
         self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
@@ -64,14 +59,13 @@ class Substitutes:
                                  (self._still, self.sensors.joint_velocities[0]), self._pose,
                                  self._center, self._soles, self._weights)
 
-    def fill(self, measured: SensorData, ages: np.ndarray, latencies: np.ndarray,
-             memory: BipedMemory, dt: float) -> SensorData:
+    def fill(self, measured: SensorData, ages: np.ndarray, memory: BipedMemory, dt: float
+             ) -> SensorData:
         """Return the measurements of now.
 
         Args:
             measured: the last valid ones.
-            ages: time since those of inertial unit, joints and feet arrived, s, shape (3,).
-            latencies: time since they were measured, s, shape (3,).
+            ages: of inertial unit, joints and feet, s, shape (3,).
             memory: of the feedback at its last tick.
             dt: of a tick, s; younger measurements are taken as they are.
 
@@ -83,10 +77,9 @@ class Substitutes:
         if late[JOINTS]:
             self._move(memory, dt)
         else:
-            self._take_joints(latencies[JOINTS], memory, dt)
-        time = max(ages[IMU], latencies[IMU])
-        if late[IMU] or time > PROMPT:
-            self._turn(measured, min(time, EXTRAPOLATED))
+            self._angles[:] = sensors.joint_positions[0]
+        if late[IMU]:
+            self._turn(measured, min(ages[IMU], EXTRAPOLATED))
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
         if late[IMU] and late[JOINTS]:
@@ -96,22 +89,6 @@ class Substitutes:
             weight = GRAVITY * memory.pose.carried[0]
             sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.fractions)
         return sensors
-
-    def _take_joints(self, latency: float, memory: BipedMemory, dt: float) -> None:
-        """Take the joints as measured a latency in s ago, but for the suspect."""
-        angles, rates = self.sensors.joint_positions[0], self.sensors.joint_velocities[0]
-        if latency > PROMPT:
-            angles += min(latency, EXTRAPOLATED) * rates
-        suspect = self.suspect
-        if suspect is None:
-            self._angles[:] = angles
-            return
-        measured, measured_rates = angles.copy(), rates.copy()
-        self._move(memory, dt)
-        predicted, rate = self._angles[suspect], rates[suspect]
-        angles[:], rates[:] = measured, measured_rates
-        angles[suspect], rates[suspect] = predicted, rate
-        self._angles[:] = angles
 
     def _move(self, memory: BipedMemory, dt: float) -> None:
         """Let the joints of the legs go on from where they were for dt in s."""

@@ -135,7 +135,7 @@ EVEN = 0.5
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4
 #: Relative change at which a trust region stops, and at which the last one does.
-TOLERANCE, LAST = 1e-3, 1e-8
+TOLERANCE, LAST = 1e-5, 1e-8
 #: A minimum may be as good as the best if its cost is less than this many times the least.
 NEARLY = 2.0
 #: Times that joints are weighted anew, and the relative change of a weight that is none.

@@ -316,7 +316,6 @@ class BalanceLoop(SensorLoop):
         ages = [now - monitor.believed for monitor in inputs.monitors]
         # Of several feet the oldest counts; where efforts are the contacts, there are none.
         pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
-        pattern.latencies[:FEET] = [monitor.latency(now) for monitor in inputs.monitors[:FEET]]
         pattern.sensors = None if self.waiting else sensors
         pattern.wish = self._motion()
         pattern.balance = self.feedback

@@ -44,12 +44,3 @@ def test_an_input_that_contradicts_the_others_makes_it_crouch(fault):
     assert humanoid.run(6.5) == 'crouch'
     assert not humanoid.crossed and not humanoid.pattern.falls
     assert humanoid.loop.faults
-
-
-@pytest.mark.parametrize('fault', ['IMU pitch negated', *in_depth(
-    'tilt 9 degrees', 'IMU turned 90 about z', 'IMU turned 180 about z')])
-def test_an_imu_that_is_mounted_otherwise_is_seen_before_the_first_step(fault):
-    humanoid = HumanoidUnderFault(fault)
-    assert humanoid.run(3.0) == 'crouch'
-    assert not humanoid.crossed and not humanoid.pattern.falls
-    assert 'mounting of the IMU' in humanoid.loop.faults
