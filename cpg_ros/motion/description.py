@@ -84,7 +84,7 @@ class JointDescription:
 
 
 @dataclass(frozen=True)
-class Shape:
+class CollisionShape:
     """A shape that collides: a box, a cylinder or a mesh.
 
     Attributes:
@@ -129,7 +129,7 @@ class LinkDescription:
     mass: float = 0.0
     radius: float = 0.0
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
-    shapes: tuple[Shape, ...] = ()
+    shapes: tuple[CollisionShape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -388,7 +388,7 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     """Return a link; what is no number counts as not there."""
     mass = radius = 0.0
     centre: tuple[float, ...] = ()
-    shapes: list[Shape] = []
+    shapes: list[CollisionShape] = []
     for part in element.iterfind('inertial/mass'):
         mass = sum(numbers(part.get('value', ''), 1))
     for collision in element.iterfind('collision'):
@@ -403,17 +403,17 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
 
 
 def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float, ...],
-            rpy: tuple[float, ...]) -> Iterator[Shape]:
+            rpy: tuple[float, ...]) -> Iterator[CollisionShape]:
     """Return a box, a cylinder or a mesh that is there."""
     for box in collision.iterfind('geometry/box'):
         if size := numbers(box.get('size', ''), 3):
-            yield Shape(xyz, rpy, size)
+            yield CollisionShape(xyz, rpy, size)
     for cylinder in collision.iterfind('geometry/cylinder'):
         (radius, length) = (sum(numbers(cylinder.get(key, ''), 1)) for key in ('radius', 'length'))
-        yield Shape(xyz, rpy, (2.0 * radius, 2.0 * radius, length))
+        yield CollisionShape(xyz, rpy, (2.0 * radius, 2.0 * radius, length))
     for mesh in collision.iterfind('geometry/mesh'):
         with suppress(MeshError):    # one that is missing is reported where it is needed
-            yield Shape(xyz, rpy, numbers(mesh.get('scale', ''), 3) or (1.0, 1.0, 1.0),
+            yield CollisionShape(xyz, rpy, numbers(mesh.get('scale', ''), 3) or (1.0, 1.0, 1.0),
                         find_mesh(mesh.get('filename', ''), path, folder))
 
 

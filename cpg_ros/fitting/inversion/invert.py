@@ -82,13 +82,14 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
     """
     found = []
     if model.size > 0.0:
-        told = [name for name, one in estimates.items() if one.bounded]
-        lost = [name for name in estimates if name not in told]
+        bounded = [name for name, one in estimates.items() if one.bounded]
+        unknown = [name for name in estimates if name not in bounded]
+        clauses = [f'the intervals of {_listed(bounded)} include that'] if bounded else []
+        if unknown:
+            clauses.append(f'{_listed(unknown)}: cannot tell')
         found.append(
             f'the model is not what was recorded: it leaves {times:.3g} times the noise, as '
-            f'waveforms that are off by {100.0 * model.size:.2g} % would; '
-            + '; '.join((*([f'the intervals of {_listed(told)} include that'] if told else ()),
-                         *([f'{_listed(lost)}: cannot tell'] if lost else ()))))
+            f'waveforms that are off by {100.0 * model.size:.2g} % would; {"; ".join(clauses)}')
     for row in known.blind:
         blind = [one.name for one,
                  fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]

@@ -305,6 +305,24 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
                  for k, (leg, one) in enumerate(stride.scatter.items())})
 
 
+def _steady(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
+            robot: Robot | None) -> tuple[Recording, dict[str, int], Stride, list[str]]:
+    """Return the recording, cells, stride and warnings, of a single stride as well.
+
+    A recording without a steady gait may be exactly one stride; copies of it then take its place.
+    """
+    try:
+        return recording, *stride_of(recording, legs, kind, robot), []
+    except NoSteadyGait:
+        recognised = recognise_stride(recording)
+        if recognised is None:
+            raise
+    cells, stride = stride_of(recognised, legs, kind, robot)
+    return recognised, cells, replace(stride, confidence=0.5 * stride.confidence), [
+        f'taken for exactly one stride, of {recognised.cycle:.4g} s, as it ends where it begins: '
+        'say so (--cycle), or record several strides']
+
+
 def _none_of(kind: type[Network], stride: Stride) -> str:
     """Return a line on phases that are those of no gait: their values and their scatter."""
     phases = ', '.join(f'{leg} {phase:.3f}' + (
@@ -362,18 +380,7 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    guessed = []
-    try:
-        cells, stride = stride_of(recording, legs, kind, robot)
-    except NoSteadyGait:
-        recognised = recognise_stride(recording)
-        if recognised is None:
-            raise
-        recording = recognised
-        cells, stride = stride_of(recording, legs, kind, robot)
-        stride = replace(stride, confidence=0.5 * stride.confidence)
-        guessed = [f'taken for exactly one stride, of {recording.cycle:.4g} s, as it ends where '
-                   'it begins: say so (--cycle), or record several strides']
+    recording, cells, stride, guessed = _steady(recording, legs, kind, robot)
     between = ''
     if not (gait or stride.gait or network_given or kind.offsets):
         between = _none_of(kind, stride)

@@ -194,7 +194,7 @@ class MessageBlock:
             self.topics.append(publisher.topic_name)
         self._native = self._native_block()
 
-    def _native_block(self) -> tuple[Any, native.Block] | None:
+    def _native_block(self) -> tuple[Any, native.SerializedMessages] | None:
         """Return what fills and publishes outside the interpreter, and its argument, if any."""
         library = native.library()
         if library is None:
@@ -207,7 +207,7 @@ class MessageBlock:
         for message, (_, part) in zip(self._messages, self._publishers, strict=True):
             message.buffer, message.length, message.capacity = at, len(part), len(part)
             at += -(-len(part) // WORD) * WORD
-        return library.publish, native.Block(
+        return library.publish, native.SerializedMessages(
             native.address('rcl_publish_serialized_message'),
             native.address('rcutils_reset_error'), self._pointers.ctypes.data,
             ctypes.addressof(self._messages), start, self._words.ctypes.data,
@@ -237,8 +237,8 @@ class MessageBlock:
         for publisher, message in self._publishers[sent:]:
             publisher.publish(bytes(message))
 
-    def _publish_natively(self, function: Any, block: native.Block, stamp: int, duration: int
-                          ) -> int:
+    def _publish_natively(self, function: Any, block: native.SerializedMessages, stamp: int,
+                          duration: int) -> int:
         """Fill and publish; return how many messages the middleware has taken."""
         # The node may be destroyed by another thread: its publishers then wait for this.
         for handle in self._handles:

@@ -39,7 +39,7 @@ class Serialized(ctypes.Structure):
                 ('capacity', ctypes.c_size_t), ('allocator', 5 * ctypes.c_void_p))
 
 
-class Block(ctypes.Structure):
+class SerializedMessages(ctypes.Structure):
     """The struct ``block`` of ``tick.c``."""
 
     _fields_ = (*((name, ctypes.c_void_p) for name in (

@@ -160,6 +160,61 @@ DIGITS = 4
 FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
 
 
+#: A topic that is silent for this long has no message, s.
+SILENCE = 1.0
+
+
+def descriptions(space: str) -> tuple[str, str]:
+    """Return the usual topics of a robot's URDF, that of the namespace first."""
+    return f'{space}/robot_description', '/robot_description'
+
+
+async def robot_info(watch: Node, services: ServiceClients, graph: Graph, generator: str,
+                     robot: str, urdf: str) -> shape.RobotInfo:
+    """Collect what the graph and the user state of a robot.
+
+    Args:
+        watch: a node that is not spun.
+        services: clients of other nodes.
+        graph: what is on it.
+        generator: full name of the node that moves the robot.
+        robot: its robot file.
+        urdf: file that the user names, '' for none.
+
+    Raises:
+        CallError: the simulation does not answer.
+
+    """
+    space, description, model = namespace(generator), '', ''
+    for topic in descriptions(space):
+        if not (urdf or description) and (topic, 'std_msgs/msg/String') in graph.topics:
+            description = getattr(await _once(watch, String, topic), 'data', '')
+    simulation = graph.beside(generator, graph.simulations)
+    if simulation:
+        model, = await NodeClient(services, simulation).values(['model'])
+    legs = {}
+    for topic, kind in () if shape.shipped_robot(robot) is not None else sorted(graph.topics):
+        leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
+        if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
+            message = await _once(watch, JointState, topic)
+            legs[leg] = list(message.name) if message else []
+    return shape.RobotInfo(urdf, description, model if isinstance(model, str) else '', robot, legs)
+
+
+async def _once(watch: Node, kind: type, name: str) -> Any:
+    """Return a topic's next or latched message, None if none arrives in time."""
+    topic = PolledSubscription(watch, kind, name, latched() if kind is String else None,
+                               overridable=False)
+    try:
+        for _ in range(round(SILENCE / 0.02)):
+            if (message := topic.newest()) is not None:
+                return message
+            await asyncio.sleep(0.02)
+        return None
+    finally:
+        topic.close()
+
+
 class RobotView:
     """Topics, parameters and shape of one generator.
 
@@ -210,7 +265,7 @@ class RobotView:
         """Start reading parameters and shape, at first and when their sources have changed."""
         sources = (self.graph.beside(self.name, self.graph.simulations),
                    *sorted(name for name, _ in self.graph.topics
-                           if name in shape.descriptions(self._space)))
+                           if name in descriptions(self._space)))
         if self._stale or sources != self._sources:
             self._stale, self._sources = False, sources
             if self._readied is not None:
@@ -222,7 +277,7 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.known.values())})
-            info = await shape.ask(
+            info = await robot_info(
                 self._watch, self._services, self.graph, self.name,
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []

@@ -17,7 +17,6 @@
 A shape is links that turn about joints, each with its own triangles.
 """
 
-import asyncio
 import base64
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -42,14 +41,9 @@ from cpg_ros.motion.meshes import find_mesh, merged, Mesh, MeshError, read_mesh
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, RobotError
 from cpg_ros.motion.rotations import rotation
-from cpg_ros.ros.node.client import Graph, namespace, NodeClient, ServiceClients
-from cpg_ros.ros.node.polled import latched, PolledSubscription
 from cpg_ros.ros.panel.pages import LONGEST
 from cpg_ros.simulation.robot_model import engine, legs, load
 import numpy as np
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
 
 #: Number of corners of a circle.
 ROUND = 16
@@ -506,8 +500,6 @@ class _Drawing:
 
 #: Robot files of this package -> the model or the URDF that goes with each.
 SHIPPED = {'unitree_go2': 'go2', 'quadruped': 'quadruped.urdf'}
-#: A topic that is silent for this long has no message, s.
-PATIENCE = 1.0
 
 
 class ShapeError(CpgError):
@@ -547,57 +539,6 @@ def shipped_robot(name: str) -> Robot | None:
         return None
 
 
-def descriptions(space: str) -> tuple[str, str]:
-    """Return the usual topics of a robot's URDF, that of the namespace first."""
-    return f'{space}/robot_description', '/robot_description'
-
-
-async def ask(watch: Node, services: ServiceClients, graph: Graph, generator: str, robot: str,
-              urdf: str) -> RobotInfo:
-    """Collect what the graph knows.
-
-    Args:
-        watch: a node that is not spun.
-        services: clients of other nodes.
-        graph: what is on it.
-        generator: full name of the node that moves the robot.
-        robot: its robot file.
-        urdf: file that the user names, '' for none.
-
-    Raises:
-        CallError: the simulation does not answer.
-
-    """
-    space, description, model = namespace(generator), '', ''
-    for topic in descriptions(space):
-        if not (urdf or description) and (topic, 'std_msgs/msg/String') in graph.topics:
-            description = getattr(await _once(watch, String, topic), 'data', '')
-    simulation = graph.beside(generator, graph.simulations)
-    if simulation:
-        model, = await NodeClient(services, simulation).values(['model'])
-    legs = {}
-    for topic, kind in () if shipped_robot(robot) is not None else sorted(graph.topics):
-        leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
-        if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
-            message = await _once(watch, JointState, topic)
-            legs[leg] = list(message.name) if message else []
-    return RobotInfo(urdf, description, model if isinstance(model, str) else '', robot, legs)
-
-
-async def _once(watch: Node, kind: type, name: str) -> Any:
-    """Return a topic's next or latched message, None if none arrives in time."""
-    topic = PolledSubscription(watch, kind, name, latched() if kind is String else None,
-                               overridable=False)
-    try:
-        for _ in range(round(PATIENCE / 0.02)):
-            if (message := topic.newest()) is not None:
-                return message
-            await asyncio.sleep(0.02)
-        return None
-    finally:
-        topic.close()
-
-
 def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 
@@ -623,8 +564,7 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
             return shape
     if robot is None and info.robot:
         report(one_line(f"drawn as a stick figure: '{info.robot[:200]}' is not one of the "
-                        f"shipped "
-                        'robots, and the panel opens no file that a node names; publish '
+                        'shipped robots, and the panel opens no file that a node names; publish '
                         'robot_description, or start the panel with -p urdf:=FILE'))
     return _sticks(info, robot)
 
