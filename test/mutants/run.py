@@ -36,12 +36,10 @@ import time
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = Path(__file__).parent
-#: Share of the mutants that has to be caught.
+#: Fraction of the mutants that has to be caught.
 ENOUGH = 57 / 60
 #: What make test leaves out.
 LEFT_OUT = 'not (deep or alone or browser or docs)'
-#: Context lines may have changed since, and line numbers have.
-APPLY = ('git', 'apply', '--recount', '-C1')
 CAUGHT, MISSED, BROKEN = 'caught', 'missed', 'does not apply'
 UNRELIABLE = 'fails without it, too'
 
@@ -76,6 +74,36 @@ class Verdict:
     verdict: str
     by: str
     seconds: float
+
+
+def mutated(path: Path, root: Path = ROOT) -> dict[str, str]:
+    """Return the text of each file that a patch changes, with its changes.
+
+    Lines are found by their text, with as much of their context as the file still has, not by
+    their numbers.
+
+    Raises:
+        ValueError: lines are not in the file, or in several places.
+
+    """
+    changed: dict[str, str] = {}
+    _, *parts = re.split(r'^--- .*\n\+\+\+ b/(\S+)\n', path.read_text(), flags=re.MULTILINE)
+    for file, hunks in zip(parts[::2], parts[1::2], strict=True):
+        text = '\n' + (root / file).read_text() + '\n'
+        for hunk in re.split(r'^@@ .*\n', hunks, flags=re.MULTILINE)[1:]:
+            lines = hunk.removesuffix('\n').split('\n')
+            edited = [k for k, line in enumerate(lines) if line[:1] in ('-', '+')]
+            for context in range(len(lines), -1, -1):
+                some = lines[max(0, edited[0] - context):edited[-1] + 1 + context]
+                old, new = (''.join(f'\n{line[1:]}' for line in some if line[:1] != other)
+                            for other in '+-')
+                if (count := text.count(old + '\n') if old else 0) == 1:
+                    break
+            else:
+                raise ValueError(f'{path.name}: {count} places in {file} have these lines: {hunk}')
+            text = text.replace(old + '\n', new + '\n')
+        changed[file] = text[1:-1]
+    return changed
 
 
 def mutants(names=()) -> list[Mutant]:
@@ -134,12 +162,13 @@ class Copy:
 
     def judge(self, mutant: Mutant, whole: bool) -> tuple[str, str]:
         """Return what becomes of a mutant, and the test that decided."""
-        applied = subprocess.run([*APPLY, mutant.path], cwd=self.place, capture_output=True,
-                                 text=True)
-        if applied.returncode:
-            return BROKEN, applied.stderr.strip()
         try:
-            for file in mutant.files:
+            changed = mutated(mutant.path, self.place)
+        except ValueError as error:
+            return BROKEN, str(error)
+        try:
+            for file, text in changed.items():
+                (self.place / file).write_text(text)
                 self.install(file)
             found = self.failures('-x', *mutant.tests) or (
                 self.failures('-x', 'test') if whole else [])
