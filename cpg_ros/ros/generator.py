@@ -188,6 +188,9 @@ SEARCH = 0.05
 class Generator(StartedNode):
     """Parameters, topics and services around one moving pattern."""
 
+    #: A gait loads its preset.
+    SETS_OTHERS = frozenset({'gait'})
+
     def __init__(self) -> None:
         """Declare the parameters, check them, and prepare to start.
 

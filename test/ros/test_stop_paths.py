@@ -17,6 +17,7 @@
 import signal
 import time
 
+from cpg_ros.networks.library.delayed import PRESETS
 from geometry_msgs.msg import Twist
 from graph import until
 import numpy as np
@@ -78,6 +79,16 @@ def test_a_valid_request_outlives_later_ones_that_are_refused(stepped, asked, ap
     assert watcher.get('frequency') == [1.5]
     assert all('superseded' in one.reason or 'above its limit' in one.reason
                for one in answers if not one.successful)
+
+
+def test_a_refused_request_does_not_bring_an_earlier_one_past_a_gait(stepped):
+    _, watcher = stepped(running=False)
+    names = 'delayed.a', 'gait', 'delayed.a'
+    answer = watcher.call(SetParameters, '/cpg_generator/set_parameters', SetParameters.Request(
+        parameters=[Parameter(name, value=value).to_parameter_msg()
+                    for name, value in zip(names, (-1.9, 'trot', -1e9), strict=True)]))
+    assert [one.successful for one in answer.results] == [True, True, False]
+    assert watcher.get('delayed.a') == [PRESETS['trot'].network.as_dict()['a']] != [-1.9]
 
 
 def test_enable_false_does_not_wait_for_plans(start):

@@ -26,6 +26,7 @@ import threading
 import traceback
 from typing import Any
 
+from cpg_ros.common.command_line import say
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.node.logging import NO_FILE, QUEUE, QueuedLogger
 from cpg_ros.ros.node.parameters import as_doubles, as_list, kind_of, Spec, StrictParameterService
@@ -185,8 +186,11 @@ class StartedNode(Node):
         failure: exception that ended the thread, or None.
         thread: one that may still be at work when the node ends, or None.
         parameter_service: services of the parameters, which have a thread of their own.
+        SETS_OTHERS: parameters whose values set those of others.
 
     """
+
+    SETS_OTHERS: frozenset[str] = frozenset()
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, start_parameter_services=False, enable_rosout=False, **options)
@@ -323,8 +327,8 @@ def _help_or_error(executable: str, text: str, known: Mapping[str, Spec],
         return None
     parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
                   for name, spec in known.items())
-    print(f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
-          f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters, sep='\n')
+    say('\n'.join((f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
+                   f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters)))
     return 0
 
 

@@ -327,7 +327,7 @@ class StrictParameterService(ParameterService):
                 waiting = self._next()
             while not self._requests.empty():
                 waiting = waiting + self._next()
-            waiting = _thinned(waiting)
+            waiting = _thinned(waiting, self._get_node().SETS_OTHERS)
             if waiting and not self._ending:
                 change = waiting.pop(0)
                 result = self._judged(change.parameters)
@@ -350,11 +350,17 @@ class StrictParameterService(ParameterService):
             return _refused(f'{type(error).__name__}: {error}')
 
 
-def _thinned(changes: list[_Change]) -> list[_Change]:
-    """Put changes whose parameters a later one sets, too, behind that one; return the others."""
+def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:
+    """Put changes whose parameters a later one sets, too, behind that one; return the others.
+
+    A parameter of ``barriers`` may set others: no change is put behind one that sets it, and one
+    that sets it is put behind the next change only.
+    """
     left: list[_Change] = []
     for change in reversed(changes):
-        later = next((one for one in left if change.names <= one.names), None)
+        reached = 1 if change.names & barriers else next(
+            (k for k, later in enumerate(reversed(left), 1) if later.names & barriers), len(left))
+        later = next((later for later in left[-reached:] if change.names <= later.names), None)
         if later is None:
             left.append(change)
         else:
