@@ -169,8 +169,8 @@ def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callab
             return
         shown = mark
         bar = '#' * int(fraction * WIDTH)
-        remaining = spent / fraction - spent if fraction else float('inf')
-        line = f'{what} [{bar:<{WIDTH}}] {fraction:4.0%}, {remaining:.0f} s left'
+        line = f'{what} [{bar:<{WIDTH}}] {fraction:4.0%}' + (
+            f', {spent / fraction - spent:.0f} s left' if fraction else '')
         sys.stderr.write(f'\r{line}\x1b[K' if live else line + '\n')
         sys.stderr.flush()
 
