@@ -221,13 +221,13 @@ def motor_indices(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarr
     return np.array([robot.order.index(name) for name in joints])
 
 
-def settings_for(robot: Robot, places: np.ndarray, *, kp: np.ndarray, kd: np.ndarray,
+def settings_for(robot: Robot, indices: np.ndarray, *, kp: np.ndarray, kd: np.ndarray,
                  torque: np.ndarray, lying: np.ndarray, **others: float) -> BridgeSettings:
     """Return the settings of a robot file; arrays have shape (joints,), in motor order.
 
     Args:
         robot: provides limits, speeds and the stand (offsets).
-        places: as returned by ``motor_indices``.
+        indices: as returned by ``motor_indices``.
         kp: proportional gains, N m / rad.
         kd: damping gains, N m s / rad.
         torque: largest torques, N m.
@@ -235,8 +235,8 @@ def settings_for(robot: Robot, places: np.ndarray, *, kp: np.ndarray, kd: np.nda
         others: further attributes of ``BridgeSettings``.
 
     """
-    order = robot.places[places]
+    order = robot.places[indices]
     lower, upper, velocity, stand = (robot.column(name)[order] for name in (
         'lower', 'upper', 'velocity', 'offset'))
-    return BridgeSettings(tuple(robot.order[index] for index in places), kp, kd, torque, lower,
+    return BridgeSettings(tuple(robot.order[index] for index in indices), kp, kd, torque, lower,
                           upper, velocity, stand, np.clip(lying, lower, upper), **others)

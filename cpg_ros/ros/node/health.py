@@ -91,7 +91,7 @@ def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companio
     """
     if node.count_publishers(topic) <= own + tolerated:
         return ''
-    names = [node_of(one) for one in node.get_publishers_info_by_topic(topic)]
+    names = [node_of(publisher) for publisher in node.get_publishers_info_by_topic(topic)]
     expected = [node.get_fully_qualified_name()] * own
     if companion:
         # On a busy machine, its name is known later than its publisher.

@@ -100,7 +100,7 @@ def leave_shared_memory() -> None:
     environment = os.environ
     name, udp = TRANSPORT
     configured = (environment.setdefault(name, udp) != udp
-                  or any(environment.get(one) for one in ('ROS_STATIC_PEERS', *PROFILES)))
+                  or any(environment.get(name) for name in ('ROS_STATIC_PEERS', *PROFILES)))
     local = (environment.get(LOCAL_ONLY) == '1' or (
         LOCAL_ONLY not in environment and environment.get(RANGE) == 'LOCALHOST'))
     if local and not configured and 'fastrtps' in get_rmw_implementation_identifier():
@@ -148,9 +148,9 @@ class Lifecycle(LifecycleNodeMixin):
         try:
             return self._change(request, response)
         except rclpy_implementation.RCLError:
-            wanted, state = request.transition, self._state_machine.current_state[1]
-            self._logger.warning(f'{wanted.label or f"transition {wanted.id}"}: refused: the '
-                                 f"state '{state}' does not have it")
+            transition, state = request.transition, self._state_machine.current_state[1]
+            name = transition.label or f'transition {transition.id}'
+            self._logger.warning(f"{name}: refused: the state '{state}' does not have it")
             response.success = False
             return response
 
@@ -238,8 +238,9 @@ class StartedNode(Node):
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
         """Return a batch of changes with the types and the further changes that it implies."""
-        return [as_list(one, self._lists[one.name]) if one.name in self._lists else one
-                for one in as_doubles(parameters, self._doubles)]
+        return [as_list(parameter, self._lists[parameter.name])
+                if parameter.name in self._lists else parameter
+                for parameter in as_doubles(parameters, self._doubles)]
 
     def resolve_topic_name(self, topic: str, **options: Any) -> str:
         """Do as the base class does; errors as of create_publisher."""
@@ -310,23 +311,23 @@ def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
             node.get_logger().error('a request failed:\n' + traceback.format_exc())
 
 
-def _help_or_error(executable: str, text: str, known: Mapping[str, Spec],
+def _help_or_error(executable: str, text: str, specs: Mapping[str, Spec],
                    args: list[str] | None) -> int | None:
     """Answer ``--help`` and reject unknown arguments; return the exit code, None to start."""
     try:
-        words = remove_ros_args(sys.argv[1:] if args is None else args)
+        arguments = remove_ros_args(sys.argv[1:] if args is None else args)
     except RuntimeError as error:
         print(f'{executable}: ROS arguments: {_first(error)}', file=sys.stderr)
         return 2
-    wrong = [word for word in words if word not in ('-h', '--help')]
+    wrong = [argument for argument in arguments if argument not in ('-h', '--help')]
     if wrong:
         print(f'{executable}: not understood: {" ".join(wrong)} (parameters: --ros-args -p '
               'NAME:=VALUE; see --help)', file=sys.stderr)
         return 2
-    if not words:
+    if not arguments:
         return None
     parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
-                  for name, spec in known.items())
+                  for name, spec in specs.items())
     say('\n'.join((f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
                    f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters)))
     return 0
@@ -345,7 +346,7 @@ def _domain() -> str:
             if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
 
 
-def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[str, Spec],
+def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[str, Spec],
         args: list[str] | None = None, executable: str = '') -> int:
     """Run a node until a signal ends it, or until it stops itself; return the exit code.
 
@@ -353,12 +354,12 @@ def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[st
         make: returns the node; a CpgError that it raises ends the start with one line.
         name: of the node.
         text: what it does, a sentence for ``--help``.
-        known: its parameters, listed by ``--help``.
+        specs: of its parameters, listed by ``--help``.
         args: from the command line, without the program's name; None for those of the process.
         executable: the program's name, '' if it is that of the node.
 
     """
-    code = _help_or_error(executable or name, text, known, args)
+    code = _help_or_error(executable or name, text, specs, args)
     if code is not None:
         return code
 
@@ -379,15 +380,15 @@ def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[st
         print(f'{name}: {wrong}', file=sys.stderr)
         return 2
     leave_shared_memory()
-    words = sys.argv if args is None else args
+    arguments = sys.argv if args is None else args
     try:
-        QUEUE.start(name, words)
+        QUEUE.start(name, arguments)
     except OSError as error:
         print(f'{name}: no process that writes the log can be started: {error.strerror}',
               file=sys.stderr)
         return 1
     try:
-        rclpy.init(args=[*words, '--ros-args', NO_FILE],
+        rclpy.init(args=[*arguments, '--ros-args', NO_FILE],
                    signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)

@@ -53,16 +53,16 @@ KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 PRESETS = '; presets: '
 
 
-def one_of(words: Iterable[str], further: str = '') -> str:
+def one_of(names: Iterable[str], further: str = '') -> str:
     """Return the constraints of a parameter that is one of some words; ``further`` is added."""
-    return 'one of: ' + ', '.join(words) + further
+    return 'one of: ' + ', '.join(names) + further
 
 
 def choices(constraints: str) -> list[str]:
     """Return the words that a descriptor's constraints list, if they are those of one_of."""
-    found = re.search(r'one of: (.*)', constraints)
-    words = re.split(f', |{PRESETS}', found[1]) if found else []
-    return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
+    match = re.search(r'one of: (.*)', constraints)
+    names = re.split(f', |{PRESETS}', match[1]) if match else []
+    return [name for name in names if re.fullmatch(r'[\w.-]+', name)]
 
 
 def presets_among(constraints: str) -> list[str]:
@@ -83,16 +83,16 @@ class Spec:
 
     def descriptor(self) -> ParameterDescriptor:
         """Return it as a ROS descriptor."""
-        made = ParameterDescriptor(description=self.text, read_only=self.read_only,
+        descriptor = ParameterDescriptor(description=self.text, read_only=self.read_only,
                                    additional_constraints=self.constraints)
         if self.low is not None and self.high is not None:
             if isinstance(self.default, int):
-                made.integer_range = [IntegerRange(from_value=int(self.low),
-                                                   to_value=int(self.high), step=1)]
+                descriptor.integer_range = [IntegerRange(
+                    from_value=int(self.low), to_value=int(self.high), step=1)]
             else:
-                made.floating_point_range = [FloatingPointRange(from_value=self.low,
-                                                                to_value=self.high)]
-        return made
+                descriptor.floating_point_range = [FloatingPointRange(
+                    from_value=self.low, to_value=self.high)]
+        return descriptor
 
 
 def fixed(specs: Mapping[str, Spec]) -> dict[str, Spec]:
@@ -113,11 +113,11 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
 def as_list(parameter: Parameter, default: list) -> Parameter:
     """Turn one value, or whole numbers, given for a list of such values into the list."""
     value = parameter.value
-    given = value if parameter.type_.name.endswith('_ARRAY') else [value]
-    wanted = type(default[0]) if default else str
-    if wanted is float and all(type(one) in (int, float) for one in given):
-        return Parameter(parameter.name, Parameter.Type.DOUBLE_ARRAY, [float(x) for x in given])
-    return Parameter(parameter.name, value=[value]) if type(value) is wanted else parameter
+    values = value if parameter.type_.name.endswith('_ARRAY') else [value]
+    kind = type(default[0]) if default else str
+    if kind is float and all(type(element) in (int, float) for element in values):
+        return Parameter(parameter.name, Parameter.Type.DOUBLE_ARRAY, [float(x) for x in values])
+    return Parameter(parameter.name, value=[value]) if type(value) is kind else parameter
 
 
 def kind_of(default: Any) -> str:
@@ -136,7 +136,7 @@ _pointer.restype, _pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes
 _capsule.restype = ctypes.py_object
 _capsule.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
 #: A capsule must not outlive what it points to.
-_kept: list[Any] = []
+_capsule_owners: list[Any] = []
 
 
 def bounded(service: type, most: int) -> type:
@@ -159,7 +159,7 @@ def bounded(service: type, most: int) -> type:
         return length if length > most else usual(message)
 
     own = _CONVERT(convert)
-    _kept.append(own)
+    _capsule_owners.append(own)
     names = '_CREATE_ROS_MESSAGE', '_DESTROY_ROS_MESSAGE', '_CONVERT_FROM_PY', '_TYPE_SUPPORT'
     support = type('Support', (type,), {
         **{name: getattr(kind, name) for name in names},
@@ -258,14 +258,15 @@ class StrictParameterService(ParameterService):
         service, request, header = received
         response = service.srv_type.Response()
         together = hasattr(response, 'result')
-        parts = [request.parameters] if together else [[one] for one in request.parameters]
+        parts = ([request.parameters] if together else
+                 [[message] for message in request.parameters])
         results: list[Any] = [None] * len(parts)
-        left = set(range(len(parts)))
+        unanswered = set(range(len(parts)))
 
         def answer(k: int, result: SetParametersResult) -> None:
             results[k] = result
-            left.discard(k)
-            if not left:
+            unanswered.discard(k)
+            if not unanswered:
                 respond()
 
         def respond() -> None:
@@ -356,14 +357,16 @@ def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:
     A parameter of ``barriers`` may set others: no change is put behind one that sets it, and one
     that sets it is put behind the next change only.
     """
-    left: list[_Change] = []
+    remaining: list[_Change] = []
     for change in reversed(changes):
         reached = 1 if change.names & barriers else next(
-            (k for k, later in enumerate(reversed(left), 1) if later.names & barriers), len(left))
-        later = next((later for later in left[-reached:] if change.names <= later.names), None)
+            (k for k, later in enumerate(reversed(remaining), 1) if later.names & barriers),
+            len(remaining))
+        later = next((later for later in remaining[-reached:] if change.names <= later.names),
+                     None)
         if later is None:
-            left.append(change)
+            remaining.append(change)
         else:
             later.replaced[:0] = [*change.replaced, change]
             change.replaced = []
-    return left[::-1]
+    return remaining[::-1]

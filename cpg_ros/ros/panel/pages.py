@@ -164,7 +164,7 @@ class Page:
         self.node = self.lost_to = self.refused = ''
         self.round_trip = 0.0
         self._lease: dict[str, Any] = {}
-        self._left, self._when = BURST, time.monotonic()
+        self._tokens, self._when = BURST, time.monotonic()
         self._fast = time.monotonic()
 
     def __str__(self) -> str:
@@ -181,9 +181,9 @@ class Page:
     def may_ask(self) -> bool:
         """Count a request; return whether the rate of requests is within the limits."""
         now = time.monotonic()
-        self._left = min(BURST, self._left + RATE * (now - self._when)) - 1.0
+        self._tokens = min(BURST, self._tokens + RATE * (now - self._when)) - 1.0
         self._when = now
-        return self._left >= 0.0
+        return self._tokens >= 0.0
 
     def waiting(self) -> int:
         """Return the number of bytes that were sent and not received yet."""

@@ -198,9 +198,9 @@ class Recorder:
             with self._packing:
                 if not archive.is_file():
                     part = archive.with_suffix('.part')
-                    with zipfile.ZipFile(part, 'w', zipfile.ZIP_DEFLATED) as made:
+                    with zipfile.ZipFile(part, 'w', zipfile.ZIP_DEFLATED) as packed:
                         for file in sorted(path.iterdir()):
-                            made.write(file, f'{bag}/{file.name}')
+                            packed.write(file, f'{bag}/{file.name}')
                     part.replace(archive)
             return archive.read_bytes()
         except OSError as error:
@@ -271,11 +271,11 @@ class RequestHandler:
         elif action == 'record':
             await self._record(view, values['on'])
         elif action in ('reset', 'fit'):
-            nodes, what = {'reset': (view.graph.simulations, 'simulated robot'),
+            nodes, robot = {'reset': (view.graph.simulations, 'simulated robot'),
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
-                raise RequestError(f'there is no {what} for {view.name}')
+                raise RequestError(f'there is no {robot} for {view.name}')
             await self.command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:

@@ -66,14 +66,14 @@ class Controls:
     """One node's parameters.
 
     Attributes:
-        known: name -> what a page needs to draw its control, with the value.
+        by_name: parameter -> its control as pages draw it, with the value.
 
     """
 
     def __init__(self, node: NodeClient, report: Callable[[str], None]) -> None:
         """Control a node; ``report`` takes a line for each value that the node rejects."""
         self._node, self._report = node, report
-        self.known: dict[str, dict[str, Any]] = {}
+        self.by_name: dict[str, dict[str, Any]] = {}
         self._waiting: dict[str, Any] = {}
         self._work: asyncio.Task | None = None
 
@@ -87,32 +87,32 @@ class Controls:
         names = [name for name in await self._node.parameters() if not name.startswith(COMMON)]
         described, values = await self._node.descriptors(names), await self._node.values(names)
         controls = {}
-        for name, about, value in zip(names, described, values, strict=True):
-            if about.type not in KINDS:
+        for name, descriptor, value in zip(names, described, values, strict=True):
+            if descriptor.type not in KINDS:
                 continue
-            (span,) = (*about.floating_point_range, *about.integer_range)[:1] or (None,)
+            (span,) = (*descriptor.floating_point_range, *descriptor.integer_range)[:1] or (None,)
             controls[name] = {
-                'name': name, 'kind': KINDS[about.type], 'text': about.description,
-                'unit': unit(about.description), 'fixed': about.read_only,
-                'choices': choices(about.additional_constraints),
-                'presets': presets_among(about.additional_constraints),
+                'name': name, 'kind': KINDS[descriptor.type], 'text': descriptor.description,
+                'unit': unit(descriptor.description), 'fixed': descriptor.read_only,
+                'choices': choices(descriptor.additional_constraints),
+                'presets': presets_among(descriptor.additional_constraints),
                 'value': value,
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
-        self.known = controls
+        self.by_name = controls
 
     def update(self, event: ParameterEvent) -> dict[str, Any]:
         """Store the changes of an event; return name -> value if they are this node's."""
         if event.node != self._node.name:
             return {}
         values = {parameter.name: parameter_value_to_python(parameter.value)
-                  for parameter in event.changed_parameters if parameter.name in self.known}
+                  for parameter in event.changed_parameters if parameter.name in self.by_name}
         for name, value in values.items():
-            self.known[name]['value'] = value
+            self.by_name[name]['value'] = value
         return values
 
     def value(self, name: str) -> Any:
         """Return a parameter's value, None if there is none."""
-        return self.known.get(name, {}).get('value')
+        return self.by_name.get(name, {}).get('value')
 
     def set(self, name: str, value: Any) -> None:  # noqa: A003
         """Set a parameter soon; of several waiting values only the last one is sent.
@@ -121,12 +121,12 @@ class Controls:
             RequestError: the node has no such parameter, or the value is invalid.
 
         """
-        about = self.known.get(name)
-        if about is None:
+        control = self.by_name.get(name)
+        if control is None:
             raise RequestError(f"{self._node.name} has no parameter '{name}'")
-        if about['fixed']:
+        if control['fixed']:
             raise RequestError(f'{name} cannot be changed while the node runs')
-        self._waiting[name] = _fitting(about, value)
+        self._waiting[name] = _fitting(control, value)
         if self._work is None or self._work.done():
             self._work = asyncio.get_running_loop().create_task(self._send())
 
@@ -142,13 +142,13 @@ class Controls:
                 self._report(str(error))
 
 
-def _fitting(about: dict[str, Any], value: Any) -> Any:
+def _fitting(control: dict[str, Any], value: Any) -> Any:
     """Return a value converted to the kind of its parameter."""
-    kind, name = about['kind'], about['name']
+    kind, name = control['kind'], control['name']
     right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
     if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):
         raise RequestError(f'{name} must be a {kind}, not {value!r}')
-    low, high = about['low'], about['high']
+    low, high = control['low'], control['high']
     if low is not None and not low <= value <= high:
         raise RequestError(f'{name} {value:g} is not from {low:g} to {high:g}')
     return float(value) if kind == 'double' else value
@@ -251,7 +251,7 @@ class RobotView:
             lambda: self.controls.value('stamped_cmd_vel') is True)
         self.graph = Graph()
         self._topics: dict[str, PolledSubscription] = {}
-        self._kept: dict[str, dict[str, Any]] = {}
+        self._latest: dict[str, dict[str, Any]] = {}
         self._joints: dict[str, float] = {}
         self._names: dict[str, list[str]] = {}
         self._urdf = str(node.get_parameter('urdf').value)
@@ -276,7 +276,7 @@ class RobotView:
         try:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
-                        'controls': list(self.controls.known.values())})
+                        'controls': list(self.controls.by_name.values())})
             info = await robot_info(
                 self._watch, self._services, self.graph, self.name,
                 str(self.controls.value('robot') or ''), self._urdf)
@@ -296,10 +296,10 @@ class RobotView:
 
     def messages(self) -> list[dict[str, Any]]:
         """Return the messages that a new page needs."""
-        return list(self._kept.values())
+        return list(self._latest.values())
 
     def _keep(self, message: dict[str, Any]) -> None:
-        self._kept[message['type']] = message
+        self._latest[message['type']] = message
         self._send(message)
 
     # -- topics -----------------------------------------------------------------------------
@@ -359,10 +359,10 @@ class RobotView:
                                          for dimension in dimensions])
                 values[key] = _short(message.data)
         if (moved := self._newest(f'{self._space}/odom')) is not None:
-            position, turn = moved.pose.pose.position, moved.pose.pose.orientation
+            position, rotation = moved.pose.pose.position, moved.pose.pose.orientation
             speed = moved.twist.twist
             values['base'] = _short((position.x, position.y, position.z,
-                                     turn.w, turn.x, turn.y, turn.z))
+                                     rotation.w, rotation.x, rotation.y, rotation.z))
             values['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
         if self.teleop.target != (0.0, 0.0):
             values['steered'] = _short(self.teleop.target)
@@ -394,7 +394,7 @@ class RobotView:
                         self._keep_health(status)
 
     def _keep_health(self, status: Any) -> None:
-        parts = {**self._kept.get('health', {}).get('parts', {}), status.name: {
+        parts = {**self._latest.get('health', {}).get('parts', {}), status.name: {
             'level': level(status), 'text': status.message,
             'values': {value.key: value.value for value in status.values}}}
         self._keep({'type': 'health', 'parts': parts})

@@ -63,7 +63,7 @@ class Link:
         joint: name of the joint between them, '' for a fixed one.
         slides: whether the joint is prismatic, m, not revolute, rad.
         axis: of the joint, in the link's own frame.
-        place, pose: of the link in its parent at angle 0: m, and a rotation matrix.
+        position, pose: of the link in its parent at angle 0: m, and a rotation matrix.
         zero: angle of the joint at which the link is where ``pose`` has it, rad.
         vertices, colours: its triangles, shape (n, 3, 3), m, and their colours, (n, 3), 0 to 1.
 
@@ -74,7 +74,7 @@ class Link:
     joint: str = ''
     slides: bool = False
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
-    place: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     pose: np.ndarray = field(default_factory=lambda: np.eye(3))
     zero: float = 0.0
     vertices: list[np.ndarray] = field(default_factory=list)
@@ -83,8 +83,8 @@ class Link:
     def add(self, triangles: np.ndarray, colour: tuple[float, ...] = GREY,
             offset: np.ndarray | None = None, pose: np.ndarray | None = None) -> None:
         """Add triangles, shape (n, 3, 3), m, in a frame within the link, in a colour."""
-        turned = triangles if pose is None else triangles @ pose.T
-        self.vertices.append(turned if offset is None else turned + offset)
+        rotated = triangles if pose is None else triangles @ pose.T
+        self.vertices.append(rotated if offset is None else rotated + offset)
         self.colours.append(np.broadcast_to(np.asarray(colour[:3]), (len(triangles), 3)))
 
 
@@ -115,7 +115,7 @@ class Shape:
                 'name': link.name, 'parent': link.parent, 'joint': link.joint,
                 'slides': link.slides, 'zero': link.zero,
                 'axis': np.round(link.axis, 6).tolist(),
-                'place': np.round(link.place, 6).tolist(),
+                'place': np.round(link.position, 6).tolist(),
                 'pose': np.round(link.pose.ravel(), 6).tolist(),
                 'vertices': _base64(corners.reshape(-1, 3).astype('<f4')),
                 'colours': _base64((255 * np.clip(np.repeat(colours, 3, 0), 0, 1)).astype('u1'))})
@@ -132,11 +132,11 @@ def _base64(values: np.ndarray) -> str:
 
 def coarse(triangles: np.ndarray, grain: float = GRAIN) -> np.ndarray:
     """Return the triangles that remain when vertices closer than ``grain``, m, are merged."""
-    left = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
+    mesh = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
                   grain)
     # Two that came to lie on one another are one, whichever way round.
-    _, kept = np.unique(np.sort(left.triangles, axis=1), axis=0, return_index=True)
-    return left.points[left.triangles[np.sort(kept)]]
+    _, indices = np.unique(np.sort(mesh.triangles, axis=1), axis=0, return_index=True)
+    return mesh.points[mesh.triangles[np.sort(indices)]]
 
 
 def box(half: np.ndarray) -> np.ndarray:
@@ -152,7 +152,7 @@ def box(half: np.ndarray) -> np.ndarray:
     return np.array(faces) * np.asarray(half)
 
 
-def turned(profile: np.ndarray) -> np.ndarray:
+def revolved(profile: np.ndarray) -> np.ndarray:
     """Return the triangles of a profile of radius and height, (n, 2), turned about z."""
     angles = np.linspace(0.0, 2.0 * math.pi, ROUND + 1)
     ring = np.stack([profile[:, :1] * np.cos(angles), profile[:, :1] * np.sin(angles),
@@ -167,14 +167,14 @@ def turned(profile: np.ndarray) -> np.ndarray:
 
 def cylinder(radius: float, half: float) -> np.ndarray:
     """Return the triangles of a cylinder along z of a radius and half a length, m."""
-    return turned(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
+    return revolved(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
 
 
 def capsule(radius: float, half: float) -> np.ndarray:
     """Return the triangles of a cylinder along z with a half sphere at each end, m."""
     bend = np.linspace(0.0, 0.5 * math.pi, ROUND // 4 + 1)
     low = np.stack([radius * np.sin(bend), -half - radius * np.cos(bend)], -1)
-    return turned(np.concatenate([low, low[::-1] * (1.0, -1.0)]))
+    return revolved(np.concatenate([low, low[::-1] * (1.0, -1.0)]))
 
 
 def sphere(radius: float) -> np.ndarray:
@@ -186,13 +186,13 @@ def along(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
     """Return the triangles of a capsule between two points, m."""
     way = np.asarray(end, float) - start
     length = float(np.linalg.norm(way))
-    made = capsule(radius, 0.5 * length)
+    triangles = capsule(radius, 0.5 * length)
     if length > 0.0:
         z = way / length
         x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
         x /= np.linalg.norm(x)
-        made = made @ np.array([x, np.cross(z, x), z])
-    return made + 0.5 * (np.asarray(start) + end)
+        triangles = triangles @ np.array([x, np.cross(z, x), z])
+    return triangles + 0.5 * (np.asarray(start) + end)
 
 
 # A stick figure for a robot of which only legs and joints are known.
@@ -202,7 +202,8 @@ LONG, WIDE, LEG = 0.24, 0.11, 0.42
 BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
 
 
-def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tuple[float, float]],
+def draw(name: str, legs: Mapping[str, Sequence[str]],
+         quarters: Mapping[str, tuple[float, float]],
          limits: Mapping[str, tuple[float, float]] | None = None) -> Shape:
     """Return the shape.
 
@@ -210,12 +211,12 @@ def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tupl
         name: of the robot, for people.
         legs: leg -> its joints, from the body down. Of three the first turns about the axis that
             points ahead, all others turn about that to the left.
-        places: leg -> 1 or -1 for ahead or behind (0 in between), and for left or right.
+        quarters: leg -> 1 or -1 for ahead or behind (0 in between), and for left or right.
         limits: joint -> lower and upper, rad.
 
     """
     base = Link('base', -1)
-    ends = [np.array([LONG * ahead, WIDE * left, 0.0]) for ahead, left in places.values()]
+    ends = [np.array([LONG * ahead, WIDE * left, 0.0]) for ahead, left in quarters.values()]
     long = max((abs(end[0]) for end in ends), default=0.0)
     base.add(box(np.array([long + 0.06, 0.7 * WIDE, 0.05])), BODY)
     base.add(box(np.array([0.02, 0.04, 0.02])), STICK, np.array([long + 0.08, 0.0, 0.02]))
@@ -226,7 +227,7 @@ def draw(name: str, legs: Mapping[str, Sequence[str]], places: Mapping[str, tupl
         down = [k for k in range(len(joints)) if not (len(joints) >= 3 and k == 0)]
         length = LEG / max(len(down), 1)
         for k, joint in enumerate(joints):
-            link = Link(joint, parent, joint, place=position,
+            link = Link(joint, parent, joint, position=position,
                         axis=np.eye(3)[1 if k in down else 0])
             if k in down:
                 tip = np.array([0.0, 0.0, -length])
@@ -292,8 +293,9 @@ def _links(mujoco: Any, model: Any, body: int, parent: int, shape: Shape) -> int
             shape.limits[joint.name] = tuple(model.jnt_range[k])
         last, frame, position = len(shape.links) - 1, np.eye(3), -anchor
     if last == parent or np.any(position):
-        where = (np.zeros(3), np.eye(3)) if parent < 0 else (position.copy(), frame)
-        shape.links.append(Link(name, last, place=where[0], pose=where[1]))
+        base = parent < 0
+        shape.links.append(Link(name, last, position=np.zeros(3) if base else position.copy(),
+                                pose=np.eye(3) if base else frame))
     return len(shape.links) - 1
 
 
@@ -343,9 +345,9 @@ def _lowest(link: Link) -> np.ndarray:
 
 
 def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
-    made = np.zeros(9)
-    mujoco.mju_quat2Mat(made, quaternion)
-    return made.reshape(3, 3)
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
 
 
 # The shape of a robot from its URDF, a file or the text on ``robot_description``.
@@ -439,7 +441,7 @@ class _Drawing:
         self._colours = {material.get('name', ''): material
                          for material in tree.findall('material')}
         self._meshes: dict[Path, np.ndarray] = {}
-        self._bytes, self._left = 0, TRIANGLES
+        self._bytes, self._remaining = 0, TRIANGLES
 
     def add(self, link: Link, visual: Xml.Element) -> None:
         """Add a visual to its link.
@@ -454,9 +456,9 @@ class _Drawing:
         colour = GREY if material is None else self._colour(material)
         for solid in visual.iterfind('geometry/*'):
             triangles = self._solid(solid)
-            if len(triangles) > self._left:
+            if len(triangles) > self._remaining:
                 raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
-            self._left -= len(triangles)
+            self._remaining -= len(triangles)
             link.add(triangles, colour, position, pose)
 
     def _colour(self, material: Xml.Element) -> tuple[float, ...]:
@@ -617,10 +619,10 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
             continue
         end = max(ends)
         # What is fixed to the last joint's link is the foot.
-        position = shape.links[end].place * 0.0
+        position = shape.links[end].position * 0.0
         tips = [link for link in shape.links if link.parent == end and not link.joint]
         if tips:
-            position = tips[-1].place
+            position = tips[-1].position
         elif shape.links[end].vertices:
             corners = shape.links[end].vertices[-1].reshape(-1, 3)
             position = corners.mean(axis=0)
@@ -631,10 +633,10 @@ def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
     if robot is None:
         legs, name = info.legs, info.robot or 'a robot'
         # Of legs that are called as those of the shipped networks: lh rh lf rf, left right.
-        places = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
+        quarters = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
                   for leg in legs}
     else:
         legs, name = _legs(info, robot), robot.name
-        places = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
+        quarters = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
                         -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
-    return draw(name, legs, places, _limits(robot))
+    return draw(name, legs, quarters, _limits(robot))

@@ -53,7 +53,7 @@ class Lease:
     def __init__(self) -> None:
         self.holder: Hashable | None = None
         self.confirmed: frozenset[bytes] = frozenset()
-        self._heard = 0.0
+        self._last_command = 0.0
 
     def acquire(self, who: Hashable, now: float) -> None:
         """Give the lease to ``who``, if it is free or already theirs; now is in s.
@@ -66,7 +66,7 @@ class Lease:
             self._pass_to(who, frozenset())
         elif self.holder != who:
             raise LeaseError(f'{self.holder} has control of the robot: take over first')
-        self._heard = now
+        self._last_command = now
 
     def take_over(self, who: Hashable, now: float,
                   others: frozenset[bytes] = frozenset()) -> Hashable | None:
@@ -78,13 +78,13 @@ class Lease:
         """
         lost = None if self.holder == who else self.holder
         self._pass_to(who, others)
-        self._heard = now
+        self._last_command = now
         return lost
 
     def renew(self, who: Hashable, now: float) -> None:
         """Record a sign of life of the holder."""
         if who == self.holder:
-            self._heard = now
+            self._last_command = now
 
     def release(self, who: Hashable) -> bool:
         """Give the lease back; return whether ``who`` held it."""
@@ -96,7 +96,7 @@ class Lease:
     def expire(self, now: float) -> Hashable | None:
         """End the lease of a holder that has been silent for too long; return it, or None."""
         holder = self.holder
-        if holder is None or now - self._heard <= SILENCE:
+        if holder is None or now - self._last_command <= SILENCE:
             return None
         self._pass_to(None, frozenset())
         return holder

@@ -93,10 +93,10 @@ class AccessControl:
         if origin and urlsplit(origin).netloc != host:
             return 'the request comes from a page of another site'
         if self._token:
-            given = parse_qs(urlsplit(path).query).get('token', [''])[0]
-            if not given:
+            token = parse_qs(urlsplit(path).query).get('token', [''])[0]
+            if not token:
                 return 'the token is missing'
-            if not hmac.compare_digest(given.encode(errors='replace'), self._token):
+            if not hmac.compare_digest(token.encode(errors='replace'), self._token):
                 return 'the token is wrong'
         # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
         elif not is_loopback(urlsplit(f'//{host}').hostname or ''):

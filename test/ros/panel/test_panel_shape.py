@@ -32,7 +32,7 @@ def worlds(shape, angles):
     found = []
     for link in shape.links:
         own, turn = np.eye(4), np.eye(4)
-        own[:3, :3], own[:3, 3] = link.pose, link.place
+        own[:3, :3], own[:3, 3] = link.pose, link.position
         x, y, z = link.axis
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         angle = angles.get(link.joint, link.zero) - link.zero

@@ -151,7 +151,7 @@ class ServoBus(StartedNode):
             raise InputError('servos of a pca9685 do not report their position, and the first '
                              'command moves them at full speed from wherever they are: lay the '
                              'robot in its rest pose, and set no_position_feedback to true')
-        self._asked = not blind
+        self._reads = not blind
         self._timeout: float = self._value('command_timeout')
         # Room for those of others, which must not displace the owner's.
         self._commands = PolledSubscription(self, Float64MultiArray, Servos.command_topic,
@@ -161,7 +161,7 @@ class ServoBus(StartedNode):
         #: Where servos that cannot be asked are taken to be: at rest, until they are commanded.
         self._assumed = self._calibration.rest
         #: When the owner, and one whose commands are refused, last commanded angles, s.
-        self._heard = self._refused_at = -math.inf
+        self._commanded_at = self._refused_at = -math.inf
         self._refusal = self._others = self._senders = ''
         self._reason = 'not commanded yet'
         self._board = open_board(self._calibration)
@@ -195,12 +195,12 @@ class ServoBus(StartedNode):
         now = time.monotonic()
         for message, _ in self._commands.receive():
             self._take(sender_of(message), np.array(message.data, dtype=float), now)
-        if self._driven and now - self._heard > self._timeout:
+        if self._driven and now - self._commanded_at > self._timeout:
             self._release(f'no command for {1e3 * self._timeout:.0f} ms', self._owner.sender)
         if self._driven:
             self._board.write(self._calibration.units(self._assumed))
         angles = self._assumed
-        if self._asked:
+        if self._reads:
             units = self._board.read()
             if units is None:
                 self.get_logger().warning('not all servos answer', throttle_duration_sec=QUIET)
@@ -234,7 +234,7 @@ class ServoBus(StartedNode):
         else:
             if not was_driven:
                 self.get_logger().info('the servos are driven')
-            self._assumed, self._heard = angles, now
+            self._assumed, self._commanded_at = angles, now
 
     def _refuse(self, reason: str, now: float) -> None:
         self._refusal, self._refused_at = f'refused: {reason}', now

@@ -28,17 +28,17 @@ import numpy as np
 _MIRRORED = bytes(int(f'{byte:08b}'[::-1], 2) for byte in range(256))
 
 
-def crc32(words: bytes) -> int:
+def crc32(data: bytes) -> int:
     """Return the check sum of little-endian 32-bit words.
 
     Args:
-        words: their bytes, a whole number of words.
+        data: their bytes, a whole number of words.
 
     """
-    turned = bytearray(len(words))
+    swapped = bytearray(len(data))
     for k in range(4):
-        turned[k::4] = words[3 - k::4]
-    reflected = zlib.crc32(turned.translate(_MIRRORED)) ^ 0xffffffff
+        swapped[k::4] = data[3 - k::4]
+    reflected = zlib.crc32(swapped.translate(_MIRRORED)) ^ 0xffffffff
     return int.from_bytes(reflected.to_bytes(4, 'little').translate(_MIRRORED), 'big')
 
 

@@ -50,12 +50,12 @@ MODELS = {'go2': Model((23.7, 23.7, 45.43), 150.0, 8.0),
           'b2': Model((200.0, 200.0, 320.0), 1000.0, 20.0)}
 
 
-def each(values: list[float], what: str, most: float) -> np.ndarray:
+def each(values: list[float], name: str, most: float) -> np.ndarray:
     """Return a number for each of the joints.
 
     Args:
         values: one for all, three for hip, thigh and calf, or one for each of JOINTS.
-        what: they are called.
+        name: of the parameter, for messages.
         most: largest that is allowed; from 0 on.
 
     Returns:
@@ -66,11 +66,11 @@ def each(values: list[float], what: str, most: float) -> np.ndarray:
 
     """
     if len(values) not in (1, len(PARTS), len(JOINTS)):
-        raise InputError(f'{what} has {len(values)} numbers: give one for all joints, three for '
+        raise InputError(f'{name} has {len(values)} numbers: give one for all joints, three for '
                          f'{", ".join(PARTS)}, or {len(JOINTS)}, for {", ".join(JOINTS)}')
     for value in values:
         if not 0.0 <= value <= most:
-            raise InputError(f'{what}: {value:g} is not from 0 to {most:g}')
+            raise InputError(f'{name}: {value:g} is not from 0 to {most:g}')
     return np.resize(np.array(values, dtype=float), len(JOINTS))
 
 
