@@ -30,42 +30,18 @@ derivatives of the positions whatever the network does, and whatever is done to 
 """
 
 from functools import lru_cache
-import math
 from typing import Any, NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import jit_entry, specialised
+from cpg_ros.dynamics.integration.c_kernel import library_of
 from cpg_ros.dynamics.integration.simulate import simulate
-from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion import readout
-from cpg_ros.motion.readout import (
-    confine,
-    DrivenJoints,
-    NoPhase,
-    observe,
-    over_cycle,
-    read_retimed,
-    retimed_phase,
-    Retiming,
-    stance,
-    TURN,
-    Waveform,
-    WaveReadout,
-)
-from cpg_ros.motion.strides import approach, lengthen, scale
+from cpg_ros.motion.core import CGait, core, look
+from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TURN, WaveReadout
 from cpg_ros.networks.registry import find_network
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
 POINTS = 4096
-#: Pull of a cell on its phase and amplitude, per stride; over how many strides it is smoothed (so
-#: much that they come back as fast as they can without overshoot); and the most it adds to the
-#: phase's speed, cycles a stride: joints never run backward.
-PULL, SMOOTHING, MOST = 1.0, 0.25, 0.5
-#: A cell further away than this many half ranges of its orbit counts as this far.
-FURTHEST = 2.0
-#: A phase off by a quarter of this (cycles) counts as far off as a half range.
-PHASE_SHARE = 4.0
 #: Least share of the first harmonic in a waveform's variance, for the phase to be followed.
 LEAST_SHARE = 0.1
 
@@ -106,111 +82,6 @@ class GaitCells(NamedTuple):
     phases: np.ndarray
     maps: np.ndarray
     known: PhaseMap
-
-
-@jit_entry
-def observe_phases(now, strides, gait, joints, clocks, angle, d_angle_d_phase, legs):
-    """Advance the cells' clocks and read joints and legs off them.
-
-    Args:
-        now: x, x', x'' of the components, two or more of each cell, shape (3, ...); only x
-            of the first two is used.
-        strides: since the last look; with 0 the clocks stand and are only read.
-        gait: GaitCells.
-        joints: DrivenJoints.
-        clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
-            stride) is above 1 now and at the next look, amplitude, its rate (per stride)
-            now and at the next look; and x, y and their derivatives by the strides.
-        angle: filled with the joints' deviation from their offset, rad.
-        d_angle_d_phase: filled with its derivative by the strides, rad per stride.
-        legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
-
-    Returns:
-        The largest distance of a cell from where the gait has it, in half ranges; 0 if the
-        clocks stand.
-
-    """
-    waves, phases, maps, (shape, circles, tables, harmonics, crests) = gait
-    cells, weights, leg_cells = joints
-    distance, sum_ = 0.0, 0.0
-    pull = PULL / (1.0 + 2.0 * PULL * strides)
-    fraction = strides / (SMOOTHING + strides)
-    for cell in range(waves.shape[0]):
-        wave = waves[cell]
-        if strides > 0.0:
-            # Both rates are linear in between, so that this is their exact integral.
-            phase = clocks[0, cell] + strides * (
-                1.0 + 0.5 * (clocks[1, cell] + clocks[2, cell]))
-            clocks[0, cell] = phase - math.floor(phase)
-            clocks[1, cell] = clocks[2, cell]
-            clocks[3, cell] += 0.5 * strides * (clocks[4, cell] + clocks[5, cell])
-            clocks[4, cell] = clocks[5, cell]
-        phase, amount = clocks[0, cell], clocks[3, cell]
-        c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
-        if strides > 0.0:
-            s, table, circle = shape[wave], tables[wave], circles[wave]
-            # The comparison keeps NaN from becoming an index.
-            place = phase * table.shape[0]
-            low = int(place) if place >= 0.0 else 0
-            t = place - low
-            low = low if low < table.shape[0] else 0
-            here, there = table[low], table[low + 1 if low + 1 < table.shape[0] else 0]
-            h01 = t * t * (3.0 - 2.0 * t)
-            h10, h11 = t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0)
-            v = here[0] + h01 * (there[0] - here[0]) + h10 * here[2] + h11 * there[2]
-            w = here[1] + h01 * (there[1] - here[1]) + h10 * here[3] + h11 * there[3]
-            x = (now[0, cell] - s[0]) / s[2]
-            y = (now[0, waves.shape[0] + cell] - s[1]) / s[3]
-            off = max(abs(x - v), abs(y - w), abs(amount - 1.0))
-            distance = max(distance, off)
-            sum_ += x + y
-            x = min(max(x, -FURTHEST), FURTHEST) - amount * v
-            y = min(max(y, -FURTHEST), FURTHEST) - amount * w
-            along = ((circle[0] * c1 + circle[1] * s1) * x
-                     + (circle[2] * c1 + circle[3] * s1) * y)
-            across = ((circle[1] * c1 - circle[0] * s1) * x
-                      + (circle[3] * c1 - circle[2] * s1) * y)
-            across = min(max(pull * across / TURN, -MOST), MOST)
-            clocks[2, cell] += fraction * (across - clocks[2, cell])
-            clocks[5, cell] += fraction * (pull * along - clocks[5, cell])
-        steep = 1.0
-        if maps[cell, 0] != 1.0:
-            phase, steep, _ = retimed_phase(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
-            c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
-        terms = harmonics[wave]
-        x, y, z = terms[0, 0], 0.0, 0.0
-        c, s_ = 1.0, 0.0
-        for k in range(1, terms.shape[0]):
-            c, s_ = c * c1 - s_ * s1, s_ * c1 + c * s1
-            in_phase = terms[k, 0] * c + terms[k, 1] * s_
-            quadrature = terms[k, 1] * c - terms[k, 0] * s_
-            x += in_phase
-            y += k * quadrature
-            z -= k * k * in_phase
-        speed, scale, rate = steep * TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
-        if amount < 1.0:
-            rest = (1.0 - amount * amount) if amount > 0.0 else 1.0
-            scale = 1.0 - rest * rest * rest
-            rate = 6.0 * max(amount, 0.0) * rest * rest * clocks[4, cell]
-        clocks[6, cell], clocks[7, cell] = scale * x, scale * y
-        clocks[8, cell] = scale * y * speed + rate * x
-        clocks[9, cell] = scale * z * speed + rate * y
-    base = clocks[0, leg_cells[0]] - phases[leg_cells[0]]
-    if strides > 0.0:
-        for cell in range(waves.shape[0]):
-            late = clocks[0, cell] - base - phases[cell]
-            distance = max(distance, PHASE_SHARE * abs(late - math.floor(late + 0.5)))
-    for joint in range(cells.shape[0]):
-        cell = cells[joint]
-        x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
-        angle[joint] = readout.value(weights[joint], x, y)
-        d_angle_d_phase[joint] = readout.rate(weights[joint], x, y, dx, dy)
-    for leg in range(leg_cells.shape[0]):
-        phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
-        phase -= math.floor(phase)
-        legs[leg] = phase if phase < 1.0 else 0.0
-    # max may lose a NaN; the sum keeps it.
-    return distance + 0.0 * sum_
 
 
 def smooth_terms(values: np.ndarray, harmonics: int) -> np.ndarray:
@@ -299,7 +170,6 @@ class PhaseReadout:
             of_cells[cells] = maps
         self.gait = GaitCells(orbit.waves, orbit.phases, of_cells, known)
         self.joints = DrivenJoints(cells, weights, leg_cells)
-        self._observe: Any = None
         self.start = float((orbit.phases[leg_cells[0]]
                             - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
         self.angles, self.rises = over_cycle(weights, lambda joint, phase: tuple(
@@ -309,20 +179,26 @@ class PhaseReadout:
     def clocks(self, phase: float) -> np.ndarray:
         """Return the cells' clocks where the gait has them at a phase of its orbit in cycles."""
         phases = self.gait.phases
-        clocks = np.zeros((10, phases.size))
+        clocks = np.zeros((6, phases.size))
         clocks[0], clocks[3] = (phase + phases) % 1.0, 1.0
         return clocks
 
+    def fields(self) -> dict[str, Any]:
+        """Return what the core reads joints and legs by, see core.CGait."""
+        waves, phases, maps, known = self.gait
+        mean, half = known.shape[:, None, :2], known.shape[:, None, 2:]
+        values = mean + half * known.tables[:, :, :2], half * known.tables[:, :, 2:]
+        return {'by_phase': 1, 'phase': phases, 'cells': phases.size, 'wave': waves,
+                'points': POINTS, 'waves': np.stack(values, axis=3).transpose(0, 2, 1, 3),
+                'shapes': known.shape, 'circles': known.circles, 'terms': known.terms,
+                'harmonics': known.terms.shape[1] - 1, 'crests': known.crests,
+                'maps': maps[self.joints.cells], **self.joints.fields()}
+
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
              d_angle_d_phase: np.ndarray, legs: np.ndarray) -> float:
-        """Advance clocks by some strides to a state and read joints and legs.
-
-        See observe_phases; arrays are C-contiguous and of float64.
-        """
-        arguments = now, strides, self.gait, self.joints, clocks, angle, d_angle_d_phase, legs
-        if self._observe is None:
-            self._observe = specialised(observe_phases, *arguments)
-        return self._observe(*arguments)
+        """Advance clocks by some strides to a state and read joints and legs; see core.look."""
+        gait = CGait(**self.fields(), shift=np.zeros(angle.size))
+        return look(gait, now.shape[1], now, strides, clocks, angle, d_angle_d_phase, legs)
 
 
 def _crest(terms: np.ndarray) -> float:
@@ -381,31 +257,15 @@ def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
 
 
 def precompile(name: str) -> None:
-    """Run each kernel that a network needs once, on the types the generator uses.
+    """Compile or load what a generator of a network runs: the core, and what steps the network.
 
     Args:
         name: as find_network takes it, and errors as of that.
 
     """
-    preset = next(iter(find_network(name).presets().values()))
-    network = preset.network
-    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
-                      symmetry=network.symmetry(preset.gait))
-    stepper.advance(2.0 * network.step)
-    some, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
-    joints, one = DrivenJoints(cells, np.zeros((1, 6)), cells), np.ones((1, 3))
-    if network.readout == 'waveform':
-        wave = Waveform(1.0, 1.0, np.zeros(8), table, table)
-        observe(stepper.now, wave, joints, some, some, some)
-        read_retimed(stepper.now, wave, joints, Retiming(np.zeros((4, 2)), np.ones((4, 4)), one),
-                     some, some)
-    else:
+    core()
+    network = next(iter(find_network(name).presets().values())).network
+    if not network.delay:
+        # Its orbits are first looked for by simulation.
         simulate(network, np.zeros(network.components), network.step, network.step)
-        known = PhaseMap(np.ones((1, 4)), np.ones((1, 4)), np.ones((1, 4, 4)),
-                         np.zeros((1, 2, 2)), some)
-        observe_phases(stepper.now, 1.0, GaitCells(cells, np.zeros(1), one, known), joints,
-                       np.zeros((10, 1)), some, some, some)
-    confine(some, some, np.zeros((3, 1)), 1.0, some, some, np.zeros(1, dtype=bool))
-    approach(some, some, 0.1, some, some)
-    lengthen(some, cells, some, np.zeros((4, 1)))
-    scale(1.0, 1.0, some, cells, some, np.zeros((4, 1)), some, some)
+    library_of(type(network))

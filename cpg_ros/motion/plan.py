@@ -25,6 +25,7 @@ from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.motion.body_file import GAIT_SPEEDS
+from cpg_ros.motion.core import CGait
 from cpg_ros.motion.phase_readout import joint_readout, PhaseReadout, standing
 from cpg_ros.motion.readout import Duty, extremes, NoPhase, WaveReadout
 from cpg_ros.motion.robot import Joint, Motion, Robot, SteeringTable
@@ -77,6 +78,8 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
     return None
 
 
+#: At rest: no state changes by more than this fraction of a cell's range in a stride.
+AT_REST = 0.05
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
 #: Periods of one orbit, solved for twice, agree to this share.
@@ -153,6 +156,17 @@ class GaitPlan(ShortRepr):
         network = self.orbit.network
         return Stepper(network, self.orbit, self.step, gain=self.gain,
                        symmetry=self.orbit.symmetry)
+
+    @cached_property
+    def core(self) -> CGait:
+        """The gait as the core in C takes it."""
+        orbit = self.orbit
+        return CGait(**{
+            **self.readout.fields(), 'frequency': self.frequency, 'period': orbit.period,
+            'start': self.readout.start, 'components': orbit.network.components,
+            'least': AT_REST * float(orbit.levels[0, 0, 1]), 'shift': self.shift,
+            'speed': self.speed, 'joint_leg': self.robot.leg_of_joint,
+            'in_place': self.in_place.joints.weights})
 
     @property
     def speeds(self) -> tuple[float, float]:

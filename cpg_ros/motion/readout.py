@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From cells to joints: what a network in its gait means for the legs, compiled.
+"""From cells to joints: what a network in its gait means for the legs.
 
 Here for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
 the gait's peak, y its derivative by phase. See phase_readout for those whose phase does.
@@ -23,8 +23,8 @@ import math
 from typing import Any, NamedTuple
 
 from cpg_ros.common.errors import CpgError, InputError
-from cpg_ros.dynamics.integration.compilation import inline, jit, jit_entry, specialised
 from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.motion.core import CGait, look, TABLE
 import numpy as np
 
 # The duty factor: how much of a stride a leg stands, whatever its network does.
@@ -33,7 +33,6 @@ import numpy as np
 LEAST, MOST = 0.3, 0.9
 
 
-@jit
 def retimed_phase(phase, k, centre, own):
     """Return the phase at which joints are read, and its first and second derivative by the phase.
 
@@ -132,18 +131,10 @@ class DrivenJoints(NamedTuple):
     weights: np.ndarray
     leg_cells: np.ndarray
 
-
-@inline
-def value(w, x, y):
-    """Return a joint's deviation from its offset, rad; w are its weights."""
-    return w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y + (w[4] * x + w[5] * y) * x * x
-
-
-@inline
-def rate(w, x, y, dx, dy):
-    """Return the derivative of a joint's angle from those of x and y, by whatever they are."""
-    return ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x + 2.0 * w[5] * x * y) * dx
-            + (w[1] + w[3] * x + w[5] * x * x) * dy)
+    def fields(self) -> dict[str, Any]:
+        """Return them as the core takes them, see core.CGait."""
+        return {'joints': self.cells.size, 'joint_cell': self.cells, 'weights': self.weights,
+                'legs': self.leg_cells.size, 'leg_cell': self.leg_cells}
 
 
 def monomials(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -193,8 +184,6 @@ def over_cycle(weights: np.ndarray, signals: Callable[[int, np.ndarray], tuple[n
 
 #: Entries of the tables over one cycle.
 POINTS = 512
-#: Squares of a size below this are those of a cell at rest, which has no phase.
-REST = 1e-12
 
 
 class Waveform(NamedTuple):
@@ -233,68 +222,6 @@ class Retiming(NamedTuple):
     maps: np.ndarray
 
 
-@jit
-def _hermite(table, column, cycles):
-    """Return value and slope per cycle of a periodic table of values and slopes per entry."""
-    place = (cycles - math.floor(cycles)) * table.shape[0]
-    # A comparison that NaN fails, too: it must not become an index.
-    low = int(place) if place >= 0.0 else 0
-    t = place - low
-    low = low if low < table.shape[0] else 0
-    high = low + 1 if low + 1 < table.shape[0] else 0
-    a, b = table[low, column], table[high, column]
-    da, db = table[low, column + 1], table[high, column + 1]
-    gap = b - a
-    value = a + t * (da + t * (3.0 * gap - 2.0 * da - db + t * (da + db - 2.0 * gap)))
-    slope = da + t * (6.0 * gap - 4.0 * da - 2.0 * db + t * (3.0 * (da + db) - 6.0 * gap))
-    return value, slope * table.shape[0]
-
-
-@jit_entry
-def read_retimed(now, wave, joints, retiming, angle, d_angle_d_phase):
-    """Read joints off a network's state at the retimed phase.
-
-    Args:
-        now: x, x', x'' of the cells, shape (3, cells).
-        wave: Waveform of the gait.
-        joints: DrivenJoints.
-        retiming: Retiming.
-        angle: filled with the joints' deviation from their offset, rad.
-        d_angle_d_phase: filled with its derivative by phase, rad per cycle.
-
-    """
-    peak, by_phase = wave.peak, wave.period / TURN
-    lead, cycle, maps = retiming
-    last, x, y, dx, dy = -1, 0.0, 0.0, 0.0, 0.0
-    for joint in range(joints.cells.shape[0]):
-        cell = joints.cells[joint]
-        if cell != last:
-            last = cell
-            x = now[0, cell] / peak
-            y = now[1, cell] * by_phase / peak
-            z = now[2, cell] * by_phase * by_phase / peak
-            square = x * x + y * y
-            # Derivatives by the phase that advances evenly, in radians.
-            turning = (y * y - x * z) / square if square > REST else 1.0
-            growing = y * (x + z) / square if square > REST else 0.0
-            turn = math.atan2(-y, x) / TURN
-            ahead, slope = _hermite(lead, 0, turn)
-            theta, going = turn + ahead, (1.0 + slope) * turning
-            own_x, own_y = _hermite(cycle, 0, theta)[0], _hermite(cycle, 2, theta)[0]
-            own_z = _hermite(cycle, 2, theta)[1] / TURN
-            whole = own_x * own_x + own_y * own_y
-            size = math.sqrt(square / whole)
-            growing = size * (growing - going * own_y * (own_x + own_z) / whole)
-            phase, steep, _ = retimed_phase(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
-            unit_x, unit_y = _hermite(cycle, 0, phase)[0], _hermite(cycle, 2, phase)[0]
-            unit_z = _hermite(cycle, 2, phase)[1] / TURN
-            speed = size * steep * going
-            x, y = size * unit_x, size * unit_y
-            dx, dy = speed * unit_y + growing * unit_x, speed * unit_z + growing * unit_y
-        angle[joint] = value(joints.weights[joint], x, y)
-        d_angle_d_phase[joint] = TURN * rate(joints.weights[joint], x, y, dx, dy)
-
-
 def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
     """Return lead and cycle of a Retiming; the waveform must determine its phase."""
     grid = np.arange(POINTS) / POINTS
@@ -318,99 +245,8 @@ def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([theta - grid, (faster - 1.0) / POINTS], axis=1), cycle
 
 
-#: Entries of the tables over one cycle.
-TABLE = 512
-
-
 class NoPhase(CpgError):
     """A waveform does not determine its phase and so cannot drive joints; the message says why."""
-
-
-@jit
-def lookup(table, cycles):
-    """Periodic table with linear interpolation, at a place in cycles."""
-    place = (cycles - math.floor(cycles)) * table.shape[0]
-    # A comparison that NaN fails, too: it must not become an index.
-    low = int(place) if place >= 0.0 else 0
-    rest = place - low
-    low = low if low < table.shape[0] else 0
-    high = low + 1 if low + 1 < table.shape[0] else 0
-    return table[low] + rest * (table[high] - table[low])
-
-
-@jit_entry
-def observe(now, wave, joints, angle, d_angle_d_phase, legs):
-    """Read joints and legs off a network's state.
-
-    Args:
-        now: x, x', x'' of the cells, shape (3, cells).
-        wave: Waveform of the gait.
-        joints: DrivenJoints.
-        angle: filled with the joints' deviation from their offset, rad.
-        d_angle_d_phase: filled with its derivative by phase, rad per cycle.
-        legs: filled with the legs' phases in cycles, [0, 1).
-
-    Returns:
-        The largest distance of a cell from where the gait has it, in units of the peak.
-
-    """
-    peak, by_phase = wave.peak, wave.period / TURN
-    for joint in range(joints.cells.shape[0]):
-        cell = joints.cells[joint]
-        x = now[0, cell] / peak
-        y = now[1, cell] * by_phase / peak
-        z = now[2, cell] * by_phase * by_phase / peak
-        angle[joint] = value(joints.weights[joint], x, y)
-        d_angle_d_phase[joint] = TURN * rate(joints.weights[joint], x, y, y, z)
-    for leg in range(joints.leg_cells.shape[0]):
-        cell = joints.leg_cells[leg]
-        turn = math.atan2(-now[1, cell] * by_phase, now[0, cell]) / TURN
-        phase = turn + lookup(wave.lead, turn)
-        legs[leg] = phase - math.floor(phase)
-    base = legs[0] - wave.phases[joints.leg_cells[0]]
-    distance, sum_ = 0.0, 0.0
-    for cell in range(wave.phases.shape[0]):
-        off = abs(now[0, cell] / peak - lookup(wave.values, base + wave.phases[cell]))
-        distance = max(distance, off)
-        sum_ += off
-    # max may lose a NaN; the sum keeps it.
-    return distance + 0.0 * sum_
-
-
-@jit_entry
-def confine(wanted, wanted_rate, limits, dt, position, velocity, behind):
-    """Move joints to the wanted positions within their limits; count those held back.
-
-    Where a limit bites, and where a joint catches up, velocity is the difference quotient, so that
-    it stays the derivative of what is published.
-
-    Args:
-        wanted: positions, rad, shape (joints,).
-        wanted_rate: their velocities, rad/s.
-        limits: lowest and highest angle, rad, and largest speed, rad/s, shape (3, joints).
-        dt: since the last tick, s.
-        position: of the last tick, rad; overwritten.
-        velocity: filled, rad/s.
-        behind: whether a limit held each joint back in the last tick; overwritten.
-
-    """
-    held, (lower, upper, speed) = 0, limits
-    for joint in range(position.shape[0]):
-        last = position[joint]
-        reach = speed[joint] * dt * (1.0 + 1e-9)
-        new = min(max(wanted[joint], last - reach), last + reach)
-        new = min(max(new, lower[joint]), upper[joint])
-        rate = wanted_rate[joint]
-        short = new != wanted[joint]
-        if short or abs(rate) > speed[joint] * (1.0 + 1e-9):
-            held += 1
-            rate = (new - last) / dt if dt > 0.0 else 0.0
-        elif behind[joint]:
-            rate = (new - last) / dt if dt > 0.0 else 0.0
-        behind[joint] = short
-        position[joint] = new
-        velocity[joint] = min(max(rate, -speed[joint]), speed[joint])
-    return held
 
 
 def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -468,8 +304,6 @@ class WaveReadout:
         z = orbit.waveform(theta, 2) / (TURN**2 * orbit.peak)
         self.wave = Waveform(orbit.peak, orbit.period, orbit.phases, x, lead_table(x, y))
         self.joints = DrivenJoints(cells, weights, leg_cells)
-        self._observe: Any = None
-        self._read_retimed: Any = None
         self.start = float(orbit.phases[leg_cells[0]])
         self.retiming = None
         if maps is None or (maps[:, 0] == 1.0).all():
@@ -481,25 +315,22 @@ class WaveReadout:
             orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3)), maps, TABLE)
 
     def clocks(self, phase: float) -> np.ndarray:
-        """Return an empty array: the state alone determines the joints."""
-        return np.empty((0, 0))
+        """Return what is nothing here: the state alone determines the joints."""
+        return np.zeros((6, self.wave.phases.size))
+
+    def fields(self) -> dict[str, Any]:
+        """Return what the core reads joints and legs by, see core.CGait."""
+        wave, joints, retiming = self.wave, self.joints, self.retiming
+        turn, cycle, maps = (None,) * 3 if retiming is None else retiming
+        return {'peak': wave.peak, 'period': wave.period, 'phase': wave.phases,
+                'cells': wave.phases.size, 'values': wave.values, 'lead': wave.lead,
+                'turn': turn, 'cycle': cycle, 'maps': maps, **joints.fields()}
 
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
              d_angle_d_phase: np.ndarray, legs: np.ndarray) -> float:
-        """Read joints and legs off a state, however many strides after the last.
-
-        See observe; arrays are C-contiguous and of float64.
-        """
-        arguments = now, self.wave, self.joints, angle, d_angle_d_phase, legs
-        if self._observe is None:
-            self._observe = specialised(observe, *arguments)
-        distance: float = self._observe(*arguments)
-        if self.retiming is not None:
-            retimed = now, self.wave, self.joints, self.retiming, angle, d_angle_d_phase
-            if self._read_retimed is None:
-                self._read_retimed = specialised(read_retimed, *retimed)
-            self._read_retimed(*retimed)
-        return distance
+        """Read joints and legs off a state; see core.look."""
+        gait = CGait(**self.fields(), shift=np.zeros(angle.size))
+        return look(gait, now.shape[1], now, strides, clocks, angle, d_angle_d_phase, legs)
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

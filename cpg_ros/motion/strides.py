@@ -14,10 +14,12 @@
 
 """Steering a gait: how long each leg's stride is, and how fast strides follow one another."""
 
+import ctypes
 import math
 from typing import TypeVar
 
 from cpg_ros.dynamics.integration.compilation import jit_entry
+from cpg_ros.motion.core import core, Drive
 import numpy as np
 
 Real = TypeVar('Real', float, np.ndarray)
@@ -38,7 +40,6 @@ def come_to_rest(start: Real, rate: Real, end: Real | float, time: float, s: flo
 
 #: Targets are approached with this time constant, s.
 TIME_CONSTANT = 0.2
-_NOTHING = np.zeros(0)
 
 
 @jit_entry
@@ -65,51 +66,6 @@ def approach(targets, trim, dt, now, rate):
         rate[k] = (rate[k] - pull * dt / TIME_CONSTANT) * decay
 
 
-@jit_entry
-def lengthen(stride, leg, shift, motion):
-    """Scale the joints' motion to the strides of their legs.
-
-    Args:
-        stride: of each leg, shape (legs,).
-        leg: of each joint, shape (joints,); all others too.
-        shift: added to the angles, rad.
-        motion: shape (4, joints): deviations of the gait from the stand, rad, and their
-            derivatives by phase, rad per cycle, both overwritten; deviations of the gait in
-            place, rad, overwritten with the derivatives of the angles by the stride; and their
-            derivatives by phase, rad per cycle.
-
-    """
-    # angle = in_place + stride (angle - in_place), and so its derivatives.
-    angle, d_angle_d_phase, reach, lift = motion
-    for joint in range(len(leg)):
-        longer = stride[leg[joint]] - 1.0
-        reach[joint] = angle[joint] - reach[joint]
-        d_angle_d_phase[joint] += longer * (d_angle_d_phase[joint] - lift[joint])
-        angle[joint] += longer * reach[joint] + shift[joint]
-
-
-@jit_entry
-def scale(level, frequency, change, leg, offset, motion, wanted, speed):
-    """Fill in the joints' angles, rad, and velocities, rad/s, of a gait, shape (joints,).
-
-    Args:
-        level: share of the gait about the stand.
-        frequency: of the stride, Hz.
-        change: of the legs' strides, 1/s, shape (legs,).
-        leg: of each joint, shape (joints,); all others too.
-        offset: the stand, rad.
-        motion: as lengthen leaves it, shape (4, joints).
-        wanted: filled, rad.
-        speed: filled, rad/s.
-
-    """
-    angle, d_angle_d_phase, reach, _ = motion
-    for joint in range(len(leg)):
-        wanted[joint] = level * angle[joint] + offset[joint]
-        speed[joint] = level * (frequency * d_angle_d_phase[joint] + change[leg[joint]]
-                                * reach[joint])
-
-
 class StrideCommand:
     """Strides of the legs and their pace, on the way to their targets.
 
@@ -120,22 +76,35 @@ class StrideCommand:
         stride: factor of each leg's stride, shape (legs,); 1 is the gait as it is.
         rate: its derivative, 1/s.
         pace: factor of the stride frequency.
-        trim: added to the targets of the strides, shape (legs,), such as by feedback; None for
-            nothing.
 
     """
 
     def __init__(self, legs: int) -> None:
         # One row: the legs' strides and the pace.
-        self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
-        self._target = (np.ones(legs + 1), False)
+        self._now, self._goal = np.ones((2, legs + 1))
+        self._rate = np.zeros(legs + 1)
+        self._target = self._taken = (np.ones(legs + 1), False)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
-        self.trim: np.ndarray | None = None
+        self._trim: np.ndarray | None = None
+        self._struct = Drive(self._now.ctypes.data, self._rate.ctypes.data,
+                             self._goal.ctypes.data, None, legs, 0)
+        self.address = ctypes.addressof(self._struct)
 
     @property
     def pace(self) -> float:
         """Factor of the stride frequency."""
         return float(self._now[-1])
+
+    @property
+    def trim(self) -> np.ndarray | None:
+        """Added to the targets of the strides, shape (legs,), such as by feedback, or None."""
+        return self._trim
+
+    @trim.setter
+    def trim(self, trim: np.ndarray | None) -> None:
+        if trim is not self._trim:
+            self._trim = None if trim is None else np.ascontiguousarray(trim, dtype=float)
+            self._struct.trim = None if self._trim is None else self._trim.ctypes.data
 
     def set_target(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
         """Set the targets, to be reached at once where nothing moves yet.
@@ -144,10 +113,14 @@ class StrideCommand:
         """
         self._target = np.append(stride, pace), at_once
 
+    def take_target(self) -> None:
+        """Let the core see the newest targets; belongs to the thread of advance."""
+        target = self._target
+        if target is not self._taken:
+            self._taken = target
+            self._goal[:], self._struct.at_once = target
+
     def advance(self, dt: float) -> None:
         """Advance by dt in s."""
-        target, at_once = self._target
-        if at_once:
-            self._now[:], self._rate[:] = target, 0.0
-            return
-        approach(target, _NOTHING if self.trim is None else self.trim, dt, self._now, self._rate)
+        self.take_target()
+        core().cpg_steer(self.address, dt)

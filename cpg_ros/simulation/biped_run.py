@@ -21,8 +21,8 @@ from cpg_ros.common.errors import ShortRepr
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.core import confine
 from cpg_ros.motion.pattern import GaitRunner
-from cpg_ros.motion.readout import confine
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.run_metrics import cost_of_transport, motor_power

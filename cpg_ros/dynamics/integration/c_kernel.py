@@ -57,7 +57,7 @@ def _sources(network: type[Network]) -> dict[str, str]:
 
 
 @cache
-def _version() -> str:
+def version() -> str:
     """Return a word that changes whenever something does that the C is written by."""
     digest = hashlib.sha256(platform.machine().encode())
     for source in sorted(FOLDER.parent.rglob('*.[chp]*')):
@@ -66,9 +66,21 @@ def _version() -> str:
     return digest.hexdigest()[:14]
 
 
-def _library(network: type[Network]) -> ctypes.CDLL:
-    return load(generated.folder(equations_of(network).key), f'kernel-{_version()}',
-                lambda: _sources(network), f"the kernels of the network '{network.name}'")
+@cache
+def library_of(network: type[Network]) -> ctypes.CDLL:
+    """Return the library that steps a kind of network.
+
+    Raises:
+        NoCompiler: it is not on disk, and there is no compiler, or it fails.
+
+    """
+    library = load(generated.folder(equations_of(network).key), f'kernel-{version()}',
+                   lambda: _sources(network), f"the kernels of the network '{network.name}'")
+    pointer, whole = ctypes.c_void_p, ctypes.c_int
+    library.set_slope.argtypes = pointer, whole
+    library.advance.argtypes = pointer, pointer, ctypes.c_double, pointer
+    library.steps.argtypes = pointer, whole, whole, whole, whole, pointer, pointer
+    return library
 
 
 def _track_of(components: int) -> type[ctypes.Structure]:
@@ -81,7 +93,7 @@ def _track_of(components: int) -> type[ctypes.Structure]:
         ('carry', real * components)]})
 
 
-class _Lane:
+class Lane:
     """A system of one lane and its history, as C takes them."""
 
     def __init__(self, kind: type[ctypes.Structure], system: System, ring: Ring) -> None:
@@ -95,6 +107,12 @@ class _Lane:
         self._track = kind(p, system.gain, system.tau[0] / ring.step, ring.step, 0.0, x, after,
                            before, len(system.basis), basis, 0, len(ring.x), 0)
         self.pointer = ctypes.byref(self._track)
+        self.address = ctypes.addressof(self._track)
+
+
+def lane_of(network: type[Network], system: System, ring: Ring) -> Lane:
+    """Return a system of one lane and its history for the functions of library_of."""
+    return Lane(_track_of(network.cells * network.variables), system, ring)
 
 
 def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Ring]]:
@@ -116,16 +134,12 @@ def c_kernels(network: type[Network]) -> Kernels:
         NoCompiler: they are not on disk, and there is no compiler, or it fails.
 
     """
-    library, components = _library(network), network.cells * network.variables
+    library, components = library_of(network), network.cells * network.variables
     kind, last = _track_of(components), None
-    pointer, whole = ctypes.c_void_p, ctypes.c_int
-    library.set_slope.argtypes = pointer, whole
-    library.advance.argtypes = pointer, pointer, ctypes.c_double, pointer
-    library.steps.argtypes = pointer, whole, whole, whole, whole, pointer, pointer
 
     def set_slope(system: System, ring: Ring, head: int) -> None:
         for one in _split(system, ring, ring.x.shape[1] // components):
-            library.set_slope(_Lane(kind, *one).pointer, head)
+            library.set_slope(Lane(kind, *one).pointer, head)
 
     def advance(system: System, ring: Ring, clock: np.ndarray, duration: float, out: np.ndarray
                 ) -> None:
@@ -133,7 +147,7 @@ def c_kernels(network: type[Network]) -> Kernels:
         lane = last
         # Of the same stepper as the last time, mostly: its addresses are known.
         if lane is None or lane.system is not system or lane.ring is not ring:
-            last = lane = _Lane(kind, system, ring)
+            last = lane = Lane(kind, system, ring)
         library.advance(lane.pointer, clock.ctypes.data, duration, out.ctypes.data)
 
     def integrate(system: System, ring: Ring, head: int, steps: int, noise: float, seed: int,
@@ -144,7 +158,7 @@ def c_kernels(network: type[Network]) -> Kernels:
         spare, end = np.empty((2, *states.shape[1:])), head
         for lane, one in enumerate(_split(system, ring, ring.x.shape[1] // components)):
             kept = (states[lane], slopes[lane]) if lane < len(states) else spare
-            end = library.steps(_Lane(kind, *one).pointer, head, steps, every, row,
+            end = library.steps(Lane(kind, *one).pointer, head, steps, every, row,
                                 *(array.ctypes.data for array in kept))
         return end
 

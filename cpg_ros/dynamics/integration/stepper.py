@@ -35,6 +35,9 @@ class Stepper:
 
     Attributes:
         now: x, x', x'' at the output instant, shape (3, components), overwritten by ``advance``.
+        system: the network as kernels take it, and its symmetry lock.
+        ring: the history.
+        clock: the newest node, and the model time from the output instant to it, shape (2,).
 
     """
 
@@ -65,7 +68,7 @@ class Stepper:
         nodes = math.ceil(max_delay / step) + 3
         states, slopes = sample_history(history, nodes, step, network.components)
         self._x, self._after, self._before = states, slopes, slopes.copy()
-        self._clock = np.array([nodes - 1, 0.0])
+        self.clock = np.array([nodes - 1, 0.0])
         self._tau = np.empty(1)
         self.now = np.empty((3, network.components))
         self.set(network, gain, symmetry)
@@ -90,11 +93,11 @@ class Stepper:
         self.network, self.gain, self.symmetry = network, gain, symmetry
         self._kernels = kernel.kernels(type(network))
         self._tau[0] = network.delay
-        self._system = System(
+        self.system = System(
             network.coefficients, self._tau, float(gain),
             np.zeros((1, network.components)) if symmetry is None else symmetry.basis)
-        self._ring = Ring(self.step, self._x, self._after, self._before)
-        self._kernels.set_slope(self._system, self._ring, int(self._clock[0]))
+        self.ring = Ring(self.step, self._x, self._after, self._before)
+        self._kernels.set_slope(self.system, self.ring, int(self.clock[0]))
 
     def advance(self, duration: float) -> np.ndarray:
         """Advance by a duration in model time (0 or more).
@@ -103,13 +106,13 @@ class Stepper:
 
         The array returned is the same one every time.
         """
-        self._kernels.advance(self._system, self._ring, self._clock, duration, self.now)
+        self._kernels.advance(self.system, self.ring, self.clock, duration, self.now)
         return self.now
 
     def copy(self) -> 'Stepper':
         """Return an independent stepper in the same state."""
         twin = copy.copy(self)
-        for name in ('_x', '_after', '_before', '_clock', '_tau', 'now'):
+        for name in ('_x', '_after', '_before', 'clock', '_tau', 'now'):
             setattr(twin, name, getattr(self, name).copy())
         twin.set(self.network, self.gain, self.symmetry)
         return twin
@@ -117,16 +120,16 @@ class Stepper:
     @property
     def ahead(self) -> float:
         """Model time from the output instant to the newest node, less than a step."""
-        return float(self._clock[1])
+        return float(self.clock[1])
 
     def newest(self) -> np.ndarray:
         """Return the state at the newest node, shape (components,)."""
-        return self._x[int(self._clock[0])].copy()
+        return self._x[int(self.clock[0])].copy()
 
     def disturb(self, offset: np.ndarray) -> None:
         """Add an offset, shape (components,), to the newest state; the history before it stays."""
-        self._x[int(self._clock[0])] += offset
-        self._kernels.set_slope(self._system, self._ring, int(self._clock[0]))
+        self._x[int(self.clock[0])] += offset
+        self._kernels.set_slope(self.system, self.ring, int(self.clock[0]))
 
     def superpose(self, motion: Callable[[np.ndarray], np.ndarray],
                   slope: Callable[[np.ndarray], np.ndarray]) -> None:
@@ -139,11 +142,11 @@ class Stepper:
             slope: its derivative, per model time, likewise.
 
         """
-        nodes, newest = len(self._x), int(self._clock[0])
+        nodes, newest = len(self._x), int(self.clock[0])
         times = (np.arange(nodes) - nodes + 1) * self.step
         oldest_first = (newest + 1 + np.arange(nodes)) % nodes
         self._x[oldest_first] += motion(times)
         slopes = slope(times)
         self._after[oldest_first] += slopes
         self._before[oldest_first] += slopes
-        self._kernels.set_slope(self._system, self._ring, newest)
+        self._kernels.set_slope(self.system, self.ring, newest)

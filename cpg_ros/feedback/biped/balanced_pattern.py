@@ -24,9 +24,9 @@ from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, FEET, IMU, JOINTS, 
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.core import confine
 from cpg_ros.motion.pattern import GaitRunner, Pattern
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.readout import confine
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
 
@@ -177,7 +177,7 @@ class BalancedPattern(Pattern):
             if self._held or self.balancing:
                 self._held = self.balancing = self.crouching = False
                 self._wanted[:], self._rate[:] = self.position, 0.0
-                self._absorption.begin()
+                self._absorb()
             super().advance(dt)
             return
         if self._arms is not balance.arms:
@@ -276,10 +276,11 @@ class BalancedPattern(Pattern):
             if isinstance(what, bool):
                 self.enabled = what
                 self.doubts.clear()
-                self._ramp.go(float(what), how)
+                self._go(self._ramp, float(what), how)
             else:
                 balance.follow(how)
-        self._tracks[:] = [balance.track]
+        if self._tracks[0] is not balance.track or len(self._tracks) > 1:
+            self._run([balance.track])
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Count inputs as out that contradict the others while it balances."""

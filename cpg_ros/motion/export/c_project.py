@@ -137,9 +137,11 @@ class CProject:
     def parts(self) -> tuple[str, ...]:
         """Files of ``c`` that make ``cpg.c``."""
         if self.data.format.form == 'table':
-            return 'common', 'table_track', 'pattern'
-        readout = 'waveform' if self.data.network.readout == 'waveform' else 'phase'
-        return 'common', 'kink', 'network', 'seed', readout, 'network_track', 'pattern'
+            return 'common', 'table_track', 'pattern', 'control'
+        readout = (('observe', 'waveform') if self.data.network.readout == 'waveform' else
+                   ('phase',))
+        return ('common', 'kink', 'network', 'seed', 'joints', *readout, 'network_track',
+                'pattern', 'control')
 
     def _source(self) -> str:
         texts = [part(f'{name}.c') for name in self.parts]

@@ -27,12 +27,15 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.c_text import braces
 from cpg_ros.motion.export.c_project import CProject
 from cpg_ros.motion.export.gait_data import c_name, CFormat, distinct_joints, GaitData, leg_phases
-from cpg_ros.motion.pattern import SHIFTING, SHORT_OF, SHORTEST
+from cpg_ros.motion.pattern import SHORTEST
 from cpg_ros.motion.plan import GaitPlan
 import numpy as np
 
 POINTS = 256
 POSITION = 13
+#: As of pattern.c: a shift between stand and gait is covered at this many times it a second, and
+#: substeps keep to this share of the bound on speed.
+SHIFTING, SHORT_OF = 2.0, 0.997
 #: Most bits of an angle, so that the difference of two fits, too; and of a rate.
 ANGLE_BITS, RATE_BITS = 14, 13
 LEAST_TICKS = 4

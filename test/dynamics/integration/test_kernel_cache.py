@@ -190,7 +190,7 @@ def test_what_compiled_code_takes_from_other_files_is_watched():
                 used = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
                 seen |= {imported[name] for name in used & set(imported)
                          if imported[name].startswith('cpg_ros.')}
-    assert 'cpg_ros.motion.readout' in seen
+    assert 'cpg_ros.motion.strides' in seen
     assert {'.'.join(module.split('.')[:2]) for module in seen} <= watched
 
 

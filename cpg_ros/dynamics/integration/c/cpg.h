@@ -55,17 +55,24 @@ typedef struct {
     cpg_real start, rate, end, time;
 } cpg_ramp_part;
 
+/* A level on the way to its target, and its rate, 1/s. */
+typedef struct {
+    cpg_real level, rate, past;
+    cpg_ramp_part part[2];
+    uint8_t parts;
+} cpg_ramp;
+
 typedef struct cpg {
     cpg_real position[CPG_JOINTS];  /* rad, leg by leg */
     cpg_real velocity[CPG_JOINTS];  /* rad/s */
     cpg_real level;                 /* 0 at the stand, 1 in the full gait */
     uint8_t held;                   /* joints that a limit held back in this tick */
     /* What follows is its own. */
-    uint8_t tracks, ramp_parts, waiting, followed;
+    uint8_t tracks, waiting, followed;
     uint8_t behind[CPG_JOINTS];
     cpg_track track[CPG_TRACKS];
-    cpg_ramp_part ramp[2];
-    cpg_real ramp_past, level_rate, slowing, slower, frequency, transition;
+    cpg_ramp ramp;
+    cpg_real slowing, slower, frequency, transition;
     cpg_real last_rate[CPG_JOINTS];
 } cpg;
 
@@ -144,6 +151,9 @@ typedef struct {
 } cpg_gait;
 
 extern CPG_ROM cpg_gait cpg_gaits[CPG_GAITS];
+#define gait_of(t) (&cpg_gaits[(t)->gait])
+#define TRACK(n) (&c->track[n])
+#define speed_of(c, t, joint, frequency) ((t)->rise[joint] * (frequency))
 extern CPG_ROM cpg_real cpg_offset[CPG_JOINTS];
 extern CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS];  /* lowest, highest, fastest */
 #ifndef CPG_TABLE

@@ -8,7 +8,7 @@ typedef double cpg_real;
 @DEFINES@
 #define CPG_NODES (t->nodes)
 #define CPG_STEP (t->step)
-#define cpg_gaits (&t->lock)
+#define gait_of(t) (&(t)->lock)
 
 typedef struct {
     int16_t basis_rows;

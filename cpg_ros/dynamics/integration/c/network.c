@@ -30,7 +30,7 @@ static void rates(const cpg_track *t, const cpg_real *driven, const cpg_real *x,
     }
     field(z, driven, t->p, out);
     if (t->gain > R(0.0)) {
-        CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
+        CPG_ROM cpg_gait *gait = gait_of(t);
         for (int16_t i = 0; i < CPG_COMPONENTS; i++) {
             out[i] -= t->gain * z[i];
         }

@@ -12,7 +12,7 @@ static void align(cpg_track *t, uint8_t gait, cpg_real phase)
 
 static void move(cpg_track *t, cpg_real strides)
 {
-    run(t, strides * cpg_gaits[t->gait].period);
+    run(t, strides * gait_of(t)->period);
     look(t, strides);
     const cpg_real expected = t->phase + strides;
     const cpg_real error = fraction(t->legs[0] - expected + R(0.5)) - R(0.5);

@@ -6,13 +6,21 @@
 
 enum { PHASE, SPEED, NEXT_SPEED, AMOUNT, GROWTH, NEXT_GROWTH };
 
+#ifndef CPG_HOST
+static void output(const cpg_track *t, cpg_real *state)
+{
+    past_state(t, t->ahead / CPG_STEP, state);
+}
+#endif
+
 static void begin_clocks(cpg_track *t, cpg_real phase)
 {
+    CPG_ROM cpg_gait *gait = gait_of(t);
     for (int16_t cell = 0; cell < CPG_CELLS; cell++) {
         for (int16_t k = 0; k < 6; k++) {
             t->clocks[k][cell] = R(0.0);
         }
-        t->clocks[PHASE][cell] = fraction(phase + cpg_gaits[t->gait].phase[cell]);
+        t->clocks[PHASE][cell] = fraction(phase + gait->phase[cell]);
         t->clocks[AMOUNT][cell] = R(1.0);
     }
 }
@@ -20,7 +28,7 @@ static void begin_clocks(cpg_track *t, cpg_real phase)
 /* Draw a cell's clock to what the cell does; now is its first two variables. */
 static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_real *now)
 {
-    CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
+    CPG_ROM cpg_gait *gait = gait_of(t);
     const int16_t wave = gait->wave[cell];
     CPG_ROM cpg_real *shape = gait->shapes + 4 * wave, *circle = gait->circles + 4 * wave;
     CPG_ROM cpg_real *table = gait->waves + (int32_t)wave * CPG_VARIABLES * gait->points * 2;
@@ -29,13 +37,19 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
     const cpg_real share = strides / (SMOOTHING + strides);
     const cpg_real c1 = F(cos)(TURN * phase), s1 = F(sin)(TURN * phase);
     cpg_real rest, slope, off[2];
+#ifdef CPG_HOST
+    watch(t, amount - R(1.0));
+#endif
     const int16_t low = place_of(phase, gait->points, &rest);
     for (int16_t v = 0; v < 2; v++) {
         const cpg_real there = lookup(table + (int32_t)v * gait->points * 2, 2, gait->points, low,
                                       rest, &slope);
         const cpg_real mean = shape[v], half = shape[2 + v];
-        off[v] = within((now[v] - mean) / half, -FURTHEST, FURTHEST)
-               - amount * (there - mean) / half;
+        const cpg_real at = (now[v] - mean) / half;
+#ifdef CPG_HOST
+        watch(t, (now[v] - there) / half);
+#endif
+        off[v] = within(at, -FURTHEST, FURTHEST) - amount * (there - mean) / half;
     }
     const cpg_real along = (circle[0] * c1 + circle[1] * s1) * off[0]
                          + (circle[2] * c1 + circle[3] * s1) * off[1];
@@ -49,7 +63,7 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
 /* x and y of a cell by its clock, and their derivatives by the strides. */
 static void signal_of(const cpg_track *t, int16_t cell, int16_t joint, cpg_real *signal)
 {
-    CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
+    CPG_ROM cpg_gait *gait = gait_of(t);
     CPG_ROM cpg_real *terms = gait->terms + gait->wave[cell] * 2 * (1 + CPG_HARMONICS);
     cpg_real phase = t->clocks[PHASE][cell], steep = R(1.0);
     const cpg_real amount = t->clocks[AMOUNT][cell];
@@ -87,10 +101,10 @@ static void signal_of(const cpg_track *t, int16_t cell, int16_t joint, cpg_real 
 /* Advance the cells' clocks by some strides and read joints and legs off them. */
 static void look(cpg_track *t, cpg_real strides)
 {
-    CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
+    CPG_ROM cpg_gait *gait = gait_of(t);
     if (strides > R(0.0)) {
         cpg_real state[CPG_COMPONENTS];
-        past_state(t, t->ahead / CPG_STEP, state);
+        output(t, state);
         for (int16_t cell = 0; cell < CPG_CELLS; cell++) {
             const cpg_real now[2] = {state[cell], state[CPG_CELLS + cell]};
             /* Both rates are linear in between, so that this is their exact integral. */
@@ -110,11 +124,13 @@ static void look(cpg_track *t, cpg_real strides)
             last = cpg_joint_cell[joint];
             signal_of(t, last, joint, signal);
         }
-        t->angle[joint] = gait->shift[joint] + joint_value(
-            gait->weights[joint], signal[0], signal[1], signal[2], signal[3], &t->rise[joint]);
+        drive_joint(t, gait, joint, signal);
     }
     for (int16_t leg = 0; leg < CPG_LEGS; leg++) {
         const int16_t cell = cpg_leg_cell[leg];
         t->legs[leg] = fraction(t->clocks[PHASE][cell] - gait->crests[gait->wave[cell]]);
     }
+#ifdef CPG_HOST
+    watch_phases(t, strides);
+#endif
 }

@@ -2,7 +2,7 @@
 /* The gait's orbit as a table: joints and legs by the phase alone. */
 static void look(cpg_track *t)
 {
-    CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
+    CPG_ROM cpg_gait *gait = gait_of(t);
     cpg_real last = R(-1.0), t1, ab = R(0.0), da = R(0.0), db = R(0.0);
     cpg_real ab_rise = R(0.0), da_rise = R(0.0), db_rise = R(0.0);
     int16_t low = 0, high = 0;

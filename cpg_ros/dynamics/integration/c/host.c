@@ -1,0 +1,133 @@
+
+/* Jumps are absorbed over this time, s. */
+#define ABSORB 0.3
+/* The clock is slowed in for as long as a stall was, but no longer than this, s. */
+#define LONGEST 0.5
+
+void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
+{
+    ramp_to(ramp, end, time);
+}
+
+/* Take over what is wanted; the difference after a jump decays smoothly. */
+static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *rate)
+{
+    const uint8_t absorbing = c->absorbed < ABSORB;
+    if (absorbing && c->jumped) {
+        c->absorbed += dt;
+    }
+    const cpg_real share = least(1.0, c->absorbed / ABSORB);
+    for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
+        cpg_real gap = 0.0, gap_rate = 0.0;
+        if (absorbing) {
+            if (!c->jumped) {
+                c->jump[joint] = c->wanted[joint] + dt * c->rate[joint] - wanted[joint];
+                c->jump_rate[joint] = c->rate[joint] - rate[joint];
+            }
+            const cpg_ramp_part way = {c->jump[joint], c->jump_rate[joint], 0.0, ABSORB};
+            gap = come_to_rest(&way, share, &gap_rate);
+        }
+        c->wanted[joint] = wanted[joint] + gap;
+        c->rate[joint] = rate[joint] + gap_rate;
+    }
+    c->jumped = 1;
+    c->recovering = c->recovering && c->absorbed < ABSORB;
+}
+
+static cpg_real pace_at(const cpg *c, cpg_real s)
+{
+    cpg_real rate;
+    return c->stall_low + (1.0 - c->stall_low) * smoothstep(s, &rate);
+}
+
+/* Slow the clock in after a stall in s: the longer, the more the joints have stopped. */
+void cpg_resume(cpg *c, cpg_real stall)
+{
+    const cpg_real pace = c->stall > 0.0 ? pace_at(c, c->stall_past / c->stall) : 1.0;
+    c->stall_low = pace * most(0.0, 1.0 - stall / HOLD);
+    c->stall = least(LONGEST, stall + c->stall - c->stall_past);
+    c->stall_past = 0.0;
+}
+
+/* Return how far a slowed clock goes in dt, s; pace is that at the end of it. */
+static cpg_real slowed_in(cpg *c, cpg_real dt, cpg_real *pace)
+{
+    const cpg_real time = c->stall, low = c->stall_low, before = c->stall_past / time;
+    const cpg_real after = least(1.0, (c->stall_past + dt) / time);
+    /* The integral of the smooth step. */
+    const cpg_real risen = after * after * after * (1.0 - 0.5 * after)
+                         - before * before * before * (1.0 - 0.5 * before);
+    const cpg_real way = time * (low * (after - before) + (1.0 - low) * risen)
+                       + most(0.0, c->stall_past + dt - time);
+    c->stall_past += dt;
+    *pace = pace_at(c, after);
+    if (after >= 1.0) {
+        c->stall = c->stall_past = 0.0;
+    }
+    return way;
+}
+
+/* Where the joints are wanted after dt s, and how fast, before any correction. */
+void cpg_plan(cpg *c, cpg_real dt)
+{
+    cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS], clock = dt;
+    c->fraction = 1.0;
+    if (c->stall > 0.0) {
+        clock = slowed_in(c, dt, &c->fraction);
+    }
+    clock *= c->frequency_scale;
+    c->fraction *= c->frequency_scale;
+    if (c->tracks == 1 && c->ramp.parts == 0 && c->lead.parts == 0 && !(c->absorbed < ABSORB)) {
+        if (cruise(c, clock, c->wanted, c->rate)) {
+            return;
+        }
+        recover(c, c->track[0]);
+        part_of_tick(c, 0.0, wanted, rate);
+        absorb(c, 0.0, wanted, rate);
+    }
+    const cpg_real parts = most(1.0, ceil(clock / c->substep - 1e-9));
+    for (cpg_real n = 0.0; n < parts; n += 1.0) {
+        part_of_tick(c, clock / parts, wanted, rate);
+        absorb(c, clock / parts, wanted, rate);
+    }
+}
+
+/* Take joints to where they are wanted, or to the goal that a correction makes of it. */
+void cpg_follow(cpg *c, cpg_real dt, int corrected)
+{
+    cpg_real rate[CPG_JOINTS];
+    for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
+        rate[joint] = c->fraction * c->rate[joint];
+        if (corrected) {
+            const cpg_real correction = c->goal[joint] - c->wanted[joint];
+            if (dt > 0.0) {
+                rate[joint] += (correction - c->correction[joint]) / dt;
+            }
+            c->correction[joint] = correction;
+        }
+    }
+    confine(c, dt, corrected ? c->goal : c->wanted, rate);
+    c->ticks_held += c->held > 0;
+}
+
+void cpg_advance(cpg *c, cpg_real dt)
+{
+    cpg_plan(c, dt);
+    cpg_follow(c, dt, 0);
+}
+
+/* Move joints to the wanted positions within limits; return how many those hold back. */
+int cpg_confine(int joints, const cpg_real *wanted, const cpg_real *rate, const cpg_real *limits,
+                cpg_real dt, cpg_real *position, cpg_real *velocity, uint8_t *behind)
+{
+    cpg c;
+    c.joints = joints;
+    for (int16_t k = 0; k < 3; k++) {
+        c.limits[k] = limits + k * joints;
+    }
+    c.position = position;
+    c.velocity = velocity;
+    c.behind = behind;
+    confine(&c, dt, wanted, rate);
+    return c.held;
+}

@@ -1,0 +1,80 @@
+/* The pattern in a process: sizes are known at run time, and memory is the caller's. */
+#include <stdint.h>
+#include <string.h>
+
+typedef double cpg_real;
+
+@DEFINES@
+#define CPG_HOST
+#define CPG_ROM const
+#define CPG_WEIGHTS 6
+#define CPG_VARIABLES 2
+#define CPG_RETIMED
+#define CPG_HARMONICS (gait->harmonics)
+#define CPG_CELLS (gait->cells)
+#define CPG_COMPONENTS (2 * gait->cells)
+#define CPG_LEGS (gait->legs)
+#define CPG_JOINTS (gait->joints)
+#define cpg_joint_cell (gait->joint_cell)
+#define cpg_leg_cell (gait->leg_cell)
+#define gait_of(t) ((t)->gait)
+#define TRACK(n) (c->track[n])
+
+typedef struct {
+    cpg_real frequency, period, start, peak, least;
+    int32_t components, cells, joints, legs, points, harmonics, by_phase;
+    const int16_t *joint_cell, *joint_leg, *leg_cell, *wave;
+    const cpg_real *phase, *shift, *speed;
+    const cpg_real (*weights)[CPG_WEIGHTS], (*in_place)[CPG_WEIGHTS], (*maps)[3];
+    const cpg_real *waves, *shapes, *circles, *terms, *crests;
+    const cpg_real *values, *lead, *turn, *cycle;
+} cpg_gait;
+
+/* A network and its history, of size numbers in each of x, slope and before. */
+typedef struct {
+    void *lane;
+    cpg_real *clock, *now, *x, *slope, *before;
+    int64_t size;
+} cpg_net;
+
+typedef struct {
+    const cpg_gait *gait;
+    void (*advance)(void *lane, cpg_real *clock, cpg_real duration, cpg_real *now);
+    cpg_net net, home, seed;  /* in use; the track's own; on the orbit at phase 0 */
+    cpg_real transition, progress, phase, phase_carry;
+    cpg_real settling, calm, still, astray;  /* strides */
+    cpg_real distance, sum;
+    cpg_real *angle, *rise, *reach, *legs, *clocks[6];
+    const cpg_real *stride;  /* of each leg, 0 if nothing steers */
+} cpg_track;
+
+/* Strides of the legs and their pace, on the way to their targets; legs + 1 numbers each. */
+typedef struct {
+    cpg_real *now, *rate;
+    const cpg_real *target, *trim;
+    int32_t legs, at_once;
+} cpg_drive;
+
+typedef struct {
+    cpg_real start, rate, end, time;
+} cpg_ramp_part;
+
+typedef struct {
+    cpg_real level, rate, past;
+    cpg_ramp_part part[2];
+    uint8_t parts;
+} cpg_ramp;
+
+typedef struct {
+    int32_t joints, tracks, held, ticks_held, faults, followed, recovering, jumped;
+    cpg_track *track[CPG_TRACKS];
+    cpg_drive *drive;
+    const int16_t *joint_leg;
+    const cpg_real *offset, *limits[3], *found;
+    cpg_real *position, *velocity, *wanted, *rate, *last_rate, *goal, *correction;
+    cpg_real *jump, *jump_rate;
+    uint8_t *behind;
+    cpg_ramp ramp, lead;
+    cpg_real slowing, slower, frequency, frequency_scale, substep, absorbed, fraction;
+    cpg_real stall, stall_past, stall_low;
+} cpg;

@@ -1,0 +1,14 @@
+
+#define PHASE_SHARE 4.0
+
+/* A phase off by a quarter of PHASE_SHARE (cycles) counts as far off as a half range. */
+static void watch_phases(cpg_track *t, cpg_real strides)
+{
+    const cpg_gait *gait = t->gait;
+    const cpg_real *phase = t->clocks[0];
+    const cpg_real base = phase[gait->leg_cell[0]] - gait->phase[gait->leg_cell[0]];
+    for (int16_t cell = 0; strides > 0.0 && cell < gait->cells; cell++) {
+        const cpg_real late = phase[cell] - base - gait->phase[cell];
+        watch(t, PHASE_SHARE * (late - floor(late + 0.5)));
+    }
+}

@@ -1,0 +1,134 @@
+
+/* Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead of
+ * the clock by this share of a cycle, for longer than this many strides. */
+#define FAR 0.3
+#define ASTRAY 0.15
+#define PATIENCE 0.5
+
+/* Read joints and legs off a track, so many strides after the last time. */
+void cpg_track_look(cpg_track *t, cpg_real strides)
+{
+    t->distance = t->sum = 0.0;
+    (t->gait->by_phase ? look_phases : look_waveform)(t, strides);
+    t->distance += 0.0 * t->sum;
+}
+
+/* A network gets some strides to find its gait. Return whether it came to rest instead. */
+static uint8_t settle(cpg_track *t, cpg_real strides)
+{
+    const cpg_gait *gait = t->gait;
+    /* A stride on the orbit is the end of it; for an instant a small state may look so. */
+    t->calm = t->distance < FAR / 3.0 ? t->calm + strides : 0.0;
+    t->settling = t->calm > 1.0 ? 0.0 : t->settling - strides;
+    cpg_real moving = 0.0;
+    for (int16_t i = 0; i < gait->components; i++) {
+        moving = most(moving, fabs(t->net.now[gait->components + i]));
+    }
+    t->still = moving * gait->period < gait->least ? t->still + strides : 0.0;
+    t->phase = t->legs[0];
+    t->phase_carry = 0.0;
+    return t->still > 1.0;
+}
+
+/* Advance by some strides; return whether the network is still on its orbit. */
+static uint8_t move(cpg_track *t, cpg_real strides)
+{
+    t->advance(t->net.lane, t->net.clock, strides * t->gait->period, t->net.now);
+    cpg_track_look(t, strides);
+    const cpg_real expected = t->phase + strides;
+    if (!(t->distance - t->distance == 0.0)) {
+        t->phase = fraction(expected);
+        return 0;
+    }
+    const cpg_real error = fraction(t->legs[0] - expected + 0.5) - 0.5;
+    /* The clock follows the network's own phase within two strides. */
+    t->phase = turned(t->phase, strides + least(1.0, 0.5 * strides) * error, &t->phase_carry);
+    if (t->settling > 0.0) {
+        if (settle(t, strides)) {
+            t->settling = 0.0;
+            t->astray = 2.0 * PATIENCE;
+        }
+    } else if (t->distance > FAR || fabs(error) > ASTRAY) {
+        t->astray += strides;
+    } else {
+        t->astray = 0.0;
+    }
+    return t->astray <= PATIENCE;
+}
+
+int cpg_track_advance(cpg_track *t, cpg_real strides)
+{
+    return move(t, strides);
+}
+
+/* Put the track's own network on its orbit where its first leg is at a phase, cycles. */
+void cpg_track_reseed(cpg_track *t, cpg_real phase)
+{
+    const cpg_real ahead = fraction(phase - t->gait->start);
+    const size_t size = (size_t)t->seed.size * sizeof(cpg_real);
+    memcpy(t->home.x, t->seed.x, size);
+    memcpy(t->home.slope, t->seed.slope, size);
+    memcpy(t->home.before, t->seed.before, size);
+    memcpy(t->home.clock, t->seed.clock, 2 * sizeof(cpg_real));
+    t->net = t->home;
+    t->advance(t->net.lane, t->net.clock, ahead * t->gait->period, t->net.now);
+    if (t->gait->by_phase) {
+        begin_clocks(t, ahead);
+    }
+    cpg_track_look(t, 0.0);
+    t->phase = t->legs[0];
+    t->phase_carry = t->settling = t->astray = 0.0;
+}
+
+/* Strides and pace approach their targets with this time constant, s. */
+#define TIME_CONSTANT 0.2
+
+/* e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target. */
+void cpg_steer(cpg_drive *drive, cpg_real dt)
+{
+    const cpg_real decay = exp(-dt / TIME_CONSTANT);
+    for (int16_t k = 0; k <= drive->legs; k++) {
+        cpg_real target = drive->target[k];
+        if (drive->at_once) {
+            drive->now[k] = target;
+            drive->rate[k] = 0.0;
+            continue;
+        }
+        if (drive->trim && k < drive->legs) {
+            target = within(target + drive->trim[k], -1.0, 1.0);
+        }
+        const cpg_real gap = drive->now[k] - target, pull = drive->rate[k] + gap / TIME_CONSTANT;
+        drive->now[k] = target + (gap + pull * dt) * decay;
+        drive->rate[k] = (drive->rate[k] - pull * dt / TIME_CONSTANT) * decay;
+    }
+}
+
+/* Advance what steers, if anything does; return the pace. */
+static cpg_real steered(cpg *c, cpg_real dt)
+{
+    if (!c->drive) {
+        return 1.0;
+    }
+    cpg_steer(c->drive, dt);
+    return c->drive->now[c->drive->legs];
+}
+
+static cpg_real speed_of(const cpg *c, const cpg_track *t, int16_t joint, cpg_real frequency)
+{
+    const cpg_real speed = t->rise[joint] * frequency;
+    return c->drive ? speed + c->drive->rate[c->joint_leg[joint]] * t->reach[joint] : speed;
+}
+
+static void recover(cpg *c, cpg_track *t)
+{
+    c->faults++;
+    c->recovering = 1;
+    cpg_track_reseed(t, t->phase);
+    c->absorbed = 0.0;
+    c->jumped = 0;
+}
+
+#undef CPG_JOINTS
+#define CPG_JOINTS (c->joints)
+#define cpg_offset (c->offset)
+#define cpg_limits (c->limits)

@@ -1,0 +1,223 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The core of the pattern in C: structs of ``c/host.h`` and functions of ``c/host.c``.
+
+It is compiled of the parts that an export is made of, once for all robots and networks; each
+network's own library steps it (integration.c_kernel). All memory is that of arrays here. Functions
+hold the interpreter's lock: they take some microseconds, and other threads write what they read.
+"""
+
+import ctypes
+from functools import cache
+from typing import Any
+
+from cpg_ros.common.c_library import load
+from cpg_ros.dynamics.integration.c_kernel import lane_of, library_of, version
+from cpg_ros.dynamics.integration.c_text import part
+from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.networks import equations as generated
+import numpy as np
+
+#: Most gaits fading into one another at once; a further one waits for a place.
+MOST_TRACKS = 4
+#: A joint whose command stood still for this time (s) has come to rest.
+HOLD = 0.1
+#: Entries of the tables of a waveform over one cycle.
+TABLE = 512
+
+_REAL, _WHOLE, _POINTER = ctypes.c_double, ctypes.c_int32, ctypes.c_void_p
+
+
+def _struct(name: str, *fields: tuple[Any, str]) -> type[ctypes.Structure]:
+    """Return a struct, from pairs of a type and the names of its fields."""
+    return type(name, (ctypes.Structure,), {'_fields_': [
+        (field, kind) for kind, names in fields for field in names.split()]})
+
+
+Gait = _struct(
+    'Gait', (_REAL, 'frequency period start peak least'),
+    (_WHOLE, 'components cells joints legs points harmonics by_phase'),
+    (_POINTER, 'joint_cell joint_leg leg_cell wave phase shift speed weights in_place maps '
+               'waves shapes circles terms crests values lead turn cycle'))
+Net = _struct('Net', (_POINTER, 'lane clock now x slope before'), (ctypes.c_int64, 'size'))
+Track = _struct(
+    'Track', (_POINTER, 'gait advance'), (Net, 'net home seed'),
+    (_REAL, 'transition progress phase phase_carry settling calm still astray distance sum'),
+    (_POINTER, 'angle rise reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
+Drive = _struct('Drive', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
+_RampPart = _struct('RampPart', (_REAL, 'start rate end time'))
+Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart * 2, 'part'),
+               (ctypes.c_uint8, 'parts'))
+Core = _struct(
+    'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
+    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive joint_leg offset'),
+    (_POINTER * 3, 'limits'),
+    (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
+               'behind'), (Ramp, 'ramp lead'),
+    (_REAL, 'slowing slower frequency frequency_scale substep absorbed fraction stall stall_past '
+            'stall_low'))
+
+_FUNCTIONS: dict[str, tuple[Any, ...]] = {
+    'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
+    'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
+    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_track_look': (_POINTER, _REAL),
+    'cpg_track_advance': (_POINTER, _REAL), 'cpg_track_reseed': (_POINTER, _REAL),
+    'cpg_steer': (_POINTER, _REAL),
+    'cpg_confine': (ctypes.c_int, *[_POINTER] * 3, _REAL, *[_POINTER] * 3)}
+
+
+def _sources() -> dict[str, str]:
+    """Return the files of the core, name -> text."""
+    defines = f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_LEAD {TABLE}\n#define HOLD {HOLD!r}'
+    names = 'host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'host_track', 'pattern', \
+        'host'
+    # Both readouts stand in it.
+    own = {'waveform': '#define look look_waveform\n', 'host_phases': '#undef look\n',
+           'phase': '#define look look_phases\n'}
+    return {'cpg.h': part('host.h', {'DEFINES': defines}),
+            'cpg.c': part('common.c') + ''.join(own.get(name, '') + part(f'{name}.c')
+                                                for name in names)}
+
+
+@cache
+def core() -> ctypes.CDLL:
+    """Return the core's functions, compiled if need be.
+
+    Raises:
+        NoCompiler: it is not on disk, and there is no C compiler, or it fails.
+
+    """
+    loaded = load(generated.folder(), f'pattern-{version()}', _sources, 'the pattern')
+    library = ctypes.PyDLL(loaded._name, handle=loaded._handle)
+    for name, types in _FUNCTIONS.items():
+        function = getattr(library, name)
+        function.argtypes = types
+        if name not in ('cpg_track_advance', 'cpg_confine'):
+            function.restype = None
+    return library
+
+
+def confine(wanted: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt: float,
+            position: np.ndarray, velocity: np.ndarray, behind: np.ndarray) -> int:
+    """Move joints to the wanted positions within their limits; count those held back.
+
+    Where a limit bites, and where a joint catches up, velocity is the difference quotient, so that
+    it stays the derivative of what is published.
+
+    Args:
+        wanted: positions, rad, shape (joints,).
+        wanted_rate: their velocities, rad/s.
+        limits: lowest and highest angle, rad, and largest speed, rad/s, shape (3, joints).
+        dt: since the last tick, s.
+        position: of the last tick, rad; overwritten.
+        velocity: filled, rad/s.
+        behind: whether a limit held each joint back in the last tick; overwritten.
+
+    """
+    given = [np.ascontiguousarray(one, dtype=float) for one in (wanted, wanted_rate, limits)]
+    held: int = core().cpg_confine(position.size, *(one.ctypes.data for one in given), dt,
+                                   position.ctypes.data, velocity.ctypes.data, behind.ctypes.data)
+    return held
+
+
+class CGait:
+    """A gait as the core takes it.
+
+    Attributes:
+        struct: its numbers, and addresses of arrays that stay as long as this object.
+
+    """
+
+    def __init__(self, **fields: Any) -> None:
+        """Take fields of the struct; arrays of integers or floats, None for none."""
+        self.struct = Gait()
+        self._arrays = []
+        for name, value in fields.items():
+            if isinstance(value, np.ndarray):
+                kind = np.int16 if value.dtype.kind in 'iu' else float
+                self._arrays.append(np.ascontiguousarray(value, dtype=kind))
+                value = self._arrays[-1].ctypes.data
+            setattr(self.struct, name, value)
+
+
+class CTrack:
+    """A gait whose network runs, as the core takes it.
+
+    Attributes:
+        struct: its numbers, and addresses of arrays that stay as long as this object.
+        angle, rise, reach: of each joint: angle from the stand, rad; its derivative by phase, rad
+            per cycle, and by the stride of its leg, rad.
+        legs: phase of each leg, cycles.
+        clocks: of each cell, shape (6, cells): phase (cycles), what its speed (cycles a stride)
+            is above 1 now and at the next look, amplitude, its rate (per stride) now and then.
+
+    """
+
+    def __init__(self, gait: CGait) -> None:
+        """Make room for a gait."""
+        joints, legs, cells = gait.struct.joints, gait.struct.legs, gait.struct.cells
+        self.struct = Track()
+        self.angle, self.rise, self.reach = motion = np.zeros((3, joints))
+        self.legs, self.clocks = np.zeros(legs), np.zeros((6, cells))
+        for name, array in (*zip(('angle', 'rise', 'reach'), motion, strict=True),
+                            ('legs', self.legs)):
+            setattr(self.struct, name, array.ctypes.data)
+        for k, row in enumerate(self.clocks):
+            self.struct.clocks[k] = row.ctypes.data
+        self.address = ctypes.addressof(self.struct)
+        self._kept: dict[str, Any] = {}
+        self.follow(gait)
+
+    def follow(self, gait: CGait) -> None:
+        """Read joints and legs as this gait has them."""
+        self._kept['gait'] = gait
+        self.struct.gait = ctypes.addressof(gait.struct)
+
+    def run(self, which: str, stepper: Stepper) -> None:
+        """Take a stepper's arrays as one of the networks of the struct: net, home or seed."""
+        network = type(stepper.network)
+        lane = lane_of(network, stepper.system, stepper.ring)
+        self._kept[which] = stepper, lane
+        arrays = stepper.clock, stepper.now, *stepper.ring[1:]
+        setattr(self.struct, which, Net(lane.address, *(one.ctypes.data for one in arrays),
+                                        stepper.ring.x.size))
+        self.struct.advance = ctypes.cast(library_of(network).advance, _POINTER).value
+
+
+def look(gait: CGait, components: int, now: np.ndarray, strides: float, clocks: np.ndarray,
+         angle: np.ndarray, rise: np.ndarray, legs: np.ndarray) -> float:
+    """Read joints and legs off a state so many strides after the last; return how far it is off.
+
+    Args:
+        gait: the gait.
+        components: of the network.
+        now: x, x', x'' of the components, shape (3, components).
+        strides: since the last look; with 0 clocks stand and are only read.
+        clocks: of each cell, see CTrack.
+        angle: filled with the joints' deviation from their offset, rad.
+        rise: filled with its derivative by phase, rad per cycle.
+        legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
+
+    Returns:
+        The largest distance of a cell from where the gait has it, over the peak or half range.
+
+    """
+    track, now = CTrack(gait), np.ascontiguousarray(now, dtype=float)
+    gait.struct.components = components
+    track.struct.net.now = now.ctypes.data
+    track.clocks[:] = clocks
+    core().cpg_track_look(track.address, strides)
+    clocks[:], angle[:], rise[:], legs[:] = track.clocks, track.angle, track.rise, track.legs
+    return float(track.struct.distance)
