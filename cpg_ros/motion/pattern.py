@@ -24,10 +24,10 @@ from collections import deque
 from collections.abc import Callable
 import ctypes
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.stepper import Stepper
-from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS
+from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS, Net, Track
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
@@ -38,6 +38,27 @@ __all__ = ['HOLD', 'SUBSTEP', 'GaitRunner', 'Pattern']
 SETTLING = 40.0
 #: Such a transition starts with at least this fraction of the new gait in the state.
 KICK = 0.05
+
+
+class Machine(NamedTuple):
+    """Addresses by which machine code advances a pattern.
+
+    Attributes:
+        advance, resume: functions of ``what`` and of a time in s, a double.
+        what: argument of both.
+        asked: a 32-bit integer that is not 0 where the next tick needs Python.
+        position, velocity, phases, state: pointers to what Pattern has by these names.
+
+    """
+
+    advance: int | None
+    resume: int | None
+    what: int
+    asked: int
+    position: int
+    velocity: int
+    phases: int
+    state: int
 
 
 def _shared(name: str) -> Any:
@@ -176,6 +197,8 @@ class Pattern:
         self._offset = robot.column('offset')
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
         self._requests: deque = deque()
+        #: Set by each request, for machine code that runs the ticks.
+        self._asked = ctypes.c_int32()
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate, self._goal, self._found, self._correction = rows = np.zeros(
             (5, self._offset.size))
@@ -250,11 +273,15 @@ class Pattern:
         """Change to a plan over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
         prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
-        self._requests.append((plan, prepared if transition > 0.0 else None))
+        self._ask((plan, prepared if transition > 0.0 else None))
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
-        self._requests.append((enabled, max(ramp, SHORTEST)))
+        self._ask((enabled, max(ramp, SHORTEST)))
+
+    def _ask(self, request: tuple) -> None:
+        self._requests.append(request)
+        self._asked.value = 1
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Request the legs' strides, shape (legs,), and the pace; see Drive.
@@ -266,6 +293,7 @@ class Pattern:
         if self.drive is None:
             raise ValueError('this pattern has no drive')
         self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
+        self._asked.value = 1
 
     def attach(self, drive: StrideCommand) -> None:
         """Use a drive from now on; one that has no target yet changes nothing."""
@@ -326,10 +354,25 @@ class Pattern:
         """Tell whether the pattern is still recovering from a fault."""
         return bool(self._struct.recovering)
 
+    @property
+    def calm(self) -> Machine | None:
+        """How machine code advances it, None where a tick needs Python."""
+        newest = self._tracks[-1]
+        if (self._asked.value or self._requests or self.correct or len(self._tracks) > 1
+                or type(self).advance is not Pattern.advance):
+            return None
+        advance, resume = (ctypes.cast(function, ctypes.c_void_p).value for function in (
+            self._core.cpg_advance, self._core.cpg_resume))
+        return Machine(advance, resume, self._address, ctypes.addressof(self._asked),
+                       self._address + Core.position.offset, self._address + Core.velocity.offset,
+                       newest.address + Track.legs.offset,
+                       newest.address + Track.net.offset + Net.now.offset)
+
     # -- the tick --------------------------------------------------------------------------
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s and fill position, velocity and phases."""
+        self._asked.value = 0
         if self._requests:
             self._take_requests()
         if self._drive is not None:

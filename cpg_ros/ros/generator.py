@@ -38,7 +38,7 @@ from cpg_ros.ros.feedback.switch import (
     FORMER,
     PREFIX,
 )
-from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, MeasuredPose, Outputs
+from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, FASTEST, MeasuredPose, Outputs
 from cpg_ros.ros.generator_parameters import (
     COMMANDS,
     exclusive,
@@ -52,6 +52,7 @@ from cpg_ros.ros.generator_parameters import (
 )
 from cpg_ros.ros.joint_tracking import JointTracking
 from cpg_ros.ros.kernels import compile_kernels
+from cpg_ros.ros.node import native
 from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers, STEADY
 from cpg_ros.ros.node.logging import QUEUE
 from cpg_ros.ros.node.node_base import Lifecycle, run, StartedNode, StartError
@@ -264,7 +265,8 @@ class Generator(StartedNode):
         self.create_service(SetBool, '~/enable', self._enable)
         real_time = RealTime.of(*map(self._value, SPECS))
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
-                             self.pattern.resume, partial(real_time.request, self.get_logger()))
+                             self.pattern.resume, partial(real_time.request, self.get_logger()),
+                             self._steadily)
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
                                         self._cmd_vel, self._feedback, lambda: self._awaited,
@@ -316,6 +318,7 @@ class Generator(StartedNode):
             self._announce()
         if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
+        self.ticker.attend()
 
     def _announce(self) -> None:
         plan = self._planner.plan(self._values())
@@ -426,6 +429,7 @@ class Generator(StartedNode):
         if not self.pattern.standing:
             return 'it is still ramping down to the stand'
         self.ticker.paused = True
+        self.ticker.attend()
         return ''
 
     def _shut_down(self) -> str:
@@ -487,6 +491,27 @@ class Generator(StartedNode):
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:
             self.ticker.stopping = False
+
+    def _steadily(self, run: Callable[..., tuple[int, int]], deadline: int, period: int
+                  ) -> tuple[int, int] | None:
+        """Tick outside the interpreter as long as a tick needs nothing of it; see Ticker.
+
+        Whatever ends that calls ``Ticker.attend``, or is asked of the pattern.
+        """
+        pattern, ticker = self.pattern, self.ticker
+        if self._feedback.loop is not None or ticker.paused or ticker.stopping:
+            return None
+        calm = pattern.calm
+        if calm is None:
+            return None
+        outputs, cells = self._outputs.block, self._cells.block
+        loop = native.Loop(**{name: getattr(calm, name)
+                              for name in ('asked', 'advance', 'resume', 'what')})
+        loop.outputs[:] = (outputs.output((calm.position, calm.velocity, calm.phases), 1),
+                           cells.output((calm.state,), max(1, round(ticker.rate / FASTEST))))
+        self._sent = pattern.position
+        with outputs.held(), cells.held():
+            return run(loop, deadline, period)
 
     def _restart(self) -> None:
         """Start again where simulated time jumped back, which the diagnostics log."""

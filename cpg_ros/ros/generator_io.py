@@ -93,14 +93,14 @@ class Outputs:
             array = Float64MultiArray()
             messages.append((COMMAND_TOPICS[command],
                              Template(array, numbers=[(array, 'data', positions)])))
-        self._block = MessageBlock(node, sizes, messages)
+        self.block = MessageBlock(node, sizes, messages)
         phase = node.resolve_topic_name('~/phase')
-        self.topics = [topic for topic in self._block.topics if topic != phase]
+        self.topics = [topic for topic in self.block.topics if topic != phase]
 
     def publish(self, stamp: int, dt: float, position: np.ndarray, velocity: np.ndarray,
                 phases: np.ndarray) -> None:
         """Publish everything: stamp in ns, dt in s, rad and rad/s by joint, phases in cycles."""
-        self._block.publish(stamp, (position, velocity, phases), round(1e9 * dt))
+        self.block.publish(stamp, (position, velocity, phases), round(1e9 * dt))
 
 
 class CellsPublisher:
@@ -116,7 +116,7 @@ class CellsPublisher:
         message.layout.dim = [
             MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
             MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
-        self._block = MessageBlock(node, [count], [
+        self.block = MessageBlock(node, [count], [
             ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))])
         self._elapsed = 1.0 / FASTEST
 
@@ -131,7 +131,7 @@ class CellsPublisher:
         self._elapsed += dt
         if self._elapsed >= (1.0 - 1e-6) / FASTEST:
             self._elapsed = 0.0
-            self._block.publish(0, (state.ravel(),))
+            self.block.publish(0, (state.ravel(),))
 
 
 def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:

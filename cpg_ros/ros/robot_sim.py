@@ -183,7 +183,7 @@ class Lockstep(TickThread):
                 return
             elif started:
                 every, patience = since + 1, IMPATIENCE
-                self.late += 1
+                self.count.late += 1
                 if self._commands.connected:
                     logger.warning(f'no command came for {1e-9 * now:.3f} s of simulated time: '
                                    'the robot holds the last one; it expects them at '
@@ -193,7 +193,7 @@ class Lockstep(TickThread):
                                 throttle_duration_sec=10.0)
             if started:
                 self._keep_pace()
-                self.ticks += 1
+                self.count.ticks += 1
                 self._tick(1.0 / self.rate, now)
 
     def _keep_pace(self) -> None:
@@ -202,7 +202,7 @@ class Lockstep(TickThread):
             return
         now = time.monotonic()
         due = max(self._due + self._spacing, now - MOST_BEHIND) if self._due else now
-        self._worst = max(self._worst, now - due)
+        self.count.worst = max(self.count.worst, round(1e9 * (now - due)))
         self._due = due
         if due > now:
             self._ending.wait(due - now)

@@ -15,7 +15,8 @@
 """Messages that are serialised once, and whose numbers are written into the bytes every tick."""
 
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 import ctypes
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -192,7 +193,7 @@ class MessageBlock:
                 qos_overriding_options=OVERRIDABLE)
             self._publishers.append((publisher, part))
             self.topics.append(publisher.topic_name)
-        self._native = self._native_block()
+        self._native, self._output = self._native_block(), native.Output()
 
     def _native_block(self) -> tuple[Any, native.SerializedMessages] | None:
         """Return what fills and publishes outside the interpreter, and its argument, if any."""
@@ -227,7 +228,9 @@ class MessageBlock:
             part[:] = given
         sent = 0
         if self._native is not None:
-            sent = self._publish_natively(*self._native, stamp, duration)
+            publish, block = self._native
+            with self.held():
+                sent = publish(ctypes.byref(block), stamp, duration)
         else:
             words = self._words
             words[0], words[1] = divmod(stamp, 1_000_000_000)
@@ -237,14 +240,29 @@ class MessageBlock:
         for publisher, message in self._publishers[sent:]:
             publisher.publish(bytes(message))
 
-    def _publish_natively(self, function: Any, block: native.SerializedMessages, stamp: int,
-                          duration: int) -> int:
-        """Fill and publish; return how many messages the middleware has taken."""
-        # The node may be destroyed by another thread: its publishers then wait for this.
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep the publishers, should another thread destroy the node meanwhile."""
         for handle in self._handles:
             handle.__enter__()
         try:
-            return function(ctypes.byref(block), stamp, duration)
+            yield
         finally:
             for handle in self._handles:
                 handle.__exit__(None, None, None)
+
+    def output(self, places: Sequence[int], every: int) -> int:
+        """Return the address of what ``tick.c`` needs to publish the messages.
+
+        Args:
+            places: addresses of pointers to the numbers of each part.
+            every: so many ticks.
+
+        """
+        assert self._native is not None
+        self._from = np.array(places, dtype=np.uint64)
+        self._sizes = np.array([len(part) for part in self._parts], dtype=np.int64)
+        self._output = native.Output(
+            ctypes.addressof(self._native[1]), self._from.ctypes.data, self._sizes.ctypes.data,
+            len(places), every, self._output.since)
+        return ctypes.addressof(self._output)

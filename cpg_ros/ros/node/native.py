@@ -47,6 +47,29 @@ class SerializedMessages(ctypes.Structure):
         ('messages', ctypes.c_int64), ('changes', ctypes.c_int64))
 
 
+class Counters(ctypes.Structure):
+    """The struct ``counters`` of ``tick.c``."""
+
+    _fields_ = (*((name, ctypes.c_int64) for name in ('ticks', 'late', 'dropped', 'worst')),
+                ('resuming', ctypes.c_int32), ('wanted', ctypes.c_int32))
+
+
+class Output(ctypes.Structure):
+    """The struct ``output`` of ``tick.c``: a block, and where the numbers of its parts are."""
+
+    _fields_ = (*((name, ctypes.c_void_p) for name in ('to', 'from', 'sizes')),
+                *((name, ctypes.c_int64) for name in ('parts', 'every', 'since')))
+
+
+class Loop(ctypes.Structure):
+    """The struct ``loop`` of ``tick.c``."""
+
+    _fields_ = (*((name, ctypes.c_void_p) for name in (
+        'count', 'asked', 'advance', 'resume', 'what')),
+                *((name, ctypes.c_int64) for name in ('deadline', 'period', 'stall')),
+                ('outputs', 2 * ctypes.c_void_p))
+
+
 @cache
 def library() -> ctypes.CDLL | None:
     """Return the library; None, and a warning, where it cannot be compiled or loaded."""
@@ -60,6 +83,7 @@ def library() -> ctypes.CDLL | None:
         return None
     whole = ctypes.c_int64
     found.publish.argtypes, found.publish.restype = (ctypes.c_void_p, whole, whole), whole
+    found.run.argtypes, found.run.restype = (ctypes.c_void_p,), whole
     found.wait_until.argtypes, found.wait_until.restype = (whole,), whole
     return found
 

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 #include <time.h>
 
 #define SECOND 1000000000
@@ -67,4 +68,96 @@ int64_t wait_until(int64_t deadline)
         behind = steady_time() - deadline;
     }
     return behind;
+}
+
+typedef struct {
+    int64_t ticks, late, dropped;  /* how many */
+    int64_t worst;                 /* longest delay, ns */
+    int32_t resuming;              /* the last tick was left out after a stall */
+    int32_t wanted;                /* set by other threads: the next tick is to be Python's */
+} counters;
+
+typedef struct {
+    block *to;
+    const double *const *const *from;  /* addresses of the pointers to the numbers of each part */
+    const int64_t *sizes;
+    int64_t parts;
+    int64_t every, since;              /* ticks between two messages, and since the last */
+} output;
+
+typedef struct {
+    counters *count;
+    const int32_t *asked;              /* by what advances, for a tick of Python's */
+    void (*advance)(void *what, double dt);
+    void (*resume)(void *what, double stall);  /* s */
+    void *what;
+    int64_t deadline, period, stall;   /* ns */
+    output *outputs[2];
+} loop;
+
+/* System time minus steady time, ns, of the narrowest of some readings. */
+static int64_t system_offset(void)
+{
+    int64_t narrowest = INT64_MAX, offset = 0;
+    for (int n = 0; n < 5 && narrowest > 20000; n++) {
+        struct timespec now;
+        const int64_t before = steady_time();
+        clock_gettime(CLOCK_REALTIME, &now);
+        const int64_t width = steady_time() - before;
+        if (width < narrowest) {
+            narrowest = width;
+            offset = (int64_t)now.tv_sec * SECOND + now.tv_nsec - before;
+        }
+    }
+    return offset;
+}
+
+static int put(output *o, int64_t stamp, int64_t duration)
+{
+    if (++o->since < o->every) {
+        return 1;
+    }
+    o->since = 0;
+    char *words = (char *)(o->to->words + 4);
+    for (int64_t part = 0; part < o->parts; part++) {
+        const size_t size = (size_t)o->sizes[part] * sizeof(double);
+        memcpy(words, *o->from[part], size);
+        words += size;
+    }
+    return publish(o->to, stamp, duration) == o->to->messages;
+}
+
+/* Tick until Python is wanted for a tick: by request, or to report an error of the middleware.
+ * Return how long ago the deadline of that tick was, ns. Stalls are left out as Ticker does. */
+int64_t run(loop *l)
+{
+    counters *count = l->count;
+    for (;;) {
+        l->deadline += l->period;
+        const int64_t behind = wait_until(l->deadline);
+        if (__atomic_load_n(&count->wanted, __ATOMIC_ACQUIRE)
+            || __atomic_load_n(l->asked, __ATOMIC_ACQUIRE)) {
+            return behind;
+        }
+        count->worst = behind > count->worst ? behind : count->worst;
+        const int stalled = behind >= l->stall;
+        const int skip = stalled && !count->resuming;
+        count->resuming = skip;
+        if (stalled) {
+            const int64_t missed = behind / l->period;
+            l->resume(l->what, 1e-9 * (double)behind);
+            l->deadline += missed * l->period;
+            count->dropped += missed + skip;
+            if (skip) {
+                continue;
+            }
+        }
+        count->late += behind > l->period;
+        count->ticks++;
+        l->advance(l->what, 1e-9 * (double)l->period);
+        const int64_t stamp = l->deadline + system_offset();
+        if (!(put(l->outputs[0], stamp, l->period) & put(l->outputs[1], 0, 0))) {
+            count->wanted = 1;
+        }
+    }
 }

@@ -183,24 +183,37 @@ class TickThread(threading.Thread):
 
     Attributes:
         rate: of the ticks, Hz.
-        ticks: ticks so far.
-        late: those that were late.
-        dropped: periods left out.
 
     """
 
     def __init__(self, name: str, rate: float, failed: Callable[[BaseException], None]) -> None:
         super().__init__(name=name, daemon=True)
         self.rate = rate
-        self.ticks = self.late = self.dropped = 0
-        self._worst, self._failed = 0.0, failed
+        #: Shared with what ticks outside the interpreter.
+        self.count = native.Counters()
+        self._failed = failed
         self._ending = threading.Event()
+
+    @property
+    def ticks(self) -> int:
+        """Ticks so far."""
+        return self.count.ticks
+
+    @property
+    def late(self) -> int:
+        """Ticks that began more than a period after their deadline."""
+        return self.count.late
+
+    @property
+    def dropped(self) -> int:
+        """Periods left out."""
+        return self.count.dropped
 
     @property
     def worst(self) -> float:
         """Longest delay of a tick since this was last read, s."""
-        worst, self._worst = self._worst, 0.0
-        return worst
+        worst, self.count.worst = self.count.worst, 0
+        return 1e-9 * worst
 
     def end(self) -> None:
         """Stop after the tick under way."""
@@ -228,8 +241,6 @@ class Ticker(TickThread):
     continues by the steady clock if ``/clock`` stands still for STOPPED s or jumps back.
 
     Attributes:
-        late: ticks that began more than a period after their deadline.
-        dropped: periods left out in stalls.
         jumps: of simulated time back.
         stopping: whether the ticks do not wait for ``/clock``; set it False at rest.
         paused: set by whoever ticks: the ticks go on, but nothing is done at them.
@@ -239,7 +250,8 @@ class Ticker(TickThread):
     def __init__(self, node: Node, rate: float, tick: Callable[[float, int], None],
                  restart: Callable[[], None], failed: Callable[[BaseException], None],
                  resume: Callable[[float], None] | None = None,
-                 begin: Callable[[], None] = lambda: None) -> None:
+                 begin: Callable[[], None] = lambda: None,
+                 steadily: Callable[..., tuple[int, int] | None] = lambda *_: None) -> None:
         """Prepare to tick.
 
         Args:
@@ -250,13 +262,17 @@ class Ticker(TickThread):
             failed: called with the exception that ended the thread.
             resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
             begin: called first thing in the thread.
+            steadily: called with a function, a deadline and a period in ns; calls the function
+                with a Loop, which does the coming ticks until ``attend`` is called, the deadline
+                and the period, and returns what it does; None if ``tick`` is to be called.
 
         """
         super().__init__('ticker', rate, failed)
         self.jumps = 0
-        self.stopping = self._resuming = self.paused = False
+        self.stopping = self.paused = False
         self._clock: Any = node.get_clock()
         self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
+        self._steadily = steadily
         self._moved = threading.Event()
         threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
                                   min_backward=Duration(nanoseconds=-1))
@@ -271,11 +287,13 @@ class Ticker(TickThread):
     def end(self) -> None:
         """Stop after the tick under way."""
         super().end()
+        self.attend()
         self._moved.set()
 
     def stop_moving(self) -> None:
         """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
         self.stopping = True
+        self.attend()
         self._moved.set()
 
     def _run(self) -> None:
@@ -292,21 +310,39 @@ class Ticker(TickThread):
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
                     going: Callable[[], bool]) -> None:
         """Tick by the steady clock while ``going``; the deadline, and its ``stamp``, in ns."""
-        ending, library = self._ending, native.library()
+        ending, library, count = self._ending, native.library(), self.count
         wait_until = _wait_until if library is None else library.wait_until
         while not ending.is_set() and going():
             period = self._period()
-            deadline += period
-            behind = wait_until(deadline)
-            self._worst = max(self._worst, behind * 1e-9)
+            count.wanted = 0
+            left = self._steadily(self._run_outside, deadline, period) if library else None
+            if left is None:
+                deadline += period
+                behind = wait_until(deadline)
+            else:
+                deadline, behind = left
+            count.worst = max(count.worst, behind)
             leap, skip = self._stalled(behind, period)
             deadline += leap
             if skip:
                 continue
-            self.ticks += 1
+            count.ticks += 1
             if behind > period:
-                self.late += 1
+                count.late += 1
             self._tick(period * 1e-9, stamp(deadline))
+
+    def _run_outside(self, loop: native.Loop, deadline: int, period: int) -> tuple[int, int]:
+        """Tick outside the interpreter; return the next deadline, and the time since it, ns."""
+        library = native.library()
+        assert library is not None
+        loop.count, loop.stall = ctypes.addressof(self.count), STALL * period
+        loop.deadline, loop.period = deadline, period
+        behind = library.run(ctypes.byref(loop))
+        return loop.deadline, behind
+
+    def attend(self) -> None:
+        """Let the next tick call ``tick``, whatever was to be done outside the interpreter."""
+        self.count.wanted = 1
 
     def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
         """Return how far the deadline must leap, ns, and whether to leave out its tick, too.
@@ -318,13 +354,13 @@ class Ticker(TickThread):
         if resume is None:
             missed, skip = behind // period if behind > MOST_BEHIND * 1e9 else 0, False
         elif behind < STALL * period:
-            self._resuming = False
+            self.count.resuming = 0
             return 0, False
         else:
-            missed, skip = behind // period, not self._resuming
-            self._resuming = skip
+            missed, skip = behind // period, not self.count.resuming
+            self.count.resuming = skip
             resume(behind * 1e-9)
-        self.dropped += missed + skip
+        self.count.dropped += missed + skip
         return missed * period, skip
 
     def _run_simulated(self) -> None:
@@ -363,7 +399,7 @@ class Ticker(TickThread):
             while not self._ending.is_set() and deadline + self._period() <= now:
                 period = self._period()
                 deadline += period
-                self.ticks += 1
+                self.count.ticks += 1
                 self._tick(period * 1e-9, deadline)
 
     def _stop_by_steady_clock(self, stamp: int) -> int:
