@@ -16,10 +16,13 @@
 
 from collections.abc import Callable, Mapping
 import ctypes
+from importlib.util import find_spec
 import os
 from pathlib import Path
+import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 
 from cpg_ros.common.cache_folder import writing
@@ -33,33 +36,41 @@ class NoCompiler(CpgError):
     """The system has no C compiler that works."""
 
 
-def compiler() -> str:
-    """Return the C compiler: that of the environment's ``CC``, or one of the usual names.
+def compiler() -> list[str]:
+    """Return the command of the C compiler: that of the environment's ``CC``, or one of the usual
+    names, or that of the wheel ziglang.
 
     Raises:
         NoCompiler: there is none.
 
     """
-    wanted = (os.environ['CC'],) if os.environ.get('CC') else COMPILERS
-    for name in wanted:
+    if given := os.environ.get('CC'):
+        command = shlex.split(given)
+        if shutil.which(command[0]) is not None:
+            return command
+        raise NoCompiler(f"the C compiler that CC names, '{given}', is not installed")
+    for name in COMPILERS:
         if shutil.which(name) is not None:
-            return name
-    raise NoCompiler(f'no C compiler ({", ".join(wanted)}) is installed: apt install gcc')
+            return [name]
+    if find_spec('ziglang') is not None:
+        return [sys.executable, '-m', 'ziglang', 'cc']
+    raise NoCompiler(f'no C compiler ({", ".join(COMPILERS)}) is installed: apt install gcc, or '
+                     'pip install ziglang, or name one in CC')
 
 
 def _compile(sources: Mapping[str, str], library: Path, what: str) -> None:
     """Write a library; arguments and errors as of load."""
-    name = compiler()
+    command = compiler()
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text)
         files = [file for file in sources if file.endswith('.c')]
-        done = subprocess.run([name, *OPTIONS, *files, '-lm', '-o', 'library.so'], cwd=folder,
+        done = subprocess.run([*command, *OPTIONS, *files, '-lm', '-o', 'library.so'], cwd=folder,
                               capture_output=True, text=True)
         if done.returncode:
             line = next((line for line in done.stderr.splitlines() if 'error' in line),
                         f'it ended with {done.returncode}')
-            raise NoCompiler(f"the C compiler '{name}' cannot make {what}: {line}")
+            raise NoCompiler(f"the C compiler '{' '.join(command)}' cannot make {what}: {line}")
         os.replace(Path(folder) / 'library.so', library)
 
 

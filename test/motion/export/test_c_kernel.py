@@ -18,6 +18,7 @@ import subprocess
 import sys
 
 from c_export import needs_gcc
+from cpg_ros.common import c_library
 from cpg_ros.common.c_library import NoCompiler
 from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.integration import kernel
@@ -101,7 +102,7 @@ def test_a_compiler_that_is_missing_or_fails_is_one_line(monkeypatch, tmp_path):
     broken = tmp_path / 'broken'
     broken.write_text('#!/bin/sh\necho "error: no disk" >&2\nexit 1\n')
     broken.chmod(0o755)
-    for compiler, line in (('missing-cc', r'no C compiler \(missing-cc\) .* apt install gcc'),
+    for compiler, line in (('missing-cc', "CC names, 'missing-cc', is not installed"),
                            (broken, 'cannot make the kernels .* no disk')):
         monkeypatch.setenv('CC', str(compiler))
         found = without_numba("""
@@ -119,6 +120,16 @@ except Exception as error:
         assert subprocess.run(['grep', '-qE', line], input=found.stderr, text=True
                               ).returncode == 0, found.stderr
         assert found.stderr.count('\n') == 1
+
+
+def test_the_wheel_of_zig_compiles_where_the_system_has_no_compiler(monkeypatch):
+    monkeypatch.delenv('CC', raising=False)
+    monkeypatch.setattr(c_library.shutil, 'which', lambda _: None)
+    monkeypatch.setattr(c_library, 'find_spec', lambda name: name == 'ziglang')
+    assert c_library.compiler() == [sys.executable, '-m', 'ziglang', 'cc']
+    monkeypatch.setattr(c_library, 'find_spec', lambda _: None)
+    with pytest.raises(NoCompiler, match=r'cc, gcc, clang.* apt install gcc, or pip install zig'):
+        c_library.compiler()
 
 
 def without_numba(text, *arguments):
