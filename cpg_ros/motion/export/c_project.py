@@ -79,7 +79,7 @@ class CProject:
 
     @property
     def ram(self) -> int:
-        """Memory of a struct cpg, bytes, to which come a few small integers."""
+        """Memory of a struct cpg, bytes, but for what pads its flags."""
         joints, legs = len(self.data.robot.joints), len(self.data.robot.legs)
         track = 5 + 2 * joints + legs
         if self.data.format.form == 'network':
@@ -88,7 +88,8 @@ class CProject:
             if self.data.network.readout != 'waveform':
                 track += 6 * self.data.network.cells
         size = 4 if self.data.format.real == 'float32' else 8
-        return joints + size * (3 * joints + 16 + self.tracks * track)
+        # The number of a ramp's parts, and that of a track's gait, take as much as a number each.
+        return 4 + joints + size * (3 * joints + 17 + self.tracks * (track + 1))
 
     def _sizes(self) -> dict[str, object]:
         data, robot, network = self.data, self.data.robot, self.data.network
