@@ -67,12 +67,13 @@ Core = _struct(
     (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
                'behind'), (Ramp, 'ramp lead'),
     (_REAL, 'slowing slower frequency frequency_scale substep absorbed fraction stall stall_past '
-            'stall_low'))
+            'stall_low'), (_POINTER, 'legs state'), (_REAL, 'go'), (_POINTER, 'waiting'))
 
 _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
     'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
-    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_track_look': (_POINTER, _REAL),
+    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_lead_in': (_POINTER, _REAL),
+    'cpg_take': (_POINTER,), 'cpg_track_look': (_POINTER, _REAL),
     'cpg_track_advance': (_POINTER, _REAL), 'cpg_track_reseed': (_POINTER, _REAL),
     'cpg_steer': (_POINTER, _REAL),
     'cpg_confine': (ctypes.c_int, *[_POINTER] * 3, _REAL, *[_POINTER] * 3)}

@@ -27,7 +27,7 @@ import math
 from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.stepper import Stepper
-from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS, Net, Track
+from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
@@ -44,8 +44,9 @@ class Machine(NamedTuple):
     """Addresses by which machine code advances a pattern.
 
     Attributes:
-        advance, resume: functions of ``what`` and of a time in s, a double.
-        what: argument of both.
+        advance, resume, plan, follow: functions of ``what`` and of a time in s, a double; advance
+            does plan and follow, between which angles may be corrected.
+        what: argument of all.
         asked: a 32-bit integer that is not 0 where the next tick needs Python.
         position, velocity, phases, state: pointers to what Pattern has by these names.
 
@@ -53,6 +54,8 @@ class Machine(NamedTuple):
 
     advance: int | None
     resume: int | None
+    plan: int | None
+    follow: int | None
     what: int
     asked: int
     position: int
@@ -196,9 +199,11 @@ class Pattern:
         self._ramp, self._lead = self._struct.ramp, self._struct.lead
         self._offset = robot.column('offset')
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
-        self._requests: deque = deque()
-        #: Set by each request, for machine code that runs the ticks.
+        #: The plan to which the network is left to find by itself, and whether there is one.
+        self._drift: deque[GaitPlan] = deque(maxlen=1)
         self._asked = ctypes.c_int32()
+        #: By the addresses of their structs.
+        self._runners: dict[int, GaitRunner] = {}
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate, self._goal, self._found, self._correction = rows = np.zeros(
             (5, self._offset.size))
@@ -221,15 +226,35 @@ class Pattern:
 
     def _run(self, tracks: list[GaitRunner]) -> None:
         """Let the core run these, the newest one last."""
-        self._tracks, self._struct.tracks = tracks, len(tracks)
         for k, track in enumerate(tracks):
+            self._keep(track)
             self._struct.track[k] = track.address
+        self._struct.tracks = len(tracks)
+        self._struct.legs = tracks[-1].legs.ctypes.data
+
+    @property
+    def _tracks(self) -> list[GaitRunner]:
+        """What the core runs, the newest one last."""
+        struct = self._struct
+        # From the last one on: the core moves them forward as the first one ends.
+        found = [struct.track[k] for k in reversed(range(struct.tracks))]
+        return [self._runners[one] for one in reversed(found)]
+
+    def _keep(self, track: GaitRunner) -> None:
+        """Keep a runner as long as the core may run it."""
+        waiting = self._struct.waiting
+        used = {waiting, track.address, *(one.address for one in self._tracks)}
+        for old in list(self._runners)[:-2 * MOST_TRACKS]:
+            if old not in used:
+                del self._runners[old]
+        self._runners[track.address] = track
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
         """Begin anew at phase 0, with the newest plan, from where the joints are."""
         newest, struct = self._tracks[-1], self._struct
         newest.reseed(0.0)
         self._run([newest])
+        struct.go = 0.0
         self.velocity[:] = 0.0
         self._wanted[:], self._rate[:] = self.position, self.velocity
         self._behind[:], self._correction[:] = False, 0.0
@@ -238,7 +263,7 @@ class Pattern:
         struct.frequency, struct.followed = newest.plan.frequency, 0
         struct.stall = struct.stall_past = 0.0
         self._ramp.level = self._ramp.rate = 0.0
-        self._go(self._ramp, float(enabled), max(ramp, SHORTEST))
+        self._go(self._ramp, float(enabled), ramp)
         self.enabled = enabled
         self.start_from(self.position, ramp)
 
@@ -260,28 +285,30 @@ class Pattern:
         self._lead.level, self._lead.rate, self._lead.parts = 1.0, 0.0, 0
         self.position[:] = np.clip(angles, *self._limits[:2])
         if self._found.any():
-            self._lead_in(time)
-
-    def _lead_in(self, time: float) -> None:
-        left = self._lead.level * np.abs(self._found)
-        fastest = float(np.max(1.5 * left / np.maximum(0.5 * self._limits[2], 1e-9)))
-        self._go(self._lead, 0.0, max(time, SHORTEST, fastest))
+            self._core.cpg_lead_in(self._address, time)
 
     # -- requests from other threads ------------------------------------------------------
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
-        """Change to a plan over a transition in s; 0 leaves it to the network's dynamics."""
+        """Change to a plan over a transition in s; 0 leaves it to the network's dynamics.
+
+        Of plans that wait, for a tick or for the end of other changes, only the last one matters.
+        """
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
         prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
-        self._ask((plan, prepared if transition > 0.0 else None))
+        self._keep(prepared)
+        if transition > 0.0:
+            self._drift.clear()
+            self._struct.waiting = prepared.address
+        else:
+            self._struct.waiting = None
+            self._drift.append(plan)
+            self._asked.value = 1
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
-        self._ask((enabled, max(ramp, SHORTEST)))
-
-    def _ask(self, request: tuple) -> None:
-        self._requests.append(request)
-        self._asked.value = 1
+        self.enabled = enabled
+        self._struct.go = math.copysign(max(ramp, SHORTEST), 1.0 if enabled else -1.0)
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Request the legs' strides, shape (legs,), and the pace; see Drive.
@@ -293,7 +320,6 @@ class Pattern:
         if self.drive is None:
             raise ValueError('this pattern has no drive')
         self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
-        self._asked.value = 1
 
     def attach(self, drive: StrideCommand) -> None:
         """Use a drive from now on; one that has no target yet changes nothing."""
@@ -314,25 +340,29 @@ class Pattern:
     @property
     def plan(self) -> GaitPlan:
         """The newest plan in force."""
-        return self._tracks[-1].plan
+        return self._newest.plan
+
+    @property
+    def _newest(self) -> GaitRunner:
+        return self._runners[self._struct.track[self._struct.tracks - 1]]
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
         """The plan that fades out, the newest in force, and the fraction of that."""
-        if len(self._tracks) == 1:
-            return self._tracks[0].plan, self._tracks[0].plan, 0.0
-        older, newest = self._tracks[-2:]
+        older, newest = (tracks := self._tracks)[-2:][0], tracks[-1]
+        if older is newest:
+            return newest.plan, newest.plan, 0.0
         return older.plan, newest.plan, smoothstep(newest.progress)[0]
 
     @property
     def phases(self) -> np.ndarray:
         """Phase of each leg in cycles, shape (legs,); 0 is where its cell peaks."""
-        return self._tracks[-1].legs
+        return self._newest.legs
 
     @property
     def state(self) -> np.ndarray:
         """The newest network's state and its rate, shape (2, components), of advance's own."""
-        return self._tracks[-1].stepper.now[:2]
+        return self._newest.stepper.now[:2]
 
     @property
     def level(self) -> float:
@@ -342,12 +372,12 @@ class Pattern:
     @property
     def standing(self) -> bool:
         """Tell whether it is disabled and the ramp has ended."""
-        return not (self.enabled or self._ramp.level or self._requests or self._lead.parts)
+        return not (self.enabled or self._ramp.level or self._struct.go or self._lead.parts)
 
     @property
     def in_transition(self) -> bool:
         """Tell whether gaits are still fading into one another, or settling."""
-        return len(self._tracks) > 1 or self._tracks[-1].settling > 0.0
+        return self._struct.tracks > 1 or self._newest.settling > 0.0
 
     @property
     def recovering(self) -> bool:
@@ -355,36 +385,33 @@ class Pattern:
         return bool(self._struct.recovering)
 
     @property
-    def calm(self) -> Machine | None:
+    def machine(self) -> Machine | None:
         """How machine code advances it, None where a tick needs Python."""
-        newest = self._tracks[-1]
-        if (self._asked.value or self._requests or self.correct or len(self._tracks) > 1
-                or type(self).advance is not Pattern.advance):
+        if self._drift or self.correct or type(self).advance is not Pattern.advance:
             return None
-        advance, resume = (ctypes.cast(function, ctypes.c_void_p).value for function in (
-            self._core.cpg_advance, self._core.cpg_resume))
-        return Machine(advance, resume, self._address, ctypes.addressof(self._asked),
-                       self._address + Core.position.offset, self._address + Core.velocity.offset,
-                       newest.address + Track.legs.offset,
-                       newest.address + Track.net.offset + Net.now.offset)
+        functions: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (
+            self._core.cpg_advance, self._core.cpg_resume, self._core.cpg_plan,
+            self._core.cpg_follow)]
+        return Machine(*functions, self._address, ctypes.addressof(self._asked), *(
+            self._address + getattr(Core, name).offset
+            for name in ('position', 'velocity', 'legs', 'state')))
 
     # -- the tick --------------------------------------------------------------------------
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s and fill position, velocity and phases."""
-        self._asked.value = 0
-        if self._requests:
-            self._take_requests()
-        if self._drive is not None:
-            self._drive.take_target()
+        if self._asked.value:
+            self._asked.value = 0
+            while self._drift:
+                self._run(self._tracks[-1:])
+                self._newest.drift_to(self._drift.pop())
+                self._absorb()
         if self.correct is None:
             self._core.cpg_advance(self._address, dt)
         else:
             self._core.cpg_plan(self._address, dt)
             self._goal[:] = self.correct(self._wanted)
             self._core.cpg_follow(self._address, dt, 1)
-        while len(self._tracks) > self._struct.tracks:
-            del self._tracks[0]
 
     def resume(self, stall: float) -> None:
         """Resume after a stall in s from where the pattern stopped, slowly at first.
@@ -392,25 +419,3 @@ class Pattern:
         Belongs to the thread of advance.
         """
         self._core.cpg_resume(self._address, stall)
-
-    def _take_requests(self) -> None:
-        waiting = []
-        while self._requests:
-            what, how = self._requests.popleft()
-            if isinstance(what, bool):
-                self.enabled = what
-                self._go(self._ramp, float(what), how)
-                if self._lead.parts and not what:
-                    self._lead_in(how)
-            elif how is None:
-                self._run(self._tracks[-1:])
-                self._tracks[0].drift_to(what)
-                self._absorb()
-            elif len(self._tracks) < MOST_TRACKS:
-                how.reseed(self._tracks[-1].phase)
-                how.drive = self.drive
-                self._run([*self._tracks, how])
-            else:
-                # Of those that wait, only the last one matters.
-                waiting = [(what, how)]
-        self._requests.extend(waiting)

@@ -83,7 +83,6 @@ class StrideCommand:
         # One row: the legs' strides and the pace.
         self._now, self._goal = np.ones((2, legs + 1))
         self._rate = np.zeros(legs + 1)
-        self._target = self._taken = (np.ones(legs + 1), False)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
         self._trim: np.ndarray | None = None
         self._struct = Drive(self._now.ctypes.data, self._rate.ctypes.data,
@@ -111,16 +110,11 @@ class StrideCommand:
 
         May be called from another thread than advance.
         """
-        self._target = np.append(stride, pace), at_once
-
-    def take_target(self) -> None:
-        """Let the core see the newest targets; belongs to the thread of advance."""
-        target = self._target
-        if target is not self._taken:
-            self._taken = target
-            self._goal[:], self._struct.at_once = target
+        # A tick in between must not reach a part of them at once.
+        self._struct.at_once = 0
+        self._goal[:-1], self._goal[-1] = stride, pace
+        self._struct.at_once = at_once
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s."""
-        self.take_target()
         core().cpg_steer(self.address, dt)

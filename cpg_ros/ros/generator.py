@@ -309,6 +309,7 @@ class Generator(StartedNode):
         for parameter in parameters:
             if parameter.name == 'rate':
                 self.ticker.rate = parameter.value
+                self.ticker.attend()
         if any(p.name in self._planner.names for p in parameters):
             plan = self._planner.plan(self._values())
             self._feedback.learn(plan)
@@ -318,7 +319,7 @@ class Generator(StartedNode):
             self._announce()
         if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
-        self.ticker.attend()
+            self.ticker.attend()
 
     def _announce(self) -> None:
         plan = self._planner.plan(self._values())
@@ -496,19 +497,17 @@ class Generator(StartedNode):
                   ) -> tuple[int, int] | None:
         """Tick outside the interpreter as long as a tick needs nothing of it; see Ticker.
 
-        Whatever ends that calls ``Ticker.attend``, or is asked of the pattern.
+        What the pattern is asked for is taken there; what else there is calls ``Ticker.attend``.
         """
         pattern, ticker = self.pattern, self.ticker
-        if self._feedback.loop is not None or ticker.paused or ticker.stopping:
-            return None
-        calm = pattern.calm
-        if calm is None:
+        machine = pattern.machine
+        if self._feedback.loop is not None or ticker.paused or machine is None:
             return None
         outputs, cells = self._outputs.block, self._cells.block
-        loop = native.Loop(**{name: getattr(calm, name)
+        loop = native.Loop(**{name: getattr(machine, name)
                               for name in ('asked', 'advance', 'resume', 'what')})
-        loop.outputs[:] = (outputs.output((calm.position, calm.velocity, calm.phases), 1),
-                           cells.output((calm.state,), max(1, round(ticker.rate / FASTEST))))
+        loop.outputs[:] = (outputs.output((machine.position, machine.velocity, machine.phases), 1),
+                           cells.output((machine.state,), max(1, round(ticker.rate / FASTEST))))
         self._sent = pattern.position
         with outputs.held(), cells.held():
             return run(loop, deadline, period)

@@ -260,5 +260,5 @@ def test_without_a_compiler_a_line_says_so(monkeypatch, tmp_path):
         [sys.executable, '-P', '-c', 'from cpg_ros.ros.node.native import library\n'
          'print(library(), library())'], capture_output=True, text=True, check=True)
     assert found.stdout == 'None None\n'
-    assert found.stderr == ('ticks are slower, and less regular: no C compiler (missing-cc) is '
-                            'installed: apt install gcc\n')
+    assert found.stderr == ('ticks are slower, and less regular: the C compiler that CC names, '
+                            "'missing-cc', is not installed\n")

@@ -106,6 +106,7 @@ def test_what_the_middleware_refuses_ends_them(monkeypatch):
 HELD = """
 import ctypes
 import time
+from cpg_ros.motion.plan import plan_gait
 from cpg_ros.ros.generator import Generator
 import rclpy
 rclpy.init(args=['generator', '--ros-args', '-p', 'rate:=1000.0', '-p', 'ramp:=0.1'])
@@ -113,17 +114,24 @@ node = Generator()
 node.begin()
 while node.ticker.ticks < 500:
     time.sleep(0.01)
+walk = plan_gait(node.pattern.robot, 'walk')
 before = node.ticker.ticks
+node.pattern.apply(walk, 0.1)
+node.pattern.enable(False, 0.1)
 # Of PyDLL: it keeps the interpreter's lock.
-ctypes.PyDLL(None).usleep(300_000)
-print(node.ticker.ticks - before)
+ctypes.PyDLL(None).usleep(600_000)
+print(node.ticker.ticks - before, node.pattern.level, node.pattern.plan is walk,
+      node.pattern.in_transition)
 node.finish()
 rclpy.shutdown()
 """
 
 
-def test_a_thread_that_holds_the_interpreter_delays_no_message(monkeypatch):
+def test_a_thread_that_holds_the_interpreter_delays_no_message_and_no_request(monkeypatch):
     monkeypatch.setenv('ROS_DOMAIN_ID', str(free_domain()))
     found = subprocess.run([sys.executable, '-P', '-c', HELD], capture_output=True, text=True)
+    ticks, level, taken, changing = found.stdout.splitlines()[-1].split()
     # Python's own ticks are none or one.
-    assert int(found.stdout.splitlines()[-1]) > 20, found.stderr
+    assert int(ticks) > 20, found.stderr
+    # The gait has changed, and the ramp is down, meanwhile.
+    assert (float(level), taken, changing) == (0.0, 'True', 'False')

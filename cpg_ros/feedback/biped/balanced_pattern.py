@@ -14,6 +14,7 @@
 
 """The pattern of a biped whose feedback bears it: joints go where balance wants them."""
 
+from collections import deque
 import math
 
 from cpg_ros.feedback.biped.crouch import crouch_pose
@@ -25,7 +26,7 @@ from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.core import confine
-from cpg_ros.motion.pattern import GaitRunner, Pattern
+from cpg_ros.motion.pattern import GaitRunner, Pattern, SHORTEST
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
@@ -108,6 +109,9 @@ class BalancedPattern(Pattern):
         self._places = self.robot.places
         self._rest = np.array(list(self.robot.held.values()))
         self._arms: Arms | None = None
+        #: Of other threads: a gait to follow, and whether doubts are to be forgotten.
+        self._follow: deque[GaitRunner] = deque(maxlen=1)
+        self._anew = False
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Do nothing: feet are placed for the wished speed."""
@@ -117,7 +121,12 @@ class BalancedPattern(Pattern):
         if self.balance is None:
             super().apply(plan, transition)
         else:
-            self._requests.append((plan, GaitRunner(plan, 0.0)))
+            self._follow.append(GaitRunner(plan, SHORTEST))
+
+    def enable(self, enabled: bool, ramp: float) -> None:
+        """Walk, or come to a stand; what contradicted is judged anew."""
+        self._anew = True
+        super().enable(enabled, ramp)
 
     def attach(self, drive: StrideCommand) -> None:
         """Do nothing, likewise."""
@@ -136,7 +145,7 @@ class BalancedPattern(Pattern):
             return super().standing
         if self._lowers and not self.fallen and (self.balancing or self._time < LOWER + SETTLED):
             return False
-        return not (self.enabled or self.level or self._requests)
+        return not (self.enabled or self.level)
 
     @property
     def held_angles(self) -> np.ndarray:
@@ -172,6 +181,10 @@ class BalancedPattern(Pattern):
         """Advance by dt in s and fill position, velocity and phases."""
         balance, sensors = self.balance, self.sensors
         if balance is None:
+            while self._follow:
+                track = self._follow.popleft()
+                self._keep(track)
+                self._struct.waiting = track.address
             if self._arms is not None:
                 self._arms.advance(dt, False)
             if self._held or self.balancing:
@@ -271,15 +284,13 @@ class BalancedPattern(Pattern):
 
     def _take(self, balance: BipedFeedback) -> None:
         """Take requests of other threads."""
-        while self._requests:
-            what, how = self._requests.popleft()
-            if isinstance(what, bool):
-                self.enabled = what
-                self.doubts.clear()
-                self._go(self._ramp, float(what), how)
-            else:
-                balance.follow(how)
-        if self._tracks[0] is not balance.track or len(self._tracks) > 1:
+        self._core.cpg_take(self._address)
+        if self._anew:
+            self._anew = False
+            self.doubts.clear()
+        while self._follow:
+            balance.follow(self._follow.popleft())
+        if self._tracks != [balance.track]:
             self._run([balance.track])
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:

@@ -293,7 +293,6 @@ class Ticker(TickThread):
     def stop_moving(self) -> None:
         """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
         self.stopping = True
-        self.attend()
         self._moved.set()
 
     def _run(self) -> None:
@@ -301,21 +300,21 @@ class Ticker(TickThread):
         if self._clock.ros_time_is_active:
             self._run_simulated()
         else:
-            self._run_steady(time.monotonic_ns(), lambda deadline: deadline + system_offset(),
-                             lambda: True)
+            self._run_steady(time.monotonic_ns(), lambda deadline: deadline + system_offset())
 
     def _period(self) -> int:
         return round(1e9 / self.rate)
 
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
-                    going: Callable[[], bool]) -> None:
-        """Tick by the steady clock while ``going``; the deadline, and its ``stamp``, in ns."""
+                    going: Callable[[], bool] | None = None) -> None:
+        """Tick by the steady clock, while ``going`` if given; deadline and its ``stamp`` in ns."""
         ending, library, count = self._ending, native.library(), self.count
         wait_until = _wait_until if library is None else library.wait_until
-        while not ending.is_set() and going():
+        while not ending.is_set() and (going is None or going()):
             period = self._period()
             count.wanted = 0
-            left = self._steadily(self._run_outside, deadline, period) if library else None
+            left = (self._steadily(self._run_outside, deadline, period)
+                    if library and going is None else None)
             if left is None:
                 deadline += period
                 behind = wait_until(deadline)

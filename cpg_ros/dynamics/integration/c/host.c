@@ -4,9 +4,47 @@
 /* The clock is slowed in for as long as a stall was, but no longer than this, s. */
 #define LONGEST 0.5
 
+/* No ramp or fade is shorter, s: the clock is slowed from substep to substep, and a joint that has
+ * to get up to speed within one would outrun its limit before that. */
+#define SHORTEST 0.05
+
 void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
 {
-    ramp_to(ramp, end, time);
+    ramp_to(ramp, end, most(time, SHORTEST));
+}
+
+/* Lead the joints from where they were found to the stand, none faster than half of its limit. */
+void cpg_lead_in(cpg *c, cpg_real time)
+{
+    for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
+        const cpg_real left = c->lead.level * fabs(c->found[joint]);
+        time = most(time, 1.5 * left / most(0.5 * c->limits[2][joint], 1e-9));
+    }
+    cpg_ramp_to(&c->lead, 0.0, time);
+}
+
+/* Take what other threads ask for. */
+void cpg_take(cpg *c)
+{
+    cpg_real go = 0.0;
+    __atomic_exchange(&c->go, &go, &go, __ATOMIC_ACQ_REL);
+    if (go != 0.0) {
+        cpg_ramp_to(&c->ramp, go > 0.0, fabs(go));
+        if (go < 0.0 && c->lead.parts > 0) {
+            cpg_lead_in(c, -go);
+        }
+    }
+    if (c->tracks < CPG_TRACKS) {
+        cpg_track *t = __atomic_load_n(&c->waiting, __ATOMIC_ACQUIRE);
+        if (t) {
+            t->stride = c->drive ? c->drive->now : 0;
+            cpg_track_reseed(t, c->track[c->tracks - 1]->phase);
+            c->track[c->tracks] = t;
+            __atomic_store_n(&c->tracks, c->tracks + 1, __ATOMIC_RELEASE);
+            /* Unless another one waits by now. */
+            __atomic_compare_exchange_n(&c->waiting, &t, 0, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED);
+        }
+    }
 }
 
 /* Take over what is wanted; the difference after a jump decays smoothly. */
@@ -71,6 +109,7 @@ static cpg_real slowed_in(cpg *c, cpg_real dt, cpg_real *pace)
 void cpg_plan(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS], clock = dt;
+    cpg_take(c);
     c->fraction = 1.0;
     if (c->stall > 0.0) {
         clock = slowed_in(c, dt, &c->fraction);
@@ -108,6 +147,9 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
     }
     confine(c, dt, corrected ? c->goal : c->wanted, rate);
     c->ticks_held += c->held > 0;
+    const cpg_track *newest = c->track[c->tracks - 1];
+    c->legs = newest->legs;
+    c->state = newest->net.now;
 }
 
 void cpg_advance(cpg *c, cpg_real dt)

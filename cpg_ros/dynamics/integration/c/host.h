@@ -77,4 +77,9 @@ typedef struct {
     cpg_ramp ramp, lead;
     cpg_real slowing, slower, frequency, frequency_scale, substep, absorbed, fraction;
     cpg_real stall, stall_past, stall_low;
+    /* Of the newest track, after each tick. */
+    const cpg_real *legs, *state;
+    /* What other threads ask for: a ramp to the gait, or down if negative, s; a gait to fade to. */
+    cpg_real go;
+    cpg_track *waiting;
 } cpg;
