@@ -389,12 +389,13 @@ class Pattern:
         """How machine code advances it, None where a tick needs Python."""
         if self._drift or self.correct or type(self).advance is not Pattern.advance:
             return None
-        functions: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (
+        addresses: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (
             self._core.cpg_advance, self._core.cpg_resume, self._core.cpg_plan,
             self._core.cpg_follow)]
-        return Machine(*functions, self._address, ctypes.addressof(self._asked), *(
-            self._address + getattr(Core, name).offset
-            for name in ('position', 'velocity', 'legs', 'state')))
+        addresses += [self._address, ctypes.addressof(self._asked)]
+        addresses += [self._address + getattr(Core, name).offset
+                      for name in ('position', 'velocity', 'legs', 'state')]
+        return Machine(*addresses)
 
     # -- the tick --------------------------------------------------------------------------
 
