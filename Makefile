@@ -141,7 +141,7 @@ $(INSTALLED): pyproject.toml .ci/constraints.txt
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'
-	@$(call pip,core c3d optimize sim fleet panel build test lint docs $(WHEELS))
+	@$(call pip,core c3d h5 optimize sim fleet panel build test lint docs $(WHEELS))
 	@$(call pip,models,--no-deps)
 	@$(call pip,numba) || \
 		echo 'numba cannot be installed here: the generator will step its network in C, without feedback'

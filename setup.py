@@ -86,8 +86,8 @@ setup(
     install_requires=['setuptools', *GROUPS['core'], *GROUPS['numba']],
     extras_require={'sim': GROUPS['sim'] + GROUPS['models'],
                     **{name: GROUPS[name]
-                       for name in ('ros', 'compiler', 'panel', 'c3d', 'optimize', 'fleet',
-                                    'test')}},
+                       for name in ('ros', 'compiler', 'panel', 'c3d', 'h5', 'optimize',
+                                    'fleet', 'test')}},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
     maintainer_email='issue-tracker@cpg-ros.invalid',

@@ -19,26 +19,28 @@ angles in degrees (Meredith & Maddock 2001).
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
-from itertools import islice
+from itertools import islice, takewhile
 import math
 from pathlib import Path
+import re
 
-from cpg_ros.common.command_line import printable
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    merged,
+    matching,
     Recording,
+    recording_of,
     RecordingError,
     RecordingFormat,
     require,
+    unwrapped,
 )
-from cpg_ros.fitting.recordings.tables import matching, number_rows, opened, remaining_lines
+from cpg_ros.fitting.recordings.tables import number_in, number_rows, opened, remaining_lines
 from cpg_ros.fitting.recordings.thinned import FARTHEST, pluralize
 import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
-#: Words of a tree, and channels of all joints: a body with hands has 300.
+STATEMENT = re.compile(r'\b(ROOT|JOINT|CHANNELS)\b[ \t]*([^\n\r]*)')
+#: Lines of a tree, and channels of all joints: a body with hands has 300.
 LONGEST, MOST = 200_000, 10_000
 
 
@@ -61,10 +63,13 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     """
     path = Path(path)
     with opened(path) as file:
-        words = _words(file)
-        channels = _tree(words, path)
-        count, interval, line = _motion(file, path, words)
-        rows, notes = number_rows(remaining_lines(file, path), None, len(channels), path, line)
+        head = list(takewhile(lambda line: line.strip() != 'MOTION', islice(file, LONGEST)))
+        if ''.join(head[:1]).split()[:1] != ['HIERARCHY']:
+            raise RecordingError(f"{path}: no BVH file: it does not begin with 'HIERARCHY'")
+        count, interval, line = _motion(file, path, len(head) + 1)
+        channels = _tree(''.join(head), path)
+        rows, notes = number_rows(remaining_lines(file, path), [
+            f'{joint} {channel}' for joint, channel in channels], None, path, line)
     if not len(rows):
         raise RecordingError(f'{path}: no frames')
     if len(rows) != count:
@@ -75,59 +80,34 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     with np.errstate(invalid='ignore'):
         angles = np.radians(rows[:, turning])
         angles[~(np.abs(angles) <= FARTHEST)] = np.nan
-        moving = [k for k, column in enumerate(angles.T) if not (column == column[0]).all()]
-    columns = ([names.index(name) for name in matching(joints, names, str(path))] if joints
-              else moving)
-    if not columns:
+        moving = [name for name, column in zip(names, angles.T, strict=True)
+                  if not (column == column[0]).all()]
+    wanted = matching(joints, names, str(path)) if joints else moving
+    if not wanted:
         raise RecordingError(f'{path}: no joint moves in {pluralize(len(rows), "frame")}')
     if not joints and len(moving) < len(names):
         notes.append(f'{pluralize(len(names) - len(moving), "channel")} left out: no motion')
-    for k in columns:
-        there = np.isfinite(angles[:, k])
-        angles[there, k] = np.unwrap(angles[there, k])
     stamps = np.rint(np.arange(len(rows)) * interval * 1e9).astype(np.int64)
-    found = merged([(stamps, [names[k] for k in columns], angles[:, columns])],
-                   printable(str(path)))
-    return replace(found, notes=(*notes, *found.notes))
+    return recording_of(path, stamps, names, unwrapped(angles), notes, wanted)
 
 
-def _words(file: Iterator[str]) -> list[str]:
-    """Return the words of the tree."""
-    words: list[str] = []
-    for line in islice(file, LONGEST):
-        if line.strip() == 'MOTION':
-            return [*words, 'MOTION', '']
-        words += [*line.split(), '\n']
-        if len(words) > LONGEST:
-            break
-    return words
-
-
-def _tree(words: list[str], path: Path) -> list[tuple[str, str]]:
+def _tree(text: str, path: Path) -> list[tuple[str, str]]:
     """Return joint and channel of each column."""
-    if words[:1] != ['HIERARCHY']:
-        raise RecordingError(f"{path}: no BVH file: it does not begin with 'HIERARCHY'")
-    if words[-2:] != ['MOTION', '']:
-        raise RecordingError(f"{path}: no BVH file: no line 'MOTION' follows the tree of joints")
     channels: list[tuple[str, str]] = []
-    joint, depth = '', 0
-    for k, word in enumerate(words):
-        if word in ('ROOT', 'JOINT'):
-            name = ' '.join(_line(words, k + 1)).partition('{')[0].strip()
-            joint = name.rpartition(':')[2]
+    joint = ''
+    for kind, value in STATEMENT.findall(text):
+        if kind != 'CHANNELS':
+            joint = value.partition('{')[0].strip().rpartition(':')[2]
             if not joint:
-                raise RecordingError(f'{path}: a {word} without a name')
-        elif word == 'CHANNELS':
-            count, *named = [*_line(words, k + 1), '']
-            named = named[:-1]
-            if count != str(len(named)) or not set(named) <= CHANNELS or not joint:
-                raise RecordingError(f'{path}: the channels of {joint or "nothing"!r}, '
-                                     f'{abbreviate([count, *named])}, are no number and as many '
-                                     'names '
-                                     'such as Xrotation')
-            channels += [(joint, channel) for channel in named]
-        depth += word.endswith('{') - word.startswith('}')
-    if depth:
+                raise RecordingError(f'{path}: a {kind} without a name')
+            continue
+        count, *named = value.split() or ['']
+        if count != str(len(named)) or not set(named) <= CHANNELS or not joint:
+            raise RecordingError(f'{path}: the channels of {joint or "nothing"!r}, '
+                                 f'{abbreviate([count, *named])}, are no number and as many '
+                                 'names such as Xrotation')
+        channels += [(joint, channel) for channel in named]
+    if text.count('{') != text.count('}'):
         raise RecordingError(f'{path}: not as many braces close as open in its tree of joints')
     if not any(channel.endswith('rotation') for _, channel in channels) or len(channels) > MOST:
         raise RecordingError(f'{path}: {pluralize(len(channels), "channel")}, where joints that '
@@ -135,26 +115,21 @@ def _tree(words: list[str], path: Path) -> list[tuple[str, str]]:
     return channels
 
 
-def _line(words: list[str], begin: int) -> list[str]:
-    return words[begin:words.index('\n', begin)]
-
-
-def _motion(file: Iterator[str], path: Path, words: list[str]) -> tuple[int, float, int]:
+def _motion(file: Iterator[str], path: Path, number: int) -> tuple[int, float, int]:
     """Return the number of frames, their interval (s), and the number of the next line."""
-    number = words.count('\n') + 1
     values: dict[str, float] = {}
     for line in islice(file, 10):
         number += 1
         name, mark, value = line.partition(':')
-        if mark:
-            try:
-                values[' '.join(name.lower().split())] = float(value)
-            except ValueError:
-                raise RecordingError(f'{path}, line {number}: {value.strip()[:40]!r} is not a '
-                                     'number') from None
+        if mark and (known := number_in(value)) is not None:
+            values[' '.join(name.lower().split())] = known
+        elif mark:
+            raise RecordingError(f'{path}, line {number}: {value.strip()[:40]!r} is not a number')
         if 'frame time' in values:
             break
-    count, interval = values.get('frames', math.nan), values.get('frame time', math.nan)
+    else:
+        raise RecordingError(f"{path}: no BVH file: no line 'MOTION' follows the tree of joints")
+    count, interval = values.get('frames', math.nan), values['frame time']
     if not (0.0 <= count < 1e9 and 1e-6 <= interval <= 10.0):
         raise RecordingError(f"{path}: after 'MOTION', 'Frames:' and 'Frame Time:' (1e-6 to 10 s) "
                              f'have to follow, not {count:g} and {interval:g}')

@@ -17,12 +17,10 @@ of Open Source Software 6(58), 2911), which runs in a process of its own (see c3
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.common import files
-from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.c3d_process import read_apart, UnreadableC3D
 from cpg_ros.fitting.recordings.markers import (
@@ -33,13 +31,16 @@ from cpg_ros.fitting.recordings.markers import (
 )
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    ANGLES,
     JOINTS,
-    merged,
+    matching,
     Recording,
+    recording_of,
     RecordingError,
     RecordingFormat,
+    unwrapped,
 )
-from cpg_ros.fitting.recordings.tables import ANGLES, matching, stamps_of_frames
+from cpg_ros.fitting.recordings.tables import stamps_of_frames
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
@@ -133,21 +134,17 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     places = points.points[:, [points.names.index(name) for name in wanted]]
     # Where a model had no value, some write zeros.
     first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
-    there = np.isfinite(first)
-    silent = [name for k, name in enumerate(wanted) if not there[:, k].any()]
+    silent = [name for k, name in enumerate(wanted) if not np.isfinite(first[:, k]).any()]
     if silent and (joints or len(silent) == len(wanted)):
         raise RecordingError(f'{source}: no value of {abbreviate(silent)}')
-    for k in range(len(wanted)):
-        first[there[:, k], k] = np.unwrap(first[there[:, k], k])
     kept = [k for k, name in enumerate(wanted) if name not in silent]
-    recording = merged([(points.stamps, [wanted[k] for k in kept], first[:, kept])],
-                       printable(str(source)))
     notes = [*points.notes, 'of each angle the first component is taken, flexion in Plug-in Gait']
     if not unit:
         notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
     if silent:
         notes.append(f'without a value, left out: {abbreviate(silent)}')
-    return replace(recording, notes=(*map(printable, notes), *recording.notes))
+    return recording_of(source, points.stamps, [wanted[k] for k in kept],
+                        unwrapped(first[:, kept]), notes)
 
 
 def _stated(path: Path) -> int:

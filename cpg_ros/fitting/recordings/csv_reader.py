@@ -15,17 +15,19 @@
 """Joint angles out of CSV files: a time column and one column per joint."""
 
 from collections.abc import Iterator, Sequence
-import csv
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 import io
 from itertools import chain, islice, takewhile
 from pathlib import Path
+import re
 
 from cpg_ros.common.command_line import printable, progress_bar
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    ANGLES,
     Chunk,
+    FootLoads,
     JOINTS,
     LATEST,
     merged,
@@ -38,38 +40,80 @@ from cpg_ros.fitting.recordings.recording import (
     UNNAMED,
 )
 from cpg_ros.fitting.recordings.tables import (
-    ANGLES,
-    Column,
-    decimal_commas,
+    cells_of,
     EMPTY,
-    load_columns,
-    LoadColumns,
     MOST_LINES,
-    NAMED,
-    NANOSECONDS,
     number_in,
+    number_rows,
     opened,
-    POSITION,
     PREAMBLE,
     preamble,
-    RECEIPT,
-    SECONDS,
-    SHARE,
-    split,
-    TIME,
-    TIMES,
-    TRUTH,
-    units_of,
-    VALUE,
 )
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
+# What the columns of a table are: its time, angles of joints, and loads on feet.
+
+#: What a header may call its unit -> that in s.
+TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
+         'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
+#: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
+BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
+TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|temps|tiempo|tempo'
+                  r'|elapsed[_ ]time)(?:[_ ]([a-z]+))?$', re.I)
+#: Times by another clock, taken where there is no other; and halves of a stamp in integers.
+RECEIPT = re.compile(r'^(receive|recv|log|publish)[_ ]?time$', re.I)
+SECONDS = re.compile(r'^(.*[./_])?(secs?)$', re.I)
+NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
+#: In a table with a line for each value: columns of names, and of values.
+NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
+VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
+#: Where a stride is 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
+SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
+#: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
+#: '/joint_states/lf_knee/position'.
+POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
+                      r'|^/.*/([^/]+)/position$', re.I)
+#: Words of a load on a foot, and those of one of several axes of it.
+LOAD = {'force', 'forces', 'contact', 'contacts', 'load', 'loads', 'grf', 'fz'}
+AXIS = {'x', 'y', 'z', 'fx', 'fy', 'vx', 'vy', 'vz', 'px', 'py', 'pz'}
+#: What a row of units has in its cells, beside numbers that would make it one of samples.
+UNITS = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
+#: A number with a decimal comma.
+COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
 DELIMITERS = ',;\t'
 #: A time that is so far ahead of both neighbours (s) is a stamp gone wrong.
 ASTRAY = 3600.0
 #: Lines that are parsed together.
 LINES = 8192
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a number is, what its header says, which joint it is of, and its unit's size."""
+
+    index: int
+    header: str
+    joint: str
+    scale: float
+
+
+def split(header: str) -> tuple[str, str | None]:
+    """Return name and unit of a header."""
+    match = BRACKETED.match(header)
+    return (match[1], match[2]) if match else (header, None)
+
+
+def load_columns(headers: list[str]) -> list[Column]:
+    """Return the columns of loads on feet, or of whether they touch the ground: two or more."""
+    found = []
+    for k, header in enumerate(headers):
+        name, unit = split(header)
+        words = {word.lower() for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+', name)}
+        if (len(words) > 1 and words & LOAD and not words & AXIS
+                and (unit is None or unit.lower() not in ANGLES)):
+            found.append(Column(k, header, name, 1.0))
+    return found if len(found) > 1 else []
 
 
 def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
@@ -116,10 +160,9 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
 
             recording = merged(chunks(), printable(str(path)),
                                [column.joint for column in table.columns])
-    notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
-    return replace(recording, notes=(*notes, *recording.notes),
+    return replace(recording, notes=(*dict.fromkeys(table.notes), *recording.notes),
                    cycle=np.nan if table.shares else 0.0,
-                   loads=table.loads.taken(recording.start, recording.times[-1]))
+                   loads=table.foot_loads(recording.start, recording.times[-1]))
 
 
 class _Table:
@@ -127,30 +170,26 @@ class _Table:
 
     def __init__(self, path: Path, file: io.TextIOBase, unit: str | None, time: str | None,
                  joints: Sequence[str]) -> None:
-        self.path = path
-        self.line, self.read = 1, 0
+        self.path, self.read, self.last = path, 0, -np.inf
         self.notes: list[str] = []
         #: Cells that are the same in all rows.
         self.fixed: dict[int, str] = {}
-        line = file.readline()
-        while line and not line.strip():
-            line, self.line = file.readline(), self.line + 1
-        if not line:
+        head = list(islice(file, PREAMBLE + 1))
+        blank = len(list(takewhile(lambda line: not line.strip(), head)))
+        if blank == len(head):
             raise RecordingError(f'{path}: the file is empty')
-        self._printable(line, self.line)
-        head = [line, *islice(file, PREAMBLE)]
-        rest = iter(head[1:])
-        if not any(map(line.strip(EMPTY).count, DELIMITERS)) and (
+        line, rest, self.line = head[blank], iter(head[blank + 1:]), blank + 1
+        if not any(map(line.strip(EMPTY).count, DELIMITERS)) and '\0' not in line and (
                 found := preamble(line, rest)) is not None:
             line, self.line, declared = found[0], self.line + found[1], found[2]
             if unit and declared and unit != declared:
                 raise RecordingError(f'{path}: its preamble says {declared}, not {unit}')
             unit = unit or declared
         else:
-            before = _lines_before_header(head)
-            line, rest = head[before], iter(head[before + 1:])
+            before = _lines_before_header(head[blank:])
+            self.line += before
+            line, rest = head[self.line - 1], iter(head[self.line:])
             if before:
-                self.line += before
                 self.notes.append(f'{pluralize(before, "line")} before the header, passed over')
         self.lines = chain(rest, file)
         self.delimiter = max(DELIMITERS, key=line.count)
@@ -169,30 +208,41 @@ class _Table:
                                  'name the columns')
         headers = self._begin(headers)
         self.time = self._time(headers, time)
-        self.loads = LoadColumns(load_columns(headers))
-        if self.loads.columns:
+        self.loads = load_columns(headers)
+        self._loads: list[np.ndarray] = []
+        if self.loads:
             self.notes.append('taken for loads on the feet: '
-                              + abbreviate([one.header for one in self.loads.columns]))
+                              + abbreviate([one.header for one in self.loads]))
         self.columns = self._joints(headers, unit, joints)
-        self.last = -np.inf
+        self.needed = [''] * len(headers)
+        for column in (self.time, *self.columns, *self.loads):
+            self.needed[column.index] = column.header
+        if self.rest >= 0:
+            self.needed[self.rest] = 'nanoseconds'
 
     def _begin(self, headers: list[str]) -> list[str]:
         """Look at the first line below the header; return the header as it is to be read."""
-        self.width, self.ended = len(headers), False
         first = next(self.lines, '')
-        if (named := self._units(headers, first)) != headers:
-            headers, first = named, next(self.lines, '')
+        cells = self._cells(first, self.line + 1) if first.strip() else []
+        units = [UNITS.fullmatch(cell.strip()) for cell in cells]
+        texts = [match[1].strip('-') for match in units if match]
+        if (len(cells) >= len(headers) == len(texts[:len(headers)]) and len(texts) == len(cells)
+                and any(texts) and not any(texts[len(headers):])
+                and 'nan' not in map(str.lower, texts)
+                and not any(split(header)[1] for header in headers)):
+            headers = [f'{header} [{unit}]' if unit else header
+                       for header, unit in zip(headers, texts, strict=False)]
             self.line += 1
             self.notes.append(f'line {self.line} is taken for the units of the columns')
-        self.commas = decimal_commas(first, self.delimiter)
+            first = next(self.lines, '')
+            cells = self._cells(first, self.line + 1) if first.strip() else []
+        self.commas = (self.delimiter != ',' and '.' not in first
+                       and any(map(COMMA.fullmatch, first.strip().split(self.delimiter))))
         if self.commas:
             self.notes.append('commas are taken for decimal points')
         self.lines = chain([first] if first else [], self.lines)
-        if first.strip() and '\0' not in first and (places := _tidy(
-                headers, self._cells(first, self.line + 1))):
-            headers = self._widened(headers, *places)
-            self.width = len(headers)
-        return headers
+        places = _tidy(headers, cells)
+        return self._widened(headers, *places) if places else headers
 
     def _echoed(self, cells: list[str]) -> list[str]:
         """Return headers for the output of ``ros2 topic echo --csv``, [] for any other line.
@@ -224,8 +274,7 @@ class _Table:
 
         """
         time = self._time(headers, None).index
-        rows: dict[str, dict[str, str]] = {}
-        joints: dict[str, None] = {}
+        rows: dict[float, dict[str, str]] = {}
         for number, line in enumerate(self.lines, self.line + 1):
             self.read += len(line)
             if number > MOST_LINES:
@@ -233,81 +282,57 @@ class _Table:
                                      'parts')
             if not line.strip():
                 continue
-            self._printable(line, number)
-            cells = self._cells(line, number)
-            if len(cells) < self.width:
-                raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
-                                     f'the header has {self.width}')
-            when, joint = cells[time].strip(), cells[name].strip()
-            for cell in (when, cells[value]):
-                if number_in(cell) is None:
-                    raise RecordingError(f'{self.path}, line {number}: {cell.strip()[:40]!r} is '
-                                         'not a number')
-            joints.setdefault(joint)
-            rows.setdefault(when, {}).setdefault(joint, cells[value].strip())
+            cells = [cell.strip() for cell in self._cells(line, number)]
+            where = f'{self.path}, line {number}'
+            if len(cells) < len(headers):
+                raise RecordingError(f'{where}: {len(cells)} columns, where the header has '
+                                     f'{len(headers)}')
+            when, _ = (number_in(cell.replace(',', '.') if self.commas else cell)
+                       for cell in (cells[time], cells[value]))
+            for cell, number_there in ((cells[time], when), (cells[value], _)):
+                if number_there is None:
+                    raise RecordingError(f'{where}: {cell[:40]!r} is not a number')
+            row = rows.setdefault(when or 0.0, {'': cells[time]})
+            row.setdefault(cells[name], cells[value])
+        joints = list(dict.fromkeys(joint for row in rows.values() for joint in row if joint))
         unit = split(headers[value])[1]
         self.notes.append(f'a line for each value: {headers[value]!r} by {headers[name]!r}')
-        times = sorted(rows, key=lambda when: number_in(when) or 0.0)
-        self.lines = chain(self.delimiter.join((when, *(rows[when].get(joint, '')
-                                                        for joint in joints))) + '\n'
-                           for when in times)
+        self.lines = chain(self.delimiter.join(rows[when].get(joint, '')
+                                               for joint in ('', *joints)) + '\n'
+                           for when in sorted(rows))
         return [headers[time], *(f'{joint} [{unit}]' if unit else joint for joint in joints)]
 
     def _cells(self, line: str, number: int) -> list[str]:
-        try:
-            return next(csv.reader([line], delimiter=self.delimiter, strict=True))
-        except csv.Error as error:
-            raise RecordingError(f'{self.path}, line {number}: {error}') from error
-
-    def _units(self, headers: list[str], line: str) -> list[str]:
-        """Return the headers with the units that the next line has, if it is one of units."""
-        if '\0' in line or not line.strip() or any(split(header)[1] for header in headers):
-            return headers
-        cells = self._cells(line, self.line + 1)
-        units = units_of(cells[:self.width])
-        if units is None or len(units) < self.width or any(map(str.strip, cells[self.width:])):
-            return headers
-        return [f'{header} [{unit}]' if unit else header
-                for header, unit in zip(headers, units, strict=True)]
-
-    def _printable(self, line: str, number: int) -> None:
-        if '\0' in line:
-            raise RecordingError(f'{self.path}, line {number}: not a text file (a byte 0)')
+        return cells_of(line, self.delimiter, f'{self.path}, line {number}')
 
     def _time(self, headers: list[str], option: str | None) -> Column:
         """Find the time column, or that of the seconds beside one of nanoseconds."""
         self.rest, self.shares = -1, False
-        found: list[tuple[int, str, str | None]] = []
-        for k, header in enumerate(headers):
-            name, unit = split(header)
-            match = TIME.match(name)
-            if match and match[2]:
-                unit = unit or match[2]
-            if match and (unit is None or unit in TIMES):
-                found.append((k, header, unit))
-        names = [split(header)[0] for header in headers]
-        if len(found) != 1:
-            pair = [[k for k, name in enumerate(names) if kind.match(name)]
-                    for kind in (SECONDS, NANOSECONDS)]
-            if len(pair[0]) == len(pair[1]) == 1:
-                self.rest = pair[1][0]
-                return Column(pair[0][0], headers[pair[0][0]], '', 1.0)
-        shares = [k for k, name in enumerate(names)
-                  if SHARE.match(name) and split(headers[k])[1] in (None, '%')]
-        self.shares = not found and len(shares) == 1
-        if self.shares:
+        names, units = zip(*map(split, headers), strict=True)
+
+        def called(kind: re.Pattern[str]) -> list[int]:
+            return [k for k, name in enumerate(names) if kind.match(name)]
+
+        found = [(k, units[k] or match[2]) for k, name in enumerate(names)
+                 if (match := TIME.match(name))]
+        found = [(k, unit) for k, unit in found if unit is None or unit in TIMES]
+        seconds, nanoseconds = called(SECONDS), called(NANOSECONDS)
+        if len(found) != 1 and len(seconds) == len(nanoseconds) == 1:
+            self.rest = nanoseconds[0]
+            return Column(seconds[0], headers[seconds[0]], '', 1.0)
+        shares = [k for k in called(SHARE) if units[k] in (None, '%')]
+        if not found and len(shares) == 1:
+            self.shares = True
             return Column(shares[0], headers[shares[0]], '', 0.01)
-        if not found:
-            found += [(k, name, None) for k, name in enumerate(names) if RECEIPT.match(name)][:1]
+        found = found or [(k, None) for k in called(RECEIPT)[:1]]
         if len(found) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '
-                + (f'{len(found)} time columns, {abbreviate([one[1] for one in found])}' if found
-                   else
-                   "no time column, such as 'time' or 'time [ms]'; the columns are "
+                + (f'{len(found)} time columns, {abbreviate([headers[k] for k, _ in found])}'
+                   if found else "no time column, such as 'time' or 'time [ms]'; the columns are "
                    + abbreviate(headers, 20)))
-        k, header, unit = found[0]
-        return Column(k, header, '', self._scale(header, unit, option, TIMES))
+        k, unit = found[0]
+        return Column(k, headers[k], '', self._scale(headers[k], unit, option, TIMES))
 
     def _scale(self, header: str, unit: str | None, option: str | None,
                units: dict[str, float]) -> float:
@@ -320,10 +345,10 @@ class _Table:
                 ) -> list[Column]:
         """Find the joints' columns."""
         columns, others = [], []
-        loads = {column.index for column in self.loads.columns}
+        taken = {self.time.index, self.rest, *(column.index for column in self.loads)}
         for k, header in enumerate(headers):
             name, unit = split(header)
-            if k in (self.time.index, self.rest) or k in loads or not name or any(
+            if k in taken or not name or any(
                     kind.match(name) for kind in (RECEIPT, SECONDS, NANOSECONDS)):
                 continue
             if UNNAMED.match(header):
@@ -365,62 +390,34 @@ class _Table:
         names = [column.joint for column in self.columns]
         places = [column.index for column in self.columns]
         scales = np.array([column.scale for column in self.columns])
+        loads = [column.index for column in self.loads]
         while lines := list(islice(self.lines, LINES)):
             self.read += sum(map(len, lines))
             if self.commas:
                 lines = [line.replace(',', '.') for line in lines]
-            numbers = self._numbers(lines)
-            seconds = whole = numbers[:, self.time.index] * self.time.scale
-            rest = numbers[:, self.rest] if self.rest >= 0 else np.zeros(len(seconds))
+            numbers, notes = number_rows(lines, self.needed, self.delimiter, self.path,
+                                         self.line + 1, cut=False, loads=loads, fixed=self.fixed)
+            self.notes += notes
+            whole = numbers[:, self.time.index] * self.time.scale
+            rest = numbers[:, self.rest] if self.rest >= 0 else np.zeros(len(whole))
             seconds = whole + 1e-9 * rest
             self._check(seconds, lines)
-            self.loads.add(seconds, numbers)
+            if loads:
+                self._loads.append(np.column_stack([seconds, numbers[:, loads]]))
             # In two parts, as floats do not hold a date to the nanosecond.
             yield (np.rint(whole * 1e9).astype(np.int64) + rest.astype(np.int64), names,
                    numbers[:, places] * scales)
             self.line += len(lines)
 
-    def _numbers(self, lines: list[str]) -> np.ndarray:
-        """Return the numbers of some lines, shape (lines that are not blank, columns)."""
-        if any(map(str.strip, lines)):
-            try:
-                numbers = np.loadtxt(lines, delimiter=self.delimiter, comments=None, ndmin=2)
-                if numbers.shape[1] == self.width:
-                    return numbers
-            except ValueError:
-                pass  # Cells without a number, or with a text: which, the slow way tells.
-        loads = {column.index for column in self.loads.columns}
-        needed = {column.index: column.header
-                  for column in (self.time, *self.columns, *self.loads.columns)}
-        if self.rest >= 0:
-            needed[self.rest] = 'nanoseconds'
-        rows = []
-        for number, line in enumerate(lines, self.line + 1):
-            if not line.strip():
-                continue
-            self._printable(line, number)
-            cells = self._cells(line, number)
-            while len(cells) > self.width and not cells[-1].strip():
-                cells.pop()
-                self.ended = True
-            if len(cells) != self.width:
-                raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
-                                     f'the header has {self.width}')
-            for k, text in self.fixed.items():
-                if cells[k] != text:
-                    raise RecordingError(f'{self.path}, line {number}: joint {cells[k][:40]!r}, '
-                                         f'where the first line has {text!r}')
-            row = np.full(self.width, np.nan)
-            for k, header in needed.items():
-                value = number_in(cells[k])
-                if value is None and k in loads:
-                    value = TRUTH.get(cells[k].strip().lower(), np.nan)
-                if value is None:
-                    raise RecordingError(f'{self.path}, line {number}, column {header!r}: '
-                                         f'{cells[k].strip()[:40]!r} is not a number')
-                row[k] = value
-            rows.append(row)
-        return np.array(rows).reshape(-1, self.width)
+    def foot_loads(self, start: float, length: float) -> FootLoads | None:
+        """Return the loads from a time on, for some seconds; None if there are no columns."""
+        if not self._loads:
+            return None
+        rows = np.concatenate(self._loads)
+        rows[:, 0] -= start
+        rows = rows[(rows[:, 0] >= 0.0) & (rows[:, 0] <= length) & np.isfinite(rows).all(axis=1)]
+        rows = rows[np.append(True, np.diff(rows[:, 0]) > 0.0)[:len(rows)]]
+        return FootLoads(tuple(column.joint for column in self.loads), rows[:, 0], rows[:, 1:])
 
     def _check(self, seconds: np.ndarray, lines: list[str]) -> None:
         """Refuse times that are none, or go back."""

@@ -23,20 +23,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.common.files import resource_folder
 from cpg_ros.common.yaml_reader import within, YamlReader
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    merged,
+    matching,
     Option,
     Recording,
+    recording_of,
     RecordingError,
 )
-from cpg_ros.fitting.recordings.tables import matching
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
@@ -67,18 +66,18 @@ class JointAngle:
     """The angle by which a segment is turned from another.
 
     Attributes:
-        first: name of the segment it is turned from, such as the thigh.
-        second: name of the segment that is turned, such as the shank.
+        between: names of the segment it is turned from, such as the thigh, and of the one that
+            is turned, such as the shank.
         axis: name of the segment about which it turns, by the right hand, in three dimensions;
             '' for the angle between the two, which has no sign.
         neutral: angle that counts as 0, rad.
 
     """
 
-    first: str
-    second: str
+    between: tuple[str, ...]
     axis: str = ''
-    neutral: float = 0.0
+    neutral: Annotated[float, lambda angle: '' if abs(angle) <= math.pi else (
+        f'{angle:g} rad is more than half a turn')] = 0.0
 
 
 @dataclass(frozen=True)
@@ -88,15 +87,15 @@ class Segments:
     Attributes:
         segments: name -> segment.
         joints: name -> angle.
-        likely: likelihood below which a marker is not seen.
+        least_likelihood: below it, a marker is not seen.
         alternatives: marker -> other names for it, or for what may stand in its place.
 
     """
 
     segments: Mapping[str, Segment]
     joints: Mapping[str, JointAngle]
-    likely: float = LIKELY
-    alternatives: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    least_likelihood: Annotated[float, within(0.0, 1.0)] = LIKELY
+    alternatives: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def named_as(self, there: Sequence[str]) -> 'Segments':
         """Return the same with those alternatives for markers that are there."""
@@ -119,7 +118,7 @@ class Segments:
         """
         one = self.joints[joint]
         return tuple(dict.fromkeys(
-            marker for name in (one.first, one.second, *[one.axis] * bool(one.axis and solid))
+            marker for name in (*one.between, *[one.axis] * bool(one.axis and solid))
             for marker in self.segments[name].markers))
 
 
@@ -130,27 +129,17 @@ class _Reader(YamlReader):
         listed = self.items(value, where)
         if len(listed) != 2:
             raise self.fail(where, f'has two ends, not {len(listed)}')
-        ends = [tuple(self.text(marker, f'{where}[{k}]') for marker in (
-            self.items(end, f'{where}[{k}]') if isinstance(end, list) else [end]))
-            for k, end in enumerate(listed)]
+        ends = [self.texts(end, f'{where}[{k}]') if isinstance(end, list) else
+                (self.text(end, f'{where}[{k}]'),) for k, end in enumerate(listed)]
         if ends[0] == ends[1]:
             raise self.fail(where, 'begins and ends at the same marker')
         return Segment(*ends)
 
-    def joint(self, value: Any, where: str, segments: Mapping[str, Segment]) -> JointAngle:
-        tree = self.keys(value, where, {'between'}, {'axis', 'neutral'})
-        between = self.items(tree['between'], f'{where}.between')
-        if len(between) != 2 or between[0] == between[1]:
+    def joint(self, value: Any, where: str) -> JointAngle:
+        joint = self.record(JointAngle, value, where)
+        if len(joint.between) != 2 or len(set(joint.between)) != 2:
             raise self.fail(f'{where}.between', 'must be two segments')
-        first, second = (self.text(one, f'{where}.between') for one in between)
-        axis = self.text(tree['axis'], f'{where}.axis') if 'axis' in tree else ''
-        for name in (first, second, *[axis] * bool(axis)):
-            if name not in segments:
-                raise self.fail(where, f'there is no segment {name!r}, only '
-                                f'{abbreviate(list(segments), 20)}')
-        return JointAngle(first, second, axis, self.number(
-            tree.get('neutral', 0.0), f'{where}.neutral', lambda angle: '' if abs(angle) <= math.pi
-            else f'{angle:g} rad is more than half a turn'))
+        return joint
 
 
 def shipped() -> list[str]:
@@ -192,22 +181,18 @@ def load_segments(name: str | Path) -> Segments:
     if not path.exists():
         raise RecordingError(f'{path}: there is no such file of segments; shipped are '
                              f'{abbreviate(shipped())}')
-    tree = reader.keys(reader.tree(), 'file', {'segments', 'joints'},
-                       {'least_likelihood', 'alternatives'})
-    for key in ('segments', 'joints'):
-        if not isinstance(tree[key], Mapping) or not tree[key]:
+    found = reader.record(Segments, reader.tree(), 'file',
+                          segments=lambda value, where: reader.mapping(value, where, reader.ends),
+                          joints=lambda value, where: reader.mapping(value, where, reader.joint))
+    for key, entries in (('segments', found.segments), ('joints', found.joints)):
+        if not entries:
             raise reader.fail(key, 'must be a mapping with at least one entry')
-    segments = {key: reader.ends(value, f'segments.{key}')
-                for key, value in tree['segments'].items()}
-    joints = {key: reader.joint(value, f'joints.{key}', segments)
-              for key, value in tree['joints'].items()}
-    others = tree.get('alternatives') or {}
-    if not isinstance(others, Mapping):
-        raise reader.fail('alternatives', 'must be a mapping')
-    alternatives = {name: [reader.text(one, f'alternatives.{name}[{k}]') for k, one in enumerate(
-        reader.items(value, f'alternatives.{name}'))] for name, value in others.items()}
-    return Segments(segments, joints, reader.number(
-        tree.get('least_likelihood', LIKELY), 'least_likelihood', within(0.0, 1.0)), alternatives)
+    for key, joint in found.joints.items():
+        for name in (*joint.between, *[joint.axis] * bool(joint.axis)):
+            if name not in found.segments:
+                raise reader.fail(f'joints.{key}', f'there is no segment {name!r}, only '
+                                  f'{abbreviate(list(found.segments), 20)}')
+    return found
 
 
 #: A segment that, as seen along the axis, has less than this share of its length has no direction.
@@ -342,7 +327,7 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
     if lost:
         notes.append(f'without the markers {abbreviate(missing)}, left out: {abbreviate(lost)}')
     used = list(dict.fromkeys(marker for name in found for marker in needs[name]))
-    points = _seen(markers, segments.likely, used, notes)
+    points = _seen(markers, segments.least_likelihood, used, notes)
     angles = {name: _angle(name, segments, markers, points) for name in found}
     silent = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
     if silent and (joints or len(silent) == len(angles)):
@@ -351,10 +336,9 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
                              'together')
     if silent:
         notes.append(f'never seen, left out: {abbreviate(silent)}')
-    table = {name: angle for name, angle in angles.items() if name not in silent}
-    recording = merged([(markers.stamps, list(table), np.column_stack(list(table.values())))],
-                       printable(str(source)))
-    return replace(recording, notes=(*map(printable, notes), *recording.notes))
+    kept = [name for name in angles if name not in silent]
+    return recording_of(source, markers.stamps, kept,
+                        np.column_stack([angles[name] for name in kept]), notes)
 
 
 def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:
@@ -385,8 +369,8 @@ def _angle(name: str, segments: Segments, markers: Markers, points: np.ndarray) 
 
     flat = points.shape[2] == 2
     axis = direction(joint.axis) if joint.axis and not flat else None
-    angle = turned(direction(joint.first), direction(joint.second), axis)
-    angle = angle - joint.neutral
+    first, second = map(direction, joint.between)
+    angle = turned(first, second, axis) - joint.neutral
     if flat or axis is not None:
         angle = (angle + np.pi) % (2.0 * np.pi) - np.pi
     return angle

@@ -15,26 +15,24 @@
 """Joint angles or markers out of numpy's archives (.npz) of arrays with names."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 import math
 import os
 from pathlib import Path
 import zipfile
 
 from cpg_ros.common import files
-from cpg_ros.common.command_line import printable
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    ANGLES,
     JOINTS,
     LATEST,
-    merged,
     Recording,
+    recording_of,
     RecordingError,
     RecordingFormat,
-    require,
     UNIT,
 )
-from cpg_ros.fitting.recordings.tables import FPS, matching, stamps_of_frames, UnpackedSize
+from cpg_ros.fitting.recordings.tables import FPS, stamps_of_frames, UnpackedSize
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
@@ -42,7 +40,7 @@ import numpy as np
 TIMES = ('time', 'times', 't', 'timestamps')
 RATES = ('fps', 'rate', 'frequency', 'sampling_rate')
 NAMES = ('joints', 'joint_names', 'names')
-ANGLES = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
+POSITIONS = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
 UNITS = ('unit', 'units')
 #: Largest archive, bytes.
 LARGEST = 1_000_000_000
@@ -74,9 +72,7 @@ def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None 
     names, angles = _angles(arrays, path, notes)
     angles = angles * _scale(arrays, unit, path, notes)
     stamps = _stamps(arrays, fps, len(angles), path)
-    found = merged([(stamps, names, angles)], printable(str(path)),
-                   matching(joints, names, str(path)))
-    return replace(found, notes=(*notes, *found.notes))
+    return recording_of(path, stamps, names, angles, notes, joints)
 
 
 def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
@@ -122,7 +118,7 @@ def _named(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:
 def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
             ) -> tuple[list[str], np.ndarray]:
     """Return the joints' names and their angles."""
-    table, listed = _named(arrays, ANGLES), _named(arrays, NAMES)
+    table, listed = _named(arrays, POSITIONS), _named(arrays, NAMES)
     if table and arrays[table].ndim == 2:
         if not listed:
             raise RecordingError(f"{path}: the columns of {table!r} have no names: an array "
@@ -149,7 +145,6 @@ def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
         used, angles = names, np.column_stack([arrays[name] for name in names])
     if angles.dtype.kind not in 'fiu':
         raise RecordingError(f'{path}: {used[0]!r} is of type {angles.dtype}, not of numbers')
-    require(names, names, str(path))
     known = {one for one in arrays if one.lower() in (*TIMES, *RATES, *UNITS)}
     left = [name for name in arrays if name not in used and name not in known]
     if left:
@@ -166,16 +161,15 @@ def _scale(arrays: Mapping[str, np.ndarray], option: str | None, path: Path, not
     """Return the size of the unit in rad."""
     name = _named(arrays, UNITS)
     stated = str(arrays[name]) if name and arrays[name].ndim == 0 else None
-    known = {'rad': 'rad', 'radians': 'rad', 'deg': 'deg', 'degrees': 'deg', '°': 'deg'}
     for value in (stated, option):
-        if value is not None and value not in known:
+        if value is not None and value not in ANGLES:
             raise RecordingError(f'{path}: unit {value[:40]!r} is none of '
-                                 f'{abbreviate(list(known))}')
-    if stated and option and known[stated] != known[option]:
+                                 f'{abbreviate(list(ANGLES))}')
+    if stated and option and ANGLES[stated] != ANGLES[option]:
         raise RecordingError(f'{path}: its angles are in {stated}, not {option}')
     if not stated and not option:
         notes.append("no array 'unit': the angles are taken to be in rad")
-    return np.pi / 180.0 if known[stated or option or 'rad'] == 'deg' else 1.0
+    return ANGLES[stated or option or 'rad']
 
 
 def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: int, path: Path

@@ -34,19 +34,14 @@ from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     JOINTS,
     LATEST,
+    matching,
     Recording,
     RecordingError,
     RecordingFormat,
     require,
     UNIT,
 )
-from cpg_ros.fitting.recordings.tables import (
-    matching,
-    number_rows,
-    opened,
-    preamble,
-    remaining_lines,
-)
+from cpg_ros.fitting.recordings.tables import number_rows, opened, preamble, remaining_lines
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
@@ -92,7 +87,8 @@ def trc_markers(path: str | Path) -> Markers:
                              f'markers, with tabs between, not {abbreviate(cells)}')
     labels = [cell for cell in cells[2:] if cell]
     stated = facts.get('NumMarkers')
-    rows, notes = number_rows(rest, '\t', 2 + 3 * len(labels), path, 6)
+    rows, notes = number_rows(rest, ['Frame#', 'Time', *(
+        f'{label} {axis}' for label in labels for axis in 'XYZ')], '\t', path, 6)
     if stated != str(len(labels)):
         notes.append(f'{pluralize(len(labels), "marker")}, where NumMarkers is '
                      f'{stated or "missing"}')
@@ -159,7 +155,7 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     names = matching(joints, list(angles.values()), str(path))
     found = read_csv(path, unit, progress=progress, joints=[
         next(column for column, joint in angles.items() if joint == name) for name in names])
-    notes = []
+    notes: list[str] = []
     if declared is None and unit is None:
         notes.append("the header has no 'inDegrees': the angles are taken to be in rad")
     left = [column for column in columns if column not in angles]

@@ -12,20 +12,24 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Markers out of the tables that pose estimation writes: DeepLabCut, SLEAP, Anipose.
+"""Markers out of what pose estimation writes: DeepLabCut, SLEAP, Anipose.
 
-DeepLabCut (and Lightning Pose): three or four rows of headers, scorer, individuals, bodyparts,
-coords (Nath et al. 2019). SLEAP's analysis: one row of headers, `nose.x`, `nose.y`, `nose.score`.
+DeepLabCut (and Lightning Pose): tables with three or four rows of headers, scorer, individuals,
+bodyparts, coords (Nath et al. 2019), and the same by pandas in HDF5. SLEAP's analysis: tables with
+one row of headers, `nose.x`, `nose.y`, `nose.score`, and arrays in HDF5 (Pereira et al. 2022).
 Anipose: `nose_x`, `nose_y`, `nose_z`, `nose_score`, and the frame in `fnum`.
 """
 
-from collections.abc import Iterator, Sequence
-import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
+import pickle
 import re
+from typing import Any
 
+from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
@@ -36,11 +40,13 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingFormat,
 )
 from cpg_ros.fitting.recordings.tables import (
+    cells_of,
     FPS,
     number_rows,
     opened,
     remaining_lines,
     stamps_of_frames,
+    UnpackedSize,
 )
 import numpy as np
 
@@ -54,31 +60,63 @@ ROWS = ('scorer', 'individuals', 'bodyparts', 'coords')
 
 
 @dataclass
-class _Layout:
-    """Where a table has what: animal -> marker -> coordinate -> column."""
+class _Poses:
+    """Numbers by animal ('' for the only one), marker and coordinate.
 
-    places: dict[str, dict[str, dict[str, int]]] = field(default_factory=dict)
-    width: int = 0
-    frame: int = 0
-    track: int | None = None
-    line: int = 1
+    Attributes:
+        path: of the file.
+        columns: animal, marker and coordinate of each column; None for other columns.
+        rows: shape (n, columns).
+        frames: their numbers, shape (n,).
+        notes: one line each.
 
-    def put(self, animal: str, marker: str, coordinate: str, column: int, path: Path) -> None:
-        own = self.places.setdefault(animal, {}).setdefault(marker, {})
-        if coordinate in own:
-            raise RecordingError(f'{path}: two columns {coordinate!r} of marker {marker!r}')
-        own[coordinate] = column
+    """
+
+    path: Path
+    columns: Sequence[tuple[str, str, str] | None]
+    rows: np.ndarray
+    frames: np.ndarray
+    notes: list[str] = field(default_factory=list)
+
+    def markers(self, fps: str | float | None, individual: str | None) -> Markers:
+        """Return the markers of one animal."""
+        animals = list(dict.fromkeys(one[0] for one in self.columns if one))
+        animal = _chosen(individual, animals, self.path)
+        places: dict[str, dict[str, int]] = {}
+        for k, one in enumerate(self.columns):
+            if one and one[0] == animal:
+                own = places.setdefault(one[1], {})
+                if one[2] in own:
+                    raise RecordingError(f'{self.path}: two columns {one[2]!r} of marker '
+                                         f'{one[1]!r}')
+                own[one[2]] = k
+        flat = not any('z' in own for own in places.values())
+        axes = 'xy' if flat else 'xyz'
+        names = tuple(name for name, own in places.items() if set(axes) <= set(own))
+        if not names:
+            raise RecordingError(f'{self.path}: no marker has columns {abbreviate(list(axes))}')
+        if not len(self.rows):
+            raise RecordingError(f'{self.path}: no rows')
+        points = np.stack([self.rows[:, [places[name][axis] for name in names]] for axis in axes],
+                          axis=2)
+        if flat:
+            points[:, :, 1] *= -1.0  # A picture's y points down.
+        scores = [places[name].get('likelihood', places[name].get('score')) for name in names]
+        likelihoods = None if all(one is None for one in scores) else np.column_stack(
+            [np.ones(len(points)) if one is None else self.rows[:, one] for one in scores])
+        return Markers(names, stamps_of_frames(self.frames, fps, self.path), points, self.path,
+                       likelihoods, tuple(self.notes))
 
 
 def read_pose(path: str | Path, segments: str | Path | None = None,
               fps: str | float | None = None, individual: str | None = None,
               joints: Sequence[str] = (), progress: bool = True) -> Recording:
-    """Read the joint angles between the markers of a table of poses.
+    """Read the joint angles between the markers of a file of poses.
 
     Args:
-        path: the CSV file, packed by gzip or not.
+        path: the CSV file, packed by gzip or not, or the HDF5 file.
         segments: which markers span which segment; see `load_segments`.
-        fps: frames a second of the video, which no such table has.
+        fps: frames a second of the video, which no such file has.
         individual: of several animals, the one to read.
         joints: of these, in this order; all of them, if empty.
         progress: not used.
@@ -92,80 +130,106 @@ def read_pose(path: str | Path, segments: str | Path | None = None,
 
 def pose_markers(path: str | Path, fps: str | float | None, individual: str | None = None
                  ) -> Markers:
-    """Read the markers of a table of poses; arguments as of `read_pose`.
+    """Read the markers of a file of poses; arguments as of `read_pose`.
 
     Raises:
-        RecordingError: no such table, no or an impossible rate, or an animal that is not there.
+        RecordingError: no such file, no or an impossible rate, or an animal that is not there.
+        MissingLibraryError: it is an HDF5 file, and h5py is not installed.
 
     """
     path = Path(path)
-    if path.suffix in ('.h5', '.slp'):
-        raise RecordingError(f'{path}: {path.suffix} files are not read: export the poses as CSV')
-    with opened(path) as file:
-        layout = _layout(file, path)
-        lines = remaining_lines(file, path)
-    if layout.track is not None:
-        lines = _of_track(lines, layout, path, individual)
-    else:
-        _require(individual, [one for one in layout.places if one], path)
-    places = layout.places.get(individual or '') or next(iter(layout.places.values()))
-    flat = not any('z' in own for own in places.values())
-    axes = 'xy' if flat else 'xyz'
-    names = tuple(name for name, own in places.items() if set(axes) <= set(own))
-    if not names:
-        raise RecordingError(f'{path}: no marker has columns {abbreviate(list(axes))}')
-    rows, notes = number_rows(lines, ',', layout.width, path, layout.line)
-    if not len(rows):
-        raise RecordingError(f'{path}: no rows')
-    stamps = stamps_of_frames(rows[:, layout.frame], fps, path)
-    points = np.stack([rows[:, [places[name][axis] for name in names]] for axis in axes], axis=2)
-    if flat:
-        points[:, :, 1] *= -1.0  # A picture's y points down.
-    scores = [next((places[name][one] for one in ('likelihood', 'score') if one in places[name]),
-                   None) for name in names]
-    likelihoods = None if all(one is None for one in scores) else np.column_stack(
-        [np.ones(len(rows)) if one is None else rows[:, one] for one in scores])
-    return Markers(names, stamps, points, path, likelihoods, tuple(notes))
+    if path.suffix == '.slp':
+        raise RecordingError(f'{path}: a project of SLEAP: export its analysis as HDF5 or CSV')
+    poses = _poses_of_hdf5(path) if path.suffix == '.h5' else _poses_of_table(path, individual)
+    # Of tracks the one that was asked for is there alone, without a name.
+    tracked = {one[0] for one in poses.columns if one} == {''}
+    return poses.markers(fps, None if tracked else individual)
+
+
+def _poses_of_hdf5(path: Path) -> _Poses:
+    needed('h5py')
+    import h5py
+    try:
+        with h5py.File(path) as file:
+            table = next((one['table'] for one in file.values()
+                          if isinstance(one, h5py.Group) and 'table' in one), None)
+            if table is None and {'tracks', 'node_names'} <= set(file):
+                return _poses_of_sleap(path, file)
+            if table is None or 'values_block_0' not in table.dtype.names:
+                raise RecordingError(f'neither poses of DeepLabCut nor an analysis of SLEAP: it '
+                                     f'has {abbreviate(list(file))}')
+            UnpackedSize(path.stat().st_size).add(table.size * table.dtype.itemsize)
+            names = _Names(BytesIO(bytes(table.attrs['values_block_0_kind']))).load()
+            # Scorer, individual where there are several animals, body part, coordinate.
+            columns = [(one[1] if len(one) == 4 else '', *one[-2:]) for one in names]
+            return _Poses(path, columns, table['values_block_0'].astype(float), table['index'])
+    # The library lists nothing of what damaged files make it raise.
+    except Exception as error:
+        why = ' '.join(str(error).split()) or type(error).__name__
+        raise RecordingError(f'{path}: no HDF5 file of poses that can be read: {why[:200]}'
+                             ) from error
+
+
+class _Names(pickle.Unpickler):
+    """Reads the names of columns, which pandas pickles, and nothing that runs code."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        raise RecordingError(f'{module}.{name} among the names of columns')
+
+
+def _poses_of_sleap(path: Path, file: Any) -> _Poses:
+    """Return SLEAP's arrays, of shapes (animals, coordinates, markers, frames), as columns."""
+    arrays = [file['tracks'], *[file[name] for name in ('point_scores',) if name in file]]
+    UnpackedSize(path.stat().st_size).add(sum(one.size * 8 for one in arrays))
+    tracks = np.concatenate([one[:] if one.ndim == 4 else one[:][:, None] for one in arrays],
+                            axis=1)
+    nodes = [name.decode() for name in file['node_names']]
+    animals = [name.decode() for name in file.get('track_names', ())]
+    axes = [*'xyz'[:arrays[0].shape[1]], 'score'][:tracks.shape[1]]
+    columns = [(animal, node, axis) for animal in animals or [''] for axis in axes
+               for node in nodes]
+    rows = tracks.reshape(-1, tracks.shape[-1]).T
+    if rows.shape[1] != len(columns):
+        raise RecordingError(f'{rows.shape[1]} columns, where {len(columns)} have names')
+    return _Poses(path, columns, rows, np.arange(len(rows)))
 
 
 def recognises(path: Path) -> bool:
     """Tell whether a file begins as a table of poses."""
     try:
         with opened(path) as file:
-            cells = _cells(file.readline())
+            cells = _cells(file.readline(), path, 1)
     except RecordingError:
         return False
     return cells[:1] == ['scorer'] or any(cell in FRAMES for cell in cells)
 
 
-def _cells(line: str) -> list[str]:
-    try:
-        return [cell.strip() for cell in next(csv.reader([line], strict=True), [])]
-    except csv.Error:
-        return []
+def _cells(line: str, path: Path, number: int) -> list[str]:
+    return [cell.strip() for cell in cells_of(line, ',', f'{path}, line {number}')]
 
 
-def _layout(file: Iterator[str], path: Path) -> _Layout:
-    """Read the rows of headers."""
-    first = _cells(next(file, ''))
-    found = _Layout(width=len(first))
-    if first[:1] == ['scorer']:
-        heads = {}
-        for line in islice(file, 3):
-            cells = _cells(line)
-            found.line += 1
+def _poses_of_table(path: Path, individual: str | None) -> _Poses:
+    columns: list[tuple[str, str, str] | None]
+    with opened(path) as file:
+        first = _cells(next(file, ''), path, 1)
+        heads: dict[str, list[str]] = {}
+        for number, line in enumerate(islice(file, 3) if first[:1] == ['scorer'] else (), 2):
+            cells = _cells(line, path, number)
             if not cells or cells[0] not in ROWS or len(cells) != len(first):
-                raise RecordingError(f'{path}, line {found.line}: a row of headers has to begin '
-                                     f'with one of {abbreviate(ROWS)} and have {len(first)} cells')
+                raise RecordingError(f'{path}, line {number}: a row of headers has to begin with '
+                                     f'one of {abbreviate(ROWS)} and have {len(first)} cells')
             heads[cells[0]] = cells
             if cells[0] == 'coords':
                 break
+        lines = remaining_lines(file, path)
+    if first[:1] == ['scorer']:
         if not {'bodyparts', 'coords'} <= set(heads):
             raise RecordingError(f"{path}: the rows of headers 'bodyparts' and 'coords' are not "
                                  'both there')
-        for k in range(1, len(first)):
-            animal = heads['individuals'][k] if 'individuals' in heads else ''
-            found.put(animal, heads['bodyparts'][k], heads['coords'][k], k, path)
+        animals = heads.get('individuals', [''] * len(first))
+        columns = [None, *zip(animals[1:], heads['bodyparts'][1:], heads['coords'][1:],
+                              strict=True)]
+        frame = 0
     else:
         frames = [k for k, cell in enumerate(first) if cell in FRAMES]
         if len(frames) != 1:
@@ -173,53 +237,40 @@ def _layout(file: Iterator[str], path: Path) -> _Layout:
                 f"{path}: no table of poses: its first line neither begins with 'scorer' nor has "
                 f'a column {" or ".join(map(repr, FRAMES))}; files of other kinds have to be '
                 'exported as CSV')
-        found.frame = frames[0]
-        found.track = first.index(TRACK) if TRACK in first else None
-        for k, cell in enumerate(first):
-            if (match := COLUMN.fullmatch(cell)) and match[1] != 'instance':
-                found.put('', match[1], match[2], k, path)
-    found.line += 1
-    if not found.places:
+        frame = frames[0]
+        columns = [('', match[1], match[2]) if (match := COLUMN.fullmatch(cell))
+                   and match[1] != 'instance' else None for cell in first]
+    if not any(columns):
         raise RecordingError(f'{path}: no columns of markers')
-    return found
-
-
-def _of_track(lines: list[str], layout: _Layout, path: Path, individual: str | None
-              ) -> list[str]:
-    """Return the lines of one animal, blank where they are another's, without its name."""
-    at = layout.track or 0
-    split = [_cells(line) for line in lines]
-    tracks = list(dict.fromkeys(cells[at] for cells in split if len(cells) > at))
-    _require(individual, tracks, path)
-    animal = individual if individual is not None else (tracks or [''])[0]
-    frames: set[str] = set()
-    kept = []
-    for number, cells in enumerate(split, layout.line):
-        if len(cells) > max(at, layout.frame) and cells[at] != animal:
-            kept.append('\n')
-            continue
-        frame = cells[layout.frame] if len(cells) > layout.frame else ''
-        if frame and frame in frames:
-            raise RecordingError(f'{path}, line {number}: frame {frame[:20]} is there twice: '
+    rows, notes = number_rows(lines, [
+        'frame' if k == frame else ' '.join(one[1:]) if one else ''
+        for k, one in enumerate(columns)], ',', path, 2 + len(heads))
+    if TRACK in first:
+        at = first.index(TRACK)
+        tracks = [_cells(line, path, k)[at] for k, line in enumerate(filter(str.strip, lines), 2)
+                  ][:len(rows)]
+        animal = _chosen(individual, list(dict.fromkeys(tracks)), path)
+        rows = rows[[track == animal for track in tracks]]
+        seen, count = np.unique(rows[:, frame], return_counts=True)
+        if (count > 1).any():
+            raise RecordingError(f'{path}: frame {seen[np.argmax(count > 1)]:g} is there twice: '
                                  'animals without tracks cannot be told apart')
-        frames.add(frame)
-        kept.append(','.join('' if k == at else cell for k, cell in enumerate(cells)) + '\n')
-    return kept
+    return _Poses(path, columns, rows, rows[:, frame], notes)
 
 
-def _require(individual: str | None, there: Sequence[str], path: Path) -> None:
-    """Check that it is told which animal to read where there are several, and that it is there."""
+def _chosen(individual: str | None, there: Sequence[str], path: Path) -> str:
+    """Return which animal to read; where there are several, it has to be named."""
     if (individual is None and len(there) < 2) or individual in there:
-        return
+        return individual if individual is not None else (*there, '')[0]
     lacking = '' if individual is None else f'no individual {individual!r}; '
-    raise RecordingError(f'{path}: {lacking}there are '
-                         f'{abbreviate(there) or "none with names"}: name one '
+    named = abbreviate([one for one in there if one])
+    raise RecordingError(f'{path}: {lacking}there are {named or "none with names"}: name one '
                          '(individual)')
 
 
 POSE = RecordingFormat(
-    name='pose', contents='markers in a CSV file of DeepLabCut, SLEAP or Anipose',
-    help='a CSV file of DeepLabCut, SLEAP (analysis) or Anipose', metavar='FILE', read=read_pose,
-    endings=('.csv', '.csv.gz'), options=(JOINTS, SEGMENTS, FPS, INDIVIDUAL),
-    recognises=recognises,
+    name='pose', contents='markers in a CSV or HDF5 file of DeepLabCut, SLEAP or Anipose',
+    help='a CSV or HDF5 file of DeepLabCut, SLEAP (analysis) or Anipose', metavar='FILE',
+    read=read_pose, endings=('.csv', '.csv.gz', '.h5'),
+    options=(JOINTS, SEGMENTS, FPS, INDIVIDUAL), recognises=recognises,
     lacks={'unit': 'markers have no angles', 'time': 'frames have no times: see --fps'})

@@ -19,10 +19,12 @@ Bags, tables and live topics all deliver chunks of samples; `merged` makes one r
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 import math
 from pathlib import Path
 import re
 
+from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.fitting.recordings.thinned import (
     drop_outlier_positions,
@@ -54,6 +56,10 @@ class FootLoads(ShortRepr):
         return f'{len(self.times)} loads on {", ".join(self.legs)}'
 
 
+#: What a file may call the unit of an angle -> that in rad.
+ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
+          'deg': math.pi / 180.0, 'degree': math.pi / 180.0, 'degrees': math.pi / 180.0,
+          '°': math.pi / 180.0}
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
 
@@ -186,6 +192,59 @@ def abbreviate(names: Sequence[str], most: int = 6) -> str:
 def joint_list(joints: Sequence[str]) -> str:
     """Return 'joint' and its name, or 'joints' and their names."""
     return f'joint{"" if len(joints) == 1 else "s"} {abbreviate(joints)}'
+
+
+def matching(wanted: Sequence[str], names: Sequence[str], source: str) -> list[str]:
+    """Return the names that are asked for, each once, in the order in which they are.
+
+    Args:
+        wanted: names, or patterns such as 'left*'; all names, if empty.
+        names: that are there.
+        source: what to call the file in messages.
+
+    Raises:
+        RecordingError: nothing fits one of them.
+
+    """
+    found: list[str] = []
+    for pattern in wanted:
+        fitting = [name for name in names if pattern == name or fnmatchcase(name, pattern)]
+        if not fitting:
+            raise RecordingError(f'{source}: no joint {pattern!r}; there are '
+                                 f'{abbreviate(names, 40)}')
+        found += fitting
+    return list(dict.fromkeys(found if wanted else names))
+
+
+def unwrapped(angles: np.ndarray) -> np.ndarray:
+    """Return angles, rad, shape (n, joints), without jumps by whole turns; nan where missing."""
+    angles = angles.copy()
+    for column in angles.T:
+        there = np.isfinite(column)
+        column[there] = np.unwrap(column[there])
+    return angles
+
+
+def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: np.ndarray,
+                 notes: Sequence[str] = (), joints: Sequence[str] = ()) -> Recording:
+    """Make a recording of all angles of a file.
+
+    Args:
+        path: of the file.
+        stamps: ns, int64, shape (n,).
+        names: of the joints.
+        angles: rad, shape (n, names).
+        notes: to begin with.
+        joints: names or patterns, in this order; all joints, if empty.
+
+    Raises:
+        RecordingError: see `merged` and `matching`.
+
+    """
+    require(names, names, str(path))
+    found = merged([(stamps, names, angles)], printable(str(path)),
+                   matching(joints, names, str(path)))
+    return replace(found, notes=(*map(printable, notes), *found.notes))
 
 
 def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:

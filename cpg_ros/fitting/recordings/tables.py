@@ -12,155 +12,80 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The text of tables as programs write it: packed, with a preamble, with a row of units."""
+"""The text of tables as programs write it: packed, cut, with a preamble; and rows of numbers."""
 
 import codecs
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
-from fnmatch import fnmatchcase
+import csv
 import gzip
 import io
 import itertools
 import math
 import os
 from pathlib import Path
-import re
 from typing import cast, IO
 import zlib
 
 from cpg_ros.common import files
-from cpg_ros.fitting.recordings.recording import (
-    abbreviate,
-    FootLoads,
-    LATEST,
-    Option,
-    RecordingError,
-)
+from cpg_ros.fitting.recordings.recording import LATEST, Option, RecordingError
 import numpy as np
 
-# What the columns of a table are: its time, angles of joints, and loads on feet.
+# Rows of numbers out of lines of text, with every mistake named by its line.
 
-#: What a header may call its unit -> that in rad, or in s.
-ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
-          'deg': np.pi / 180.0, 'degree': np.pi / 180.0, 'degrees': np.pi / 180.0,
-          '°': np.pi / 180.0}
-TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
-         'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
-#: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
-BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
-TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|temps|tiempo|tempo'
-                  r'|elapsed[_ ]time)(?:[_ ]([a-z]+))?$', re.I)
-#: Times by another clock, taken where there is no other; and halves of a stamp in integers.
-RECEIPT = re.compile(r'^(receive|recv|log|publish)[_ ]?time$', re.I)
-SECONDS = re.compile(r'^(.*[./_])?(secs?)$', re.I)
-NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
-#: In a table with a line for each value: columns of names, and of values.
-NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
-VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
-#: Where a stride is 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
-SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
-#: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
-#: '/joint_states/lf_knee/position'.
-POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
-                      r'|^/.*/([^/]+)/position$', re.I)
-#: Words of a load on a foot, and those of one of several axes of it.
-LOAD = {'force', 'forces', 'contact', 'contacts', 'load', 'loads', 'grf', 'fz'}
-AXIS = {'x', 'y', 'z', 'fx', 'fy', 'vx', 'vy', 'vz', 'px', 'py', 'pz'}
 #: A contact may be written as a word.
 TRUTH = {'true': 1.0, 'false': 0.0}
 
 
-@dataclass(frozen=True)
-class Column:
-    """Where a number is, what its header says, which joint it is of, and its unit's size."""
-
-    index: int
-    header: str
-    joint: str
-    scale: float
-
-
-def split(header: str) -> tuple[str, str | None]:
-    """Return name and unit of a header."""
-    match = BRACKETED.match(header)
-    return (match[1], match[2]) if match else (header, None)
-
-
 def number_in(cell: str) -> float | None:
     """Return the number in a cell, nan where it is empty, None where it is something else."""
-    cell = cell.strip()
-    if not cell:
-        return float('nan')
     try:
-        return float(cell)
+        return float(cell) if cell.strip() else float('nan')
     except ValueError:
         return None
 
 
-def load_columns(headers: list[str]) -> list[Column]:
-    """Return the columns of loads on feet, or of whether they touch the ground: two or more."""
-    found = []
-    for k, header in enumerate(headers):
-        name, unit = split(header)
-        words = {word.lower() for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+', name)}
-        if (len(words) > 1 and words & LOAD and not words & AXIS
-                and (unit is None or unit.lower() not in ANGLES)):
-            found.append(Column(k, header, name, 1.0))
-    return found if len(found) > 1 else []
+def cells_of(line: str, delimiter: str | None, where: str) -> list[str]:
+    """Return the cells of a line; the delimiter None is any white space.
+
+    Raises:
+        RecordingError: it is no text, or quotes do not end; messages begin with ``where``.
+
+    """
+    if '\0' in line:
+        raise RecordingError(f'{where}: not a text file (a byte 0)')
+    if delimiter is None:
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=delimiter, strict=True), [])
+    except csv.Error as error:
+        raise RecordingError(f'{where}: {error}') from error
 
 
-class LoadColumns:
-    """Those of a table that are loads on feet, and what they hold."""
-
-    def __init__(self, columns: list[Column]) -> None:
-        self.columns = columns
-        self._seconds: list[np.ndarray] = []
-        self._rows: list[np.ndarray] = []
-
-    def add(self, seconds: np.ndarray, numbers: np.ndarray) -> None:
-        """Take some lines of the table: times, s, and all its columns, shape (n, columns)."""
-        if self.columns:
-            self._seconds.append(seconds)
-            self._rows.append(numbers[:, [column.index for column in self.columns]])
-
-    def taken(self, start: float, length: float) -> FootLoads | None:
-        """Return the loads from a time on, for some seconds; None if there are no columns."""
-        if not self._rows:
-            return None
-        times = np.concatenate(self._seconds) - start
-        rows = np.concatenate(self._rows)
-        held = (times >= 0.0) & (times <= length) & np.isfinite(rows).all(axis=1)
-        times, rows = times[held], rows[held]
-        rising = np.append(True, np.diff(times) > 0.0)[:len(times)]
-        return FootLoads(tuple(column.joint for column in self.columns), times[rising],
-                         rows[rising])
-
-
-# Rows of numbers out of lines of text, with every mistake named by its line.
-
-def number_rows(lines: Sequence[str], delimiter: str | None, width: int, path: Path, first: int
-                ) -> tuple[np.ndarray, list[str]]:
+def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | None, path: Path,
+                first: int, *, cut: bool = True, loads: Collection[int] = (),
+                fixed: Mapping[int, str] | None = None) -> tuple[np.ndarray, list[str]]:
     """Return the numbers of lines that are not blank, nan where a cell is empty, and notes.
-
-    A last line with fewer cells than the others is one that was not written to its end: it is
-    left out.
 
     Args:
         lines: of text.
+        headers: of the columns; '' for those that need not hold numbers.
         delimiter: of cells; None for any white space.
-        width: cells in a line; more may follow if they are empty.
         path: for messages.
         first: number of the first of the lines, counted from 1.
+        cut: whether a last line with fewer cells is left out, as one not written to its end.
+        loads: columns of loads, which may be words.
+        fixed: column -> text that it has in every line.
 
     Returns:
-        Numbers, shape (rows, width), and what was left out, one line each.
+        Numbers, shape (rows, columns), and what was left out, one line each.
 
     Raises:
         RecordingError: a cell that is no number, or a line of another width.
 
     """
     numbered = [(k, line) for k, line in enumerate(lines, first) if line.strip()]
+    width = len(headers)
     try:
         table = np.loadtxt([line for _, line in numbered], delimiter=delimiter, comments=None,
                            ndmin=2) if numbered else np.empty((0, width))
@@ -169,27 +94,32 @@ def number_rows(lines: Sequence[str], delimiter: str | None, width: int, path: P
     except ValueError:
         pass  # Cells that are empty or no number: which, the slow way tells.
     rows: list[list[float]] = []
-    notes = []
+    notes: dict[str, None] = {}
     for number, line in numbered:
-        cells = line.rstrip('\r\n').split(delimiter)
+        where = f'{path}, line {number}'
+        cells = cells_of(line, delimiter, where)
         while len(cells) > width and not cells[-1].strip():
             cells.pop()
-        if len(cells) < width and number == numbered[-1][0] and rows:
-            notes.append(f'line {number} is cut, left out')
+            notes['lines that end in a delimiter'] = None
+        if cut and len(cells) < width and number == numbered[-1][0] and rows:
+            notes[f'line {number} is cut, left out'] = None
             continue
         if len(cells) != width:
-            raise RecordingError(f'{path}, line {number}: {len(cells)} columns, where there '
-                                 f'should be {width}')
-        rows.append([_number(cell, path, number) for cell in cells])
-    return np.array(rows).reshape(-1, width), notes
-
-
-def _number(cell: str, path: Path, line: int) -> float:
-    cell = cell.strip()
-    try:
-        return float(cell) if cell else float('nan')
-    except ValueError:
-        raise RecordingError(f'{path}, line {line}: {cell[:40]!r} is not a number') from None
+            raise RecordingError(f'{where}: {len(cells)} columns, where the header has {width}')
+        for k, text in (fixed or {}).items():
+            if cells[k] != text:
+                raise RecordingError(f'{where}: joint {cells[k][:40]!r}, where the first line has '
+                                     f'{text!r}')
+        row = [number_in(cell) if header else math.nan
+               for cell, header in zip(cells, headers, strict=True)]
+        for k in loads:
+            row[k] = TRUTH.get(cells[k].strip().lower(), math.nan) if row[k] is None else row[k]
+        if None in row:
+            k = row.index(None)
+            raise RecordingError(f'{where}, column {headers[k]!r}: {cells[k].strip()[:40]!r} is '
+                                 'not a number')
+        rows.append(cast(list[float], row))
+    return np.array(rows).reshape(-1, width), list(notes)
 
 
 # How large what is unpacked may become: a small file may hold zeros without end.
@@ -255,30 +185,6 @@ def stamps_of_frames(frames: np.ndarray, fps: str | float | None, path: Path) ->
     return np.rint(seconds * 1e9).astype(np.int64)
 
 
-# The joints of a file that names or patterns ask for.
-
-def matching(wanted: Sequence[str], names: Sequence[str], source: str) -> list[str]:
-    """Return the names that are asked for, each once, in the order in which they are.
-
-    Args:
-        wanted: names, or patterns such as 'left*'; all names, if empty.
-        names: that are there.
-        source: what to call the file in messages.
-
-    Raises:
-        RecordingError: nothing fits one of them.
-
-    """
-    found: list[str] = []
-    for pattern in wanted:
-        fitting = [name for name in names if pattern == name or fnmatchcase(name, pattern)]
-        if not fitting:
-            raise RecordingError(f'{source}: no joint {pattern!r}; there are '
-                                 f'{abbreviate(names, 40)}')
-        found += fitting
-    return list(dict.fromkeys(found if wanted else names))
-
-
 #: Largest file, bytes, packed or not, and longest line, letters.
 LARGEST, LONGEST = 4_000_000_000, 1 << 17
 #: Most lines of a file that is kept as text while it is read: six hours at 100 Hz.
@@ -291,12 +197,6 @@ UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
 EMPTY = ',;\t \r\n'
 #: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
 END, PREAMBLE = 'endheader', 100
-#: What a row of units has in its cells, beside numbers that would make it one of samples.
-UNIT = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
-#: A number with a decimal comma.
-COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
-
-
 class _Lines(io.TextIOWrapper):
     """Text whose lines have a largest length: what has none is no table, and fills the memory.
 
@@ -405,16 +305,3 @@ def preamble(first: str, text: Iterator[str]
     rows = values.get('nrows', values.get('datarows', ''))
     return (next(text, ''), len(lines), units.get(values.get('indegrees', '')),
             int(rows) if rows.isdecimal() and len(rows) < 12 else None)
-
-
-def units_of(cells: Sequence[str]) -> list[str] | None:
-    """Return the units that a row has, '' where a column has none; None if it is no such row."""
-    found = [UNIT.fullmatch(cell.strip()) for cell in cells]
-    units = ['' if match is None or match[1] == '-' else match[1] for match in found]
-    return units if all(found) and any(units) and 'nan' not in map(str.lower, units) else None
-
-
-def decimal_commas(line: str, delimiter: str) -> bool:
-    """Tell whether the numbers of a line have decimal commas, and no decimal points."""
-    return (delimiter != ',' and '.' not in line
-            and any(COMMA.fullmatch(cell) for cell in line.strip().split(delimiter)))

@@ -14,10 +14,9 @@
 
 """Long recordings on a coarser even grid, smoothed as they are read, so that they fit in memory.
 
-Around each point of the grid a parabola is fitted to the samples of three of its steps: that
-passes what a stride is made of and averages what is faster (Savitzky & Golay 1964), whatever the
-stamps' jitter. Grids are multiples of a step since the epoch, so that topics recorded side by
-side come to lie on the same stamps.
+A point of the grid has the mean of the samples nearest to it, corrected for their slope, as they
+are not centred on it. Grids are multiples of a step since the epoch, so that topics recorded side
+by side come to lie on the same stamps.
 """
 
 from array import array
@@ -100,8 +99,8 @@ STEPS, SHARE = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
 A_PERIOD, SLOWEST = 40.0, 0.2
 #: Samples of a part of which a spectrum is made.
 PART = 1 << 14
-#: A parabola takes so many samples, about the point: their mean is no farther off (steps).
-SAMPLES, ABOUT = 5, 0.75
+#: Samples whose mean time is farther off their point have the mean at that time (steps).
+ABOUT = 0.3
 #: A sample is no motion that is off both neighbours by this many standard deviations, and times
 #: as much as they differ.
 SPIKE = 3.0
@@ -122,7 +121,7 @@ class Thinned:
         self._coming: list[tuple[np.ndarray, np.ndarray]] = []
         self._size, self._next = 0, LONG
         # Of the grid so far. Arrays that grow in place: pieces to be joined would take twice that.
-        self._stamps, self._values, self._columns = array('q'), array('d'), 0
+        self._stamps, self._values = array('q'), array('d')
 
     def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
         """Take samples.
@@ -137,44 +136,40 @@ class Thinned:
         self._size += len(stamps)
         if self._size < self._next:
             return
-        whole = _joined(self._coming)
+        stamps, values = self._joined()
         if not self.step:
-            self.step, self.rate = _step_for(*whole)
+            self.step, self.rate = _step_for(stamps, values)
             # Where there is none now, there may be one later: joints may stand first.
             self._next = LONG if self.step else 2 * self._next
+        last = 0
         if self.step:
-            self._thin(*whole)
-        else:
-            self._coming = [whole]
-
-    def _thin(self, stamps: np.ndarray, values: np.ndarray) -> None:
-        """Thin all but what belongs to the last point of the grid."""
-        place = _places(stamps, self.step)
-        others = np.flatnonzero(place != place[-1])
-        last = int(others[-1]) + 1 if others.size else 0
-        self._keep(stamps[:last], values[:last])
+            # All but what belongs to the last point of the grid.
+            points = _points(stamps, self.step)
+            last = int(np.flatnonzero(np.append(True, points != points[-1]))[-1])
+            self._keep(stamps[:last], values[:last])
         self._coming = [(stamps[last:].copy(), values[last:].copy())]
         self._size = len(stamps) - last
+
+    def _joined(self) -> tuple[np.ndarray, np.ndarray]:
+        stamps, values = zip(*self._coming, strict=True)
+        return np.concatenate(stamps), np.concatenate(values)
 
     def _keep(self, stamps: np.ndarray, values: np.ndarray) -> None:
         """Put samples on the grid."""
         stamps, values = smoothed(stamps, values, self.step)
-        self._columns = values.shape[1]
         self._stamps.frombytes(stamps.tobytes())
         self._values.frombytes(values.tobytes())
 
     def taken(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stamps and values, the caller's own, and forget them."""
-        rest = _joined(self._coming)
-        if self.step:
-            self._keep(*rest)
-            rest = (np.frombuffer(self._stamps, np.int64),
-                    np.frombuffer(self._values).reshape(-1, self._columns))
-            self._stamps, self._values = array('q'), array('d')
-        elif len(self._coming) == 1:
-            rest = rest[0].copy(), rest[1].copy()
+        stamps, values = self._joined()
         self._coming = []
-        return rest
+        if self.step:
+            self._keep(stamps, values)
+            stamps, columns = np.frombuffer(self._stamps, np.int64), values.shape[1]
+            values = np.frombuffer(self._values).reshape(-1, columns)
+            self._stamps, self._values = array('q'), array('d')
+        return stamps, values
 
     @property
     def note(self) -> str:
@@ -184,14 +179,7 @@ class Thinned:
             'the recording is long')
 
 
-def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
-    if len(parts) == 1:
-        return parts[0]
-    return (np.concatenate([stamps for stamps, _ in parts]),
-            np.concatenate([values for _, values in parts]))
-
-
-def _places(stamps: np.ndarray, step: int) -> np.ndarray:
+def _points(stamps: np.ndarray, step: int) -> np.ndarray:
     """Return the number of the grid point nearest to each stamp."""
     return (stamps + step // 2) // step
 
@@ -228,7 +216,7 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
              ) -> tuple[np.ndarray, np.ndarray]:
     """Put samples on the grid.
 
-    Where a point has too few samples around it, their mean stands, at its own stamp.
+    Where samples lie on one side of a point, their mean stands, at its own stamp.
 
     Args:
         stamps: ns, int64, shape (n,).
@@ -241,67 +229,26 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
     """
     if not len(stamps):
         return stamps, values
-    if (np.diff(stamps) < 0).any():
-        order = np.argsort(stamps, kind='stable')
-        stamps, values = stamps[order], values[order]
-    values = _without_odd(values)
-    places = _places(stamps, step)
-    points, first = np.unique(places, return_index=True)
-    own = (stamps - places * step) / step
+    order = np.argsort(stamps, kind='stable')
+    stamps, values = stamps[order], _without_odd(values[order])
+    numbers = _points(stamps, step)
+    points, first = np.unique(numbers, return_index=True)
     there = np.isfinite(values)
-    if there.all():
-        level, good = _parabolas(own, values, first, points)
-    else:
-        level, good = np.full((len(points), values.shape[1]), np.nan), np.zeros(len(points), bool)
-        for column, mask in enumerate(there.T):
-            if mask.any():
-                some, begin = np.unique(places[mask], return_index=True)
-                at = np.searchsorted(points, some)
-                found, sound = _parabolas(own[mask], values[mask, column:column + 1], begin, some)
-                level[at, column] = found[:, 0]
-                good[at] |= sound
-    centre = np.add.reduceat(own, first) / np.diff(first, append=len(own))
-    return points * step + np.where(good, 0.0, np.rint(centre * step)).astype(np.int64), level
-
-
-def _parabolas(own: np.ndarray, values: np.ndarray, first: np.ndarray, points: np.ndarray
-               ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit a parabola about every point to its samples and those of both neighbours.
-
-    Args:
-        own: places of the samples about their points, in steps, shape (n,).
-        values: shape (n, columns).
-        first: where the samples of each point begin, shape (m,).
-        points: their numbers, shape (m,).
-
-    Returns:
-        Levels (m, columns), and whether they are those of parabolas, not mere means, (m,).
-
-    """
-    sums = np.array([np.add.reduceat(own**p, first) for p in range(5)])
-    products = np.array([np.add.reduceat(values * (own**p)[:, None], first) for p in range(3)])
-    mean = products[0] / sums[0][:, None]
-    beside = np.diff(points) == 1
-    whole, right = sums.copy(), products.copy()
-    for side in (-1.0, 1.0):
-        # About the point, the neighbours' samples are a step further.
-        into, of = (slice(1, None), slice(None, -1)) if side < 0.0 else (slice(None, -1),
-                                                                         slice(1, None))
-        for p in range(5):
-            moved = sum(_BINOMIAL[p][j] * side**(p - j) * sums[j, of] for j in range(p + 1))
-            whole[p, into] += np.where(beside, moved, 0.0)
-            if p < 3:
-                also = sum(_BINOMIAL[p][j] * side**(p - j) * products[j, of]
-                           for j in range(p + 1))
-                right[p, into] += np.where(beside[:, None], also, 0.0)
-    a, b, c, d, e = whole
-    # Cramer's rule for the level of the parabola.
-    cofactors = c * e - d * d, c * d - b * e, b * d - c * c
-    determinant = a * cofactors[0] + b * cofactors[1] + c * cofactors[2]
-    good = (a >= SAMPLES) & (np.abs(b) <= ABOUT * a) & (determinant > 1e-9 * a**3)
-    level = sum(cofactors[p][:, None] * right[p] for p in range(3)) / np.where(
-        good, determinant, 1.0)[:, None]
-    return np.where(good[:, None], level, mean), good
-
-
-_BINOMIAL = ((1,), (1, 1), (1, 2, 1), (1, 3, 3, 1), (1, 4, 6, 4, 1))
+    count = np.add.reduceat(there, first, dtype=float)
+    own = ((stamps - numbers * step) / step)[:, None]
+    with np.errstate(invalid='ignore'):
+        # Where nothing is there, 0 / 0 is nan.
+        mean = np.add.reduceat(np.where(there, values, 0.0), first) / count
+        off = np.add.reduceat(there * own, first) / count
+    rise = np.diff(mean, axis=0) / (1.0 + np.diff(off, axis=0))
+    beside = np.isfinite(rise) & (np.diff(points) == 1)[:, None]
+    rise = np.where(beside, rise, 0.0)
+    before, after = (np.pad(rise, one) for one in (((1, 0), (0, 0)), ((0, 1), (0, 0))))
+    sides = np.pad(beside, ((1, 0), (0, 0))) + np.pad(beside, ((0, 1), (0, 0))).astype(int)
+    slope = (before + after) / np.maximum(sides, 1)
+    # Samples all over a step have a mean that is off by 1 / 24 of the second difference.
+    mean -= np.where(sides == 2, (after - before) / 24.0, 0.0)
+    centre = off[np.arange(len(points)), np.argmax(count, axis=1)]
+    centre[np.abs(centre) <= ABOUT] = 0.0
+    return (points * step + np.rint(centre * step).astype(np.int64),
+            mean - slope * (off - centre[:, None]))

@@ -94,7 +94,7 @@ def test_a_cut_file_is_read_to_its_last_whole_frame(tmp_path):
     (text(np.zeros((0, 12))), 'no frames'),
     (text(np.zeros((5, 12))), 'no joint moves in 5 frames'),
     (text().replace('RightUpLeg', 'LeftUpLeg'), "joint 'LeftUpLeg_z' is named twice"),
-    (text() + '1 2 3\n4 5\n', 'line 73: 3 columns, where there should be 12'),
+    (text() + '1 2 3\n4 5\n', 'line 73: 3 columns, where the header has 12'),
 ])
 def test_what_is_wrong_is_said(tmp_path, content, words):
     with pytest.raises(RecordingError, match=words):

@@ -15,11 +15,15 @@
 """Tables of pose estimation: DeepLabCut, SLEAP, Anipose, against numbers printed into them."""
 
 import gzip
+import os
+import pickle
 
 import cpg_ros
+from cpg_ros.common import errors
 from cpg_ros.fitting.recordings.formats import format_of
 from cpg_ros.fitting.recordings.pose_reader import pose_markers
 from cpg_ros.fitting.recordings.recording import RecordingError
+import h5py
 import numpy as np
 import pytest
 from skeletons import deeplabcut
@@ -94,7 +98,7 @@ def test_sleap(tmp_path):
     with pytest.raises(RecordingError, match="there are 'one', 'two': name one"):
         pose_markers(path, 20)
     path.write_text(SLEAP.replace('two', '').replace('one', ''))
-    with pytest.raises(RecordingError, match='line 3: frame 0 is there twice: animals without'):
+    with pytest.raises(RecordingError, match='frame 0 is there twice: animals without'):
         pose_markers(path, 20)
 
 
@@ -124,9 +128,9 @@ GOOD = deeplabcut(POINTS, LIKELY, NAMES)
     (GOOD.replace('Ankle', 'Knee'), "two columns 'x' of marker 'Knee'"),
     (GOOD.replace(',y,', ',v,').replace(',y\n', ',v\n'), "no marker has columns 'x', 'y'"),
     (GOOD.partition('\n0,')[0], 'no rows'),
-    (GOOD.replace('\n3,', '\n3,up,'), r'line 7: 17 columns, where there should be 16'),
+    (GOOD.replace('\n3,', '\n3,up,'), r'line 7: 17 columns, where the header has 16'),
     (GOOD.replace('\n3,', '\n1e300,'), 'frames without a plausible number'),
-    (GOOD.replace('\n3,', '\nthree,'), "line 7: 'three' is not a number"),
+    (GOOD.replace('\n3,', '\nthree,'), "line 7, column 'frame': 'three' is not a number"),
 ])
 def test_what_is_wrong_is_said(tmp_path, text, words):
     with pytest.raises(RecordingError, match=words):
@@ -142,8 +146,80 @@ def test_the_rate_is_told_and_never_guessed(tmp_path, fps, words):
         pose_markers(written(tmp_path, GOOD), fps)
 
 
-def test_binary_files_are_to_be_exported(tmp_path):
+def pandas_table(path, columns, rows):
+    """Write a table as pandas does in HDF5: a record for each row, names of columns pickled."""
+    kind = np.dtype([('index', '<i8'), ('values_block_0', '<f8', (rows.shape[1],))])
+    table = np.empty(len(rows), kind)
+    table['index'], table['values_block_0'] = 3 + np.arange(len(rows)), rows
+    with h5py.File(path, 'w') as file:
+        one = file.create_dataset('df_with_missing/table', data=table)
+        one.attrs['values_block_0_kind'] = np.bytes_(pickle.dumps(columns, protocol=0))
+    return path
+
+
+@pytest.mark.parametrize('animals', [('',), ('a', 'b')], ids=['one', 'two'])
+def test_deeplabcut_in_hdf5(tmp_path, animals):
+    columns = [('net', *[animal] * bool(animal), name, axis) for animal in animals
+               for name in NAMES for axis in ('x', 'y', 'likelihood')]
+    own = np.concatenate([POINTS, LIKELY[:, :, None]], axis=2).reshape(20, -1)
+    path = pandas_table(tmp_path / 'pose.h5', columns,
+                        np.concatenate([own + 9.0 * k for k in range(len(animals))], axis=1))
+    assert format_of(path).name == 'pose'
+    found = pose_markers(path, 250, animals[-1] or None)
+    assert found.names == NAMES
+    assert found.stamps == pytest.approx(1e9 * (3 + np.arange(20)) / 250.0)
+    shift = 9.0 * (len(animals) - 1)
+    np.testing.assert_array_equal(found.points, (POINTS + shift) * [1.0, -1.0])
+    np.testing.assert_array_equal(found.likelihoods, LIKELY + shift)
+    if len(animals) > 1:
+        with pytest.raises(RecordingError, match="there are 'a', 'b': name one"):
+            pose_markers(path, 250)
+
+
+def test_sleap_in_hdf5(tmp_path):
+    path = tmp_path / 'analysis.h5'
+    tracks = RNG.uniform(0.0, 500.0, (2, 2, 5, 20))
+    with h5py.File(path, 'w') as file:
+        file['tracks'], file['point_scores'] = tracks, tracks[:, 0] / 500.0
+        file['node_names'] = [name.encode() for name in NAMES]
+        file['track_names'] = [b'one', b'two']
+    found = pose_markers(path, 20, 'two')
+    assert found.names == NAMES
+    np.testing.assert_array_equal(found.points, tracks[1].T * [1.0, -1.0])
+    np.testing.assert_array_equal(found.likelihoods, tracks[1, 0].T / 500.0)
+    with pytest.raises(RecordingError, match="there are 'one', 'two': name one"):
+        pose_markers(path, 20)
+
+
+class Harmful:
+    """Runs a command where it is unpickled."""
+
+    def __reduce__(self):
+        return os.system, ('false',)
+
+
+@pytest.mark.parametrize(('content', 'words'), [
+    (b'\x89HDF\r\n', r'no HDF5 file of poses that can be read: .*'),
+    ({'other': 1}, "neither poses of DeepLabCut nor an analysis of SLEAP: it has 'other'"),
+    ([Harmful()], 'system among the names of columns'),
+], ids=['damaged', 'other', 'harmful'])
+def test_hdf5_files_of_other_kinds_end_in_one_line(tmp_path, content, words):
     path = tmp_path / 'pose.h5'
-    path.write_bytes(b'\x89HDF\r\n')
-    with pytest.raises(RecordingError, match=r'\.h5 files are not read: export the poses as CSV'):
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif isinstance(content, list):
+        pandas_table(path, content, np.zeros((3, 1)))
+    else:
+        with h5py.File(path, 'w') as file:
+            file.update(content)
+    with pytest.raises(RecordingError, match=words) as raised:
         pose_markers(path, 25)
+    assert str(raised.value).startswith(f'{path}: ') and '\n' not in str(raised.value)
+
+
+def test_a_project_of_sleap_and_a_missing_library_are_said(tmp_path, monkeypatch):
+    with pytest.raises(RecordingError, match='export its analysis as HDF5 or CSV'):
+        pose_markers(tmp_path / 'pose.slp', 25)
+    monkeypatch.setattr(errors, 'find_spec', lambda name: None)
+    with pytest.raises(errors.MissingLibraryError, match=r'needs h5py, .*/pip install h5py'):
+        pose_markers(tmp_path / 'pose.h5', 25)

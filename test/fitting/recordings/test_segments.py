@@ -38,7 +38,7 @@ def test_a_file_of_ones_own(tmp_path):
     path.write_text(GOOD + 'least_likelihood: 0.9\n')
     found = load_segments(path)
     assert found.segments['b'].begin == ('y', 'z') and found.segments['b'].end == ('w',)
-    assert found.likely == 0.9 and found.joints['knee'].neutral == 0.0
+    assert found.least_likelihood == 0.9 and found.joints['knee'].neutral == 0.0
 
 
 @pytest.mark.parametrize(('text', 'words'), [

@@ -52,12 +52,13 @@ def test_a_cut_file_is_read_to_its_last_whole_row(tmp_path):
 @pytest.mark.parametrize(('change', 'words'), [
     (lambda text: '', "no TRC file: it does not begin with 'PathFileType'"),
     (lambda text: text[:200], 'no rows'),
-    (lambda text: text.replace('RTOE', ''), 'columns, where there should be 35'),
+    (lambda text: text.replace('RTOE', ''), 'columns, where the header has 35'),
     (lambda text: text.replace('Frame#', 'Frames'), "line 4: the columns have to be 'Frame#'"),
-    (lambda text: text.replace('\t0.050000', '\t?'), r"line 12: '\?' is not a number"),
+    (lambda text: text.replace('\t0.050000', '\t?'),
+     r"line 12, column 'Time': '\?' is not a number"),
     (lambda text: text.replace('\t0.050000', '\tnan'), '1 row without a time in s, such as f'),
     (lambda text: text.replace('\t0.050000', '\t1e30'), '1 row without a time in s'),
-    (lambda text: text.replace('\n6\t', '\n6\t7\t'), 'line 12: 39 columns, where there should be'),
+    (lambda text: text.replace('\n6\t', '\n6\t7\t'), 'line 12: 39 columns, where the header has'),
     (lambda text: text.partition('\n1\t')[0], 'no rows'),
 ])
 def test_what_is_wrong_is_said(tmp_path, change, words):
