@@ -311,7 +311,7 @@ class Pattern:
         self._struct.go = math.copysign(max(ramp, SHORTEST), 1.0 if enabled else -1.0)
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
-        """Request the legs' strides, shape (legs,), and the pace; see Drive.
+        """Request the legs' strides, shape (legs,), and the pace; see StrideCommand.
 
         Raises:
             ValueError: the pattern was made without a drive.

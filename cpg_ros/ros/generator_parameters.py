@@ -42,8 +42,8 @@ NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_onl
                                   'append a number of legs, as in delayed6, for a variant; '
                                   "without one, the robot file's number of legs is used where the "
                                   'file asks for that variant'))
-KERNEL = Spec('auto', 'what steps the network: code compiled by numba, or the exported C (c), for '
-              'which a C compiler is needed; auto takes numba where it is installed',
+KERNEL = Spec('auto', 'what solves for gaits: code compiled by numba, or C (c); auto takes numba '
+              'where it is installed; what moves the joints is C in any case',
               read_only=True, constraints=one_of(KERNELS))
 
 

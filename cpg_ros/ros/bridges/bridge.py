@@ -199,7 +199,7 @@ class BridgeNode(StartedNode):
         self.create_service(Trigger, '~/start', self._start_again)
         self._before = 0, 0, 0
         self._health = HealthPublisher(self, 'robot', self.robot.name, self._report_health)
-        self._timer = self.create_timer(CHECK, self._check_network, clock=STEADY)
+        self._timer = self.create_timer(CHECK, self._check_graph, clock=STEADY)
         self._warn_of_unknown()
 
     def _common_settings(self) -> dict[str, float]:
@@ -266,7 +266,7 @@ class BridgeNode(StartedNode):
 
         """
 
-    def network_hazard(self) -> str:
+    def graph_hazard(self) -> str:
         """Return what on the network endangers the robot, and what to do, or ''."""
         return ''
 
@@ -448,9 +448,9 @@ class BridgeNode(StartedNode):
         response.success, response.message = True, 'starting: ~/state and the log say how it goes'
         return response
 
-    def _check_network(self) -> None:
+    def _check_graph(self) -> None:
         """Look for others who command the robot, and for what endangers it."""
-        if (hazard := self.network_hazard()) and not self._hazard:
+        if (hazard := self.graph_hazard()) and not self._hazard:
             self._hazard = hazard
             self.get_logger().error(hazard)
         before, (self._conflict, _) = self._conflict, self._find_conflict()

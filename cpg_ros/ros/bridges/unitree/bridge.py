@@ -357,7 +357,7 @@ class UnitreeBridge(BridgeNode):
         pressed = self._state.buttons & self._button
         return 'the button of the wireless remote' if pressed else ''
 
-    def network_hazard(self) -> str:
+    def graph_hazard(self) -> str:
         """Return a participant that crashes the robot's software, or ''."""
         hazard = self._announcements.check()
         return hazard and (f'{hazard} is on this network: it crashes the 0.10 in '
