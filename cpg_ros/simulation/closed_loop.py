@@ -61,7 +61,7 @@ class _Gaits(NamedTuple):
 
 
 class _Drives(NamedTuple):
-    """Strides of the legs and pace, as of motion.strides.StrideCommand, and what else changes a run."""
+    """A StrideCommand (motion.strides), and what else changes a run."""
 
     target: np.ndarray
     now: np.ndarray
