@@ -34,21 +34,25 @@ import numpy as np
 
 __all__ = ['HOLD', 'SUBSTEP', 'GaitRunner', 'Pattern']
 
-#: Strides the network gets to find its new gait by itself after a transition of 0 s.
+#: SETTLING: strides in which the network has to find its new gait after a transition of 0 s.
 SETTLING = 40.0
-#: Such a transition starts with at least this fraction of the new gait in the state.
+#: KICK: least amplitude of the new gait in the state when such a transition starts, as a share of
+#: the full gait's.
 KICK = 0.05
 
 
 class Machine(NamedTuple):
-    """Addresses by which machine code advances a pattern.
+    """Addresses by which compiled code advances a pattern.
 
     Attributes:
-        advance, resume, plan, follow: functions of ``what`` and of a time in s, a double; advance
-            does plan and follow, between which angles may be corrected.
-        what: argument of all.
-        asked: a 32-bit integer that is not 0 where the next tick needs Python.
-        position, velocity, phases, state: pointers to what Pattern has by these names.
+        advance: function that computes a tick: plan, then follow.
+        resume: function that resumes after a stall.
+        plan: function that computes the wanted angles, which may then be corrected.
+        follow: function that moves the joints to the wanted angles within their limits.
+        what: address of the core's struct, first argument of all functions; the second argument
+            is a time in s, a double.
+        asked: address of a 32-bit integer that is not 0 if the next tick needs Python.
+        position, velocity, phases, state: addresses of the pointers to Pattern's arrays.
 
     """
 
@@ -65,7 +69,7 @@ class Machine(NamedTuple):
 
 
 def _shared(name: str) -> Any:
-    """Return a property that is a number of the struct of the core."""
+    """Return a property that reads and writes a number of the core's struct."""
     def read(self: Any) -> Any:
         return getattr(self._struct, name)
 
@@ -80,9 +84,9 @@ class GaitRunner:
     Attributes:
         legs: phase of each leg, cycles.
         phase: of the first leg by the clock, cycles.
-        progress: how much of its transition is over.
+        progress: share of its transition that is over, 0 to 1.
         settling: strides that are left to find the gait.
-        address: of the struct of the core.
+        address: of its struct in the core.
 
     """
 
@@ -90,7 +94,7 @@ class GaitRunner:
 
     def __init__(self, plan: GaitPlan, transition: float,
                  drive: StrideCommand | None = None) -> None:
-        """Run a plan, its strides as long as a drive has them, if there is one."""
+        """Run a plan; a drive, if given, scales its strides."""
         self._core, self._track = core(), CTrack(plan.core)
         self._struct, self.address = self._track.struct, self._track.address
         self._struct.transition = transition
@@ -108,7 +112,7 @@ class GaitRunner:
 
     @property
     def drive(self) -> StrideCommand | None:
-        """What makes the strides as long as they are, None for the gait's own."""
+        """The source of the stride lengths, None for the gait's own."""
         return self._drive
 
     @drive.setter
@@ -141,8 +145,8 @@ class GaitRunner:
     def drift_to(self, plan: GaitPlan) -> None:
         """Take a plan's parameters and leave the change to the network's own dynamics.
 
-        A gait in whose class the state has nothing, as between any two gaits on their exact
-        orbits, gets a small start; the lock would otherwise hold the network at rest.
+        If the state has no component in the new gait's symmetry class, as on the exact orbit of
+        another gait, a small one is added; the lock would otherwise hold the network at rest.
         """
         orbit, stepper = plan.orbit, self.stepper
         stepper.set(orbit.network, plan.gain, orbit.symmetry)
@@ -152,7 +156,7 @@ class GaitRunner:
         if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
             stepper.superpose(lambda times: KICK * (orbit(at + times) - mean),
                               lambda times: KICK * orbit.derivative(at + times))
-        # On to the node where the change is, so that all of it shows at once.
+        # Advance to the node at which the change was made, so that all of it shows at once.
         stepper.advance(stepper.ahead)
         self._start_on(plan)
         self.stepper = stepper
@@ -162,10 +166,10 @@ class GaitRunner:
         self.settling = SETTLING
 
 
-#: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
+#: SUBSTEP: longest step of cross-fades and ramps, s, whatever the tick.
 SUBSTEP = 1e-3
-#: No ramp or cross-fade is shorter (s): the clock is slowed from substep to substep, and a joint
-#: that has to get up to speed within one would outrun its limit before that.
+#: SHORTEST: least duration of a ramp or cross-fade, s. The clock adapts from substep to substep: a
+#: joint that accelerated within a single one would exceed its speed limit before the clock slows.
 SHORTEST = 0.05
 
 
@@ -189,7 +193,7 @@ class Pattern:
 
     def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,
                  drive: StrideCommand | None = None) -> None:
-        """Stand, then go into the gait within ``ramp`` s if enabled; a drive steers it."""
+        """Begin in the stand and, if enabled, ramp into the gait in ``ramp`` s."""
         robot = plan.robot
         self.robot = robot
         self.correct: Callable[[np.ndarray], np.ndarray] | None = None
@@ -199,16 +203,16 @@ class Pattern:
         self._ramp, self._lead = self._struct.ramp, self._struct.lead
         self._offset = robot.column('offset')
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
-        #: The plan to which the network is left to find by itself, and whether there is one.
+        #: The plan whose gait the network is to find by itself, if requested; _asked is then 1.
         self._drift: deque[GaitPlan] = deque(maxlen=1)
         self._asked = ctypes.c_int32()
-        #: By the addresses of their structs.
+        #: Runners by the addresses of their structs.
         self._runners: dict[int, GaitRunner] = {}
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate, self._goal, self._found, self._correction = rows = np.zeros(
             (5, self._offset.size))
         self._behind = np.zeros(self._offset.size, dtype=bool)
-        # Of the core alone: the last rates, and the jump that it absorbs.
+        # Arrays that only the core uses: last rates; the jump that it absorbs, and its rate.
         own = np.zeros((3, self._offset.size))
         leg = robot.leg_of_joint.astype(np.int16)
         self._kept = own, leg
@@ -225,7 +229,7 @@ class Pattern:
         self.restart(ramp, enabled)
 
     def _run(self, tracks: list[GaitRunner]) -> None:
-        """Let the core run these, the newest one last."""
+        """Let the core run these runners, the newest one last."""
         for k, track in enumerate(tracks):
             self._keep(track)
             self._struct.track[k] = track.address
@@ -234,7 +238,7 @@ class Pattern:
 
     @property
     def _tracks(self) -> list[GaitRunner]:
-        """What the core runs, the newest one last."""
+        """The runners in the core, the newest one last."""
         struct = self._struct
         # From the last one on: the core moves them forward as the first one ends.
         found = [struct.track[k] for k in reversed(range(struct.tracks))]
@@ -268,11 +272,11 @@ class Pattern:
         self.start_from(self.position, ramp)
 
     def _go(self, ramp: Any, end: float, time: float) -> None:
-        """Lead a ramp to its end in s, from its present level and rate, without overshoot."""
+        """Lead a ramp to its end within a time in s, from its present level and rate."""
         self._core.cpg_ramp_to(ctypes.addressof(ramp), end, time)
 
     def _absorb(self) -> None:
-        """Let the difference decay by which the next wanted positions jump."""
+        """Let the core smooth the jump of the next wanted positions: it decays over time."""
         self._struct.absorbed, self._struct.jumped = 0.0, 0
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
@@ -280,7 +284,7 @@ class Pattern:
 
         To be called before the first advance. No joint takes more than half of its speed limit.
         """
-        # Where the joints were found, from the stand, and what is left of that.
+        # The joints' offsets from the stand, and the ramp that leads these to 0.
         self._found[:] = angles - self._offset
         self._lead.level, self._lead.rate, self._lead.parts = 1.0, 0.0, 0
         self.position[:] = np.clip(angles, *self._limits[:2])
@@ -292,9 +296,9 @@ class Pattern:
     def apply(self, plan: GaitPlan, transition: float) -> None:
         """Change to a plan over a transition in s; 0 leaves it to the network's dynamics.
 
-        Of plans that wait, for a tick or for the end of other changes, only the last one matters.
+        A plan that still waits, for a tick or for the end of other changes, is replaced.
         """
-        # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
+        # Seeding an orbit takes long: do it in the caller's thread, not in that of the ticks.
         prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
         self._keep(prepared)
         if transition > 0.0:
@@ -329,7 +333,7 @@ class Pattern:
 
     @property
     def drive(self) -> StrideCommand | None:
-        """What steers, None for nothing."""
+        """The stride command that steers, None for none."""
         return self._drive
 
     @drive.setter
@@ -348,7 +352,7 @@ class Pattern:
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
-        """The plan that fades out, the newest in force, and the fraction of that."""
+        """The plan that fades out, the newest plan in force, and the share of the newest."""
         older, newest = (tracks := self._tracks)[-2:][0], tracks[-1]
         if older is newest:
             return newest.plan, newest.plan, 0.0
@@ -361,7 +365,7 @@ class Pattern:
 
     @property
     def state(self) -> np.ndarray:
-        """The newest network's state and its rate, shape (2, components), of advance's own."""
+        """The newest network's state and rate, shape (2, components); overwritten by advance."""
         return self._newest.stepper.now[:2]
 
     @property
@@ -386,7 +390,7 @@ class Pattern:
 
     @property
     def machine(self) -> Machine | None:
-        """How machine code advances it, None where a tick needs Python."""
+        """Addresses by which compiled code advances the pattern, None if a tick needs Python."""
         if self._drift or self.correct or type(self).advance is not Pattern.advance:
             return None
         addresses: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (

@@ -275,14 +275,14 @@ class NetworkDefinition(ABC):
 
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what the network states for another number of legs: attribute -> value.
+        """Return the class attributes of this network for another number of legs: name -> value.
 
-        A network for any even number gives its cells, legs, sides and girdles by a rule, and
-        all that depends on them; ``equations`` then state inputs by rules, too. ``fields`` names
-        the parameters that each leg has.
+        A network that takes any even number derives cells, legs, sides, girdles and all that
+        depends on them by a rule; its ``equations`` state the inputs by rules, too. The key
+        ``fields``, if there is one, names the parameters of the legs, instead of this network's.
 
         Raises:
-            ValueError: it takes no such number.
+            InputError: the network does not take this number of legs.
 
         """
         raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')

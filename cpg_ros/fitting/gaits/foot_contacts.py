@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stance and swing from the loads on the feet, and what they say of walk and run.
+"""Stance and swing from the loads on the feet; walk and run told apart by the flight.
 
 A stride is from touchdown to touchdown; duty is the share of it in stance. In a walk a foot is on
 the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
@@ -27,20 +27,22 @@ from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError
 from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike
 import numpy as np
 
-#: A foot is on the ground where its load is more than this share of the way from its least to its
-#: largest load. If the least is more than this share of the largest, it is never lifted.
+#: LOADED: a foot is on the ground above this share of the span from its least to its largest load.
+#: ALWAYS: a foot is never lifted if its least load exceeds this share of its largest.
 LOADED, ALWAYS = 0.15, 0.5
-#: What counts as least and largest, percentiles.
+#: LEAST, LARGEST: percentiles of a foot's loads that count as its least and largest.
 LEAST, LARGEST = 5.0, 95.0
-#: Contacts and lifts shorter than this share of a stride are those of a foot that bounces.
+#: BOUNCE: share of a stride below which a contact or a lift is a bounce and is ignored.
 BOUNCE = 0.08
-#: Touchdowns are at one phase if there are so many strides, and if single strides differ from most
-#: of them in no more than this share of the cycle; points of a cycle, and which samples are near.
+#: STRIDES: fewest strides from which the phase of touchdown is read.
+#: DISAGREE: largest mean share of strides that contradict the majority about stance or swing.
+#: POINTS: number of phases of the cycle at which stance is averaged over the strides.
+#: NEAR: width, in cycles, of the window that averages samples of similar phase.
 STRIDES, DISAGREE, POINTS, NEAR = 3.0, 0.15, 200, 0.02
-#: Fewest samples of a stride that tell stance from swing.
+#: FEWEST: smallest number of samples of a stride that tells stance from swing.
 FEWEST = 12
-#: Flight, as a share of the time, up to which legs walk, and from which on they run: a foot that
-#: is about to be lifted bears little.
+#: WALK: share of the time in flight up to which a gait is a walk; RUN: share from which it is a
+#: run. WALK is above 0, as a foot that is about to be lifted bears little and may count as lifted.
 WALK, RUN = 0.1, 0.15
 
 
@@ -93,7 +95,7 @@ class FootContacts(ShortRepr):
             legs: names, in the order of the network.
 
         Returns:
-            None for too few strides, and where a leg does not stand at one part of them.
+            None for too few strides, or if the strides do not agree on when a leg stands.
 
         """
         cycles = phase(self.times)
@@ -125,9 +127,9 @@ class FootContacts(ShortRepr):
 
 
 def _touchdown(stands: np.ndarray) -> float | None:
-    """Return where the longest stance begins, cycles, given the share of strides that stand.
+    """Return where the longest stance begins, cycles, or None if the strides disagree too much.
 
-    None where it is not clear when the leg stands: at most points strides have to agree.
+    Stands is the share of strides in which the leg stands at each phase, shape (POINTS,).
     """
     most = stands > 0.5
     if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
@@ -136,7 +138,7 @@ def _touchdown(stands: np.ndarray) -> float | None:
     ends = np.flatnonzero(~most & np.roll(most, 1))
     long = (ends[np.searchsorted(ends, begins) % len(ends)] - begins) % len(most)
     k = int(begins[np.argmax(long)])
-    # Where the share passes a half.
+    # The touchdown is where the share crosses one half, by linear interpolation.
     before, after = stands[k - 1], stands[k]
     return float((k - (after - 0.5) / (after - before)) / len(most))
 
@@ -187,7 +189,7 @@ def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] 
 
 
 def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:
-    """Yield from where to where something is there for a short time, within the rest."""
+    """Yield begin and end indices of inner runs of True that last less than shortest, s."""
     edges = np.flatnonzero(np.diff(there)) + 1
     for first, last in pairwise(edges.tolist()):
         if there[first] and times[last] - times[first] < shortest:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Checks of what was found in a recording, and how much confidence they leave."""
+"""Plausibility checks of a recording's stride, legs and travel, and the confidence they leave."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,39 +25,41 @@ from cpg_ros.fitting.gaits.mean_cycle import average_cycles, PhaseAverage
 from cpg_ros.fitting.gaits.phase_estimation import PhaseEstimate
 import numpy as np
 
-#: Below so many cycles errors are rough.
+#: SURE: number of cycles below which the errors are rough.
 SURE = 3.0
-#: A change of frequency over the stretch that is worth a note.
+#: DRIFT: change of the frequency over the stretch, as a share of it, from which on a note is made.
 DRIFT = 0.04
-#: Fewer samples a stride may be those of a gait several times as fast.
+#: SAMPLES: samples per stride below which the true gait may be several times as fast (aliasing).
 SAMPLES = 20.0
-#: A mean cycle is several strides if all but this share of its power is at multiples of their
-#: rate.
+#: ALIKE: a mean cycle is n strides if less than this share of its power is off the multiples of n.
 ALIKE = 0.1
-#: Strides slower than this (Hz) are of no leg; with their times in another unit they may lie
-#: between the others.
+#: SLOW: stride frequency, Hz, below which no leg steps; USUAL: range of frequencies, Hz, in which
+#: the same times in another unit must lie for that unit to be suggested.
 SLOW, USUAL = 0.05, (0.2, 12.5)
+#: UNITS: unit of time -> how many of it are a second.
 UNITS = {'ms': 1e3, 'us': 1e6, 'ns': 1e9}
-#: No joint of a leg swings by more (rad).
+#: SWING: largest plausible range of a leg's joint, rad.
 SWING = 2.0 * np.pi
-#: Legs whose phases differ by more between the parts of a stretch (cycles) change gait.
+#: CHANGE: change of a leg's phase between parts of a stretch, cycles, above which the gait
+#: changes.
 CHANGE = 0.1
-#: These parts of a stretch are compared, of so many strides at least, and of so many samples of
-#: each joint.
+#: PARTS: names of the parts of a stretch that are compared; STRIDES: fewest strides of a part;
+#: FEWEST: fewest samples of each joint in a part.
 PARTS, STRIDES, FEWEST = ('at its beginning', 'in its middle', 'at its end'), 1, 16
-#: Legs that move together, within this part of a cycle, and by less than this (rad) may stand.
+#: TOGETHER: largest phase difference, cycles, of legs that move together.
+#: SWAY: range of the joints, rad, below which such legs may only sway on the spot.
 TOGETHER, SWAY = 0.06, 0.3
-#: A leg limps that moves by less than this share of what the others do.
+#: LIMPS: a leg limps if it moves by less than this share of the other legs' median motion.
 LIMPS = 0.6
 
 
 @dataclass(frozen=True)
 class QualityIssue:
-    """Something that speaks against what was found.
+    """A reason to doubt a result.
 
     Attributes:
         message: one line.
-        left: the share of the confidence that it leaves.
+        left: the factor by which it multiplies the confidence.
 
     """
 
@@ -67,7 +69,7 @@ class QualityIssue:
 
 def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
                  ) -> list[QualityIssue]:
-    """Doubt a stride frequency that rests on few samples, or whose mean cycle is several.
+    """Return issues of a frequency from few samples, of a cycle of several strides or no leg's.
 
     Args:
         frequency: Hz.
@@ -98,7 +100,7 @@ def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndar
 
 
 def _samples(phases: np.ndarray, x: np.ndarray) -> float:
-    """Return how many samples of a joint a stride has: of bursts, by the pauses between them."""
+    """Return the samples of a joint per stride; for bursts, the pauses between them count."""
     there = np.isfinite(x)
     own = phases[there[:, int(np.argmax(there.sum(axis=0)))]]
     steps = np.sort(np.diff(own))
@@ -109,7 +111,7 @@ def _samples(phases: np.ndarray, x: np.ndarray) -> float:
 
 
 def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
-    """Doubt mean cycles of joints, rad, shape (joints, m), that swing too far."""
+    """Return an issue if a joint swings too far; mean cycles in rad, shape (joints, m)."""
     swing = np.ptp(mean, axis=1)
     k = int(np.argmax(swing))
     if swing[k] <= SWING:
@@ -119,7 +121,7 @@ def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
 
 
 def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIssue]:
-    """Doubt a hop of all legs that a body which breathes or sways on its feet would look like.
+    """Return an issue if the hop of all legs may be a body that stands and sways.
 
     Args:
         phases: leg -> its phase, cycles.
@@ -134,7 +136,7 @@ def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIss
 
 
 def check_legs(vague: Sequence[str]) -> list[QualityIssue]:
-    """Doubt the phases of legs that may be half a cycle off."""
+    """Return an issue if the phases of some legs may be half a cycle off."""
     if not vague:
         return []
     return [QualityIssue(f'nothing tells in which sense {", ".join(vague)} count angles: half a '
@@ -143,7 +145,7 @@ def check_legs(vague: Sequence[str]) -> list[QualityIssue]:
 
 def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
                  names: Sequence[str]) -> list[QualityIssue]:
-    """Doubt one gait where the legs' phases differ between parts of the stretch.
+    """Return an issue if the legs' phases differ between parts of the stretch.
 
     Args:
         phases: of the samples of a stretch, cycles, shape (n,).
@@ -170,7 +172,7 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
 
 def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
               names: Sequence[str]) -> list[dict[str, float]]:
-    """Find the legs' phases in the parts of a stretch, if it is that long."""
+    """Return leg -> phase, cycles, for each part of a stretch; nothing if it is too short."""
     span, found = phases[-1] - phases[0], []
     edges = np.searchsorted(phases, phases[0] + span * np.arange(1, len(PARTS)) / len(PARTS))
     for place in map(slice, [0, *edges], [*edges, len(phases)]):
@@ -186,7 +188,7 @@ def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str
 
 
 def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> list[str]:
-    """Name the legs that move by much less than the others do, one line each."""
+    """Return a line for each leg that moves by much less than the others."""
     size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in listed)
                                / len(listed))) for leg, listed in legs.items()}
     found = []
@@ -198,7 +200,7 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
 
 
 def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
-    """Note few cycles, a drift of the frequency, and samples left out, one line each."""
+    """Return a line each on few cycles, a drift of the frequency, and samples left out."""
     notes = []
     if warp.cycles < SURE:
         notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '
@@ -215,17 +217,17 @@ def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]
     return notes
 
 
-# What legs do besides their phases: walk on, step on the spot, or turn.
+# Travel, which phases do not show: whether legs walk on, step on the spot, or turn.
 
-#: Area of a loop over that of an ellipse of the same amplitudes, a quarter of a cycle apart: below
-#: the first there is no telling from a path, above the second the sense is sure.
+#: PATH, SURE_AREA: area of the loop that two joints of a leg describe, relative to an ellipse of
+#: the same amplitudes. Below PATH the leg goes to and fro; above SURE_AREA its sense is certain.
 PATH, SURE_AREA = 0.25, 0.4
-#: Joints that move by less than this share of the motion of the leg's first one are ignored.
+#: MOVES: a joint is ignored if it moves by less than this share of the leg's largest motion.
 MOVES = 0.1
 
 
 def _area(a: np.ndarray, b: np.ndarray) -> float:
-    """Signed area of the loop of two joints, 1 for an ellipse a quarter of a cycle apart."""
+    """Return the signed area of two joints' loop, 1 for an ellipse a quarter of a cycle apart."""
     n = np.arange(1, a.size)
     sizes = np.sum(n * np.abs(a[1:])**2) * np.sum(n * np.abs(b[1:])**2)
     return float(np.sum(n * (a[1:].conj() * b[1:]).imag) / max(np.sqrt(sizes), 1e-300))
@@ -233,9 +235,9 @@ def _area(a: np.ndarray, b: np.ndarray) -> float:
 
 def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
            ) -> tuple[dict[str, float], set[str]]:
-    """Return areas of the loops of two joints that all legs have, and these joints' names.
+    """Return leg -> area of the loop of its two joints that move most, and these joints' names.
 
-    Of those the two that move most; nothing if there are none.
+    Only joints that all legs have are considered; both results are empty if fewer than two move.
     """
     roles = [{role_of(name): name for name in listed} for listed in legs.values()]
     power = {role: sum(float(np.sum(np.abs(c[own[role]][1:])**2)) for own in roles)
@@ -250,7 +252,7 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 
 def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
                  girdles: Mapping[str, str], opposite: Collection[str]) -> list[QualityIssue]:
-    """Doubt a gait that goes nowhere, or round.
+    """Return an issue if the gait steps on the spot or turns on the spot.
 
     Args:
         legs: leg -> its joints.

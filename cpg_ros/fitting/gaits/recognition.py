@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which gait is this? The spatio-temporal symmetry of a recorded or simulated rhythm.
+"""Gait recognition: the spatio-temporal symmetry of a recorded or simulated rhythm.
 
 A symmetry g with shift theta means ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono &
 Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
@@ -134,17 +134,18 @@ def steadiness(v: np.ndarray, w: np.ndarray) -> float:
     return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TURN
 
 
-#: Fewest samples of a rhythm.
+#: FEWEST: smallest number of samples of a rhythm.
 FEWEST = 8
-#: Largest distance of a symmetry that holds in whatever noise; the distance, in what noise and
-#: tolerance explain, at which a gait is as likely as none; and the largest distance of several in
-#: noise, over the usual.
+#: MOST: upper bound of the tolerance that noise may widen, as a distance (see Recognition).
+#: NONE: distance, in units of tolerance and noise, at which "no named gait" is as likely as a
+#: gait.
+#: LARGER: factor of the noise in the tolerance, for the largest of several noisy distances.
 MOST, NONE, LARGER = 0.3, 3.0, 1.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recognition(ShortRepr):
-    """What a rhythm is.
+    """The gait that a rhythm shows, and its symmetry.
 
     Distances are the RMS violation of a symmetry over cells and cycle, in units of the
     signals' RMS about their means: 0 where it holds, 1.4 where nothing does.

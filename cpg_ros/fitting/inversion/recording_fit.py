@@ -46,14 +46,15 @@ from cpg_ros.networks.registry import (
 from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 
-# A fit for every steady gait: where the requested one has no orbit, a simpler one.
+# A fit to every steady gait: where the requested fit has no orbit, a simpler one.
 
-#: Half the range of a parameter that keeps its value, over that value.
+#: STAYS: half width of the bounds that hold a parameter at its value, as a share of that value.
 STAYS = 1e-9
-#: A duty that no robot file states is one of the recording's where legs that stand as the cells
-#: do fit worse by this many standard errors, or where it is known to this standard error.
+#: ASKED: standard errors by which the cells' own stance must fit worse before duty is fitted.
+#: KNOWN: standard error of the duty (share of a stride) from which on a warning calls it unknown.
 ASKED, KNOWN = 3.3, 0.03
-#: Names, order and starts of a fit, and what they are in words.
+#: One attempt at a fit: free parameters, order of the readout, starts, and a text that describes
+#: it.
 Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
 
 
@@ -74,15 +75,15 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
                        readout: GaitReadout | None = None,
                        done: Callable[[float], None] = lambda fraction: None
                        ) -> tuple[Fit, tuple[str, ...]]:
-    """Fit with these names and this order, or as near to them as the generator runs.
+    """Fit these parameters at this order, or the nearest fit that the generator runs.
 
-    Without names, the usual ones and the duty of the gait are fitted; the duty only if the readout
-    has one, or else if the recording tells it from that of the network's cells.
+    Without names, the network's usual parameters and the gait's duty are fitted. The duty is
+    included if the readout has one, or if the recording tells it from that of the cells.
 
     Args: as of invert.
 
     Returns:
-        The fit, and warnings of what was given up for it.
+        The fit, and warnings that say how it differs from the one requested.
 
     Raises:
         InputError: as in invert.
@@ -126,7 +127,7 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
 def _with_duty_if_told(names: tuple[str, ...], order: int,
                        fitted: Callable[..., tuple[Fit, tuple[str, ...]]]
                        ) -> tuple[Fit, tuple[str, ...]]:
-    """Fit with legs that stand as the cells do, unless the recording tells another duty."""
+    """Fit without a duty, unless the recording shows that it differs from the cells'."""
     try:
         other, _ = fitted((*names, GAIT_DUTY), order, ())
     except NoOrbit:
@@ -145,7 +146,7 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
 
 def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str, order: int,
               readout: GaitReadout, done: Callable[[float], None]) -> Fit:
-    """Fit readouts to the gait of a network whose parameters stay."""
+    """Fit the readouts alone; all parameters of the network keep their values."""
     name = next(iter(network.parameters()))
     value, kind = float(network.as_dict()[name]), network.ranges[name]
     room = STAYS * max(abs(value), 1.0)
@@ -156,8 +157,9 @@ def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())
 
 
-#: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
-#: and walks leave 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04; and what it leaves of confidence.
+#: POOR: order of the readout -> mean RMS error, as a share of the range, above which a fit is
+#: poor; fits of real trots and walks have 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04.
+#: LEFT: factor of the confidence of a poor fit.
 POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
 
 
@@ -197,7 +199,7 @@ class RecordingFit(ShortRepr):
 
     @property
     def poor(self) -> bool:
-        """Whether the readouts leave more than those of their order do of a gait."""
+        """Whether the mean RMS error is above POOR for the order of the readouts."""
         return self.fit.mean_rms_share > POOR[self.fit.order]
 
     def as_dict(self) -> dict[str, Any]:
@@ -307,7 +309,7 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
 
 def _steady(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
             robot: Robot | None) -> tuple[Recording, dict[str, int], Stride, list[str]]:
-    """Return the recording, cells, stride and warnings, of a single stride as well.
+    """Return the recording, cells, stride and warnings; a single stride is enough.
 
     A recording without a steady gait may be exactly one stride; copies of it then take its place.
     """

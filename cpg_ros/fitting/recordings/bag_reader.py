@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Loads on the feet out of a bag, on the clock of the joint states beside them.
+"""Reader of rosbag2 bags: joint states, and foot loads on the clock of the joint states.
 
-Robots publish them as arrays without stamps, one number a leg, labelled with the legs' names. When
-they were received says where between the joint states they belong.
+Bags are sqlite3 or mcap, compressed or not, and are read without ROS. Foot loads are arrays
+without stamps, one number a leg, labelled with the legs' names; their times of reception place
+them between the joint states.
 """
 
 from collections.abc import Sequence
@@ -36,22 +37,24 @@ from cpg_ros.fitting.recordings.recording import (
 )
 import numpy as np
 
-#: Topics that have this name, in whatever namespace, and this type.
+# Foot loads, whose messages have no stamps.
+
+#: NAME: last part of the name of a topic with foot loads, in any namespace; TYPE: its type.
 NAME, TYPE = 'foot_contacts', 'std_msgs/msg/Float64MultiArray'
-#: Bytes before a message's content, the second of which is 1 if numbers are little-endian.
+#: HEAD: bytes of the CDR header of a message; bit 0 of its second byte is 1 for little-endian.
 HEAD = 4
-#: A recording that starts so long before the first stamp (s) does not use the stamps.
+#: APART: if start and first stamp differ by more, s, the recording uses times of reception.
 APART = 60.0
 
 
 class LoadStream:
-    """What a topic of foot loads delivered, and when the joint states came in between."""
+    """The messages of a topic of foot loads, and the clock of the joint states around them."""
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
         self._received: list[int] = []
         self._messages: list[bytes] = []
-        #: Of joint states: when they were received and what their headers say, ns.
+        #: Time of reception and stamp of each joint state, ns.
         self._clock: list[tuple[int, int]] = []
 
     def add(self, received: int, message: bytes) -> None:
@@ -72,7 +75,7 @@ class LoadStream:
             start: the recording's, s on the clock that it uses.
 
         Raises:
-            RecordingError: a message is none, or has no label that names the legs.
+            RecordingError: a message is malformed, or has no label that names the legs.
 
         """
         if not self._messages or not self._clock:
@@ -98,7 +101,7 @@ class LoadStream:
             # Joint states without stamps are recorded by when they were received.
             stamps = received
         begin, own = received[0], np.array(self._received, dtype=np.int64)
-        # Differences, which floats hold to the nanosecond.
+        # Interpolate differences: floats hold these to the nanosecond, unlike times since 1970.
         return np.asarray(1e-9 * np.interp(own - begin, received - begin, stamps - stamps[0])
                           + (1e-9 * float(stamps[0]) - start))
 
@@ -108,10 +111,12 @@ def _order(message: bytes) -> str:
 
 
 def _layout(message: bytes) -> tuple[tuple[str, ...], int]:
-    """Return the names of the legs in the label of the only dimension, and where numbers begin.
+    """Return the names of the legs and the offset of the first number, bytes.
+
+    The names are the label of the only dimension of the array.
 
     Raises:
-        struct.error, UnicodeDecodeError, ValueError: it has another layout.
+        struct.error, UnicodeDecodeError, ValueError: the message has another layout.
 
     """
     order = _order(message)
@@ -128,7 +133,7 @@ def _layout(message: bytes) -> tuple[tuple[str, ...], int]:
     return legs, place + -(place - HEAD) % 8
 
 
-# Joint states out of rosbag2 bags: sqlite3 and mcap, compressed or not, without ROS.
+# The recording: joint states, and the foot loads if there are any.
 
 def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str] = (),
              progress: bool = True, some: bool = False, servo: Servo | None = None
@@ -195,7 +200,7 @@ def _with_loads(recording: Recording, stream: LoadStream) -> Recording:
     try:
         return replace(recording, loads=stream.loads(recording.start))
     except RecordingError as error:
-        # What is asked for is the joints.
+        # Only the joints are required: unreadable loads become a note.
         return replace(recording, notes=(*recording.notes, f'{error}: left out'))
 
 

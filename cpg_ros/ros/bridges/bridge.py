@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The base class of bridges: drives a robot by what a generator publishes.
+"""The base class of bridges, which drive a robot from a generator's output; start sequences.
 
 A bridge adds its robot's messages, limits and numbers: .github/CONTRIBUTING.md, section
 Add a bridge.
@@ -462,10 +462,10 @@ class BridgeNode(StartedNode):
             self.get_logger().error(self._conflict)
 
     def _find_conflict(self) -> tuple[str, bool]:
-        """Return which other node commands the robot, or publishes the generator's targets.
+        """Return a line on other nodes that command the robot or publish targets, '' for none.
 
-        The text is '' for none. The second value is whether all have one name, as a node has
-        that was killed and started again, until the network forgets it.
+        The second value tells whether all of them have one name: a node that was killed and
+        started again is listed twice until the middleware forgets its first instance.
         """
         if names := self._others():
             return (f'another node commands the robot: {names}',
@@ -477,7 +477,7 @@ class BridgeNode(StartedNode):
         return '', False
 
     def _report_health(self) -> Health:
-        """Publish what changes slowly, and return the status.
+        """Publish slow measurements; return the level, its text and the values of diagnostics.
 
         ERROR while the robot sits down or is damped, or was not started; WARN while it is silent.
         """
@@ -510,7 +510,7 @@ class BridgeNode(StartedNode):
     # -- beginning and end ----------------------------------------------------------------
 
     def begin(self) -> None:
-        """Start the thread, and raise the robot to its stand unless that waits for ~/start."""
+        """Start the ticks; with autostart, also begin to raise the robot to its stand."""
         for number in termination_signals():
             signal.signal(number, self._leave)
         self.get_logger().info(
@@ -521,7 +521,7 @@ class BridgeNode(StartedNode):
             self._begin_start()
 
     def _leave(self, number: int, _: Any) -> None:
-        """Sit down, damp, and end; at a signal that was given once more, damp at once."""
+        """Sit down, damp and end at a signal; damp at once at a repeated one."""
         name, now = signal.Signals(number).name, time.monotonic()
         again, self._ending = self._ending, True
         if again and now < self._ended_at + ONE_PRESS:
@@ -540,7 +540,7 @@ class BridgeNode(StartedNode):
             start.cancel(reason)
 
     def finish(self) -> None:
-        """End the threads; the watchdog, too, if the robot is at rest."""
+        """End the threads; end the watchdog, too, unless the bridge failed."""
         self.ticker.end()
         self.ticker.join(timeout=1.0)
         self._cancel_start('the bridge ends')

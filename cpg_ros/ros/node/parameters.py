@@ -352,10 +352,11 @@ class StrictParameterService(ParameterService):
 
 
 def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:
-    """Put changes whose parameters a later one sets, too, behind that one; return the others.
+    """Return the changes that still have to be made, in order; drop those that are superseded.
 
-    A parameter of ``barriers`` may set others: no change is put behind one that sets it, and one
-    that sets it is put behind the next change only.
+    A change is superseded by a later one that sets all of its parameters, and joins ``replaced``
+    of that one. Parameters in ``barriers`` may set others: no change is superseded across a
+    change that sets a barrier, and such a change only by the one right after it.
     """
     remaining: list[_Change] = []
     for change in reversed(changes):

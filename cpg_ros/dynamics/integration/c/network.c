@@ -48,7 +48,7 @@ static void rates(const cpg_track *t, const cpg_real *driven, const cpg_real *x,
     }
 }
 
-/* What is heard a delay before c steps after the head node. */
+/* Coupling terms `driven` at c steps after the head node, from the state a delay earlier. */
 static const cpg_real *heard(const cpg_track *t, cpg_real c, cpg_real *driven)
 {
 #if CPG_DRIVEN > 0
@@ -62,7 +62,7 @@ static const cpg_real *heard(const cpg_track *t, cpg_real c, cpg_real *driven)
     return driven;
 }
 
-/* Recompute the slope that leaves the head node, after parameters have changed. */
+/* Recompute the slope of the step that begins at the head node, after parameters have changed. */
 static void restart(cpg_track *t)
 {
     cpg_real room[CPG_DRIVEN_ROOM];

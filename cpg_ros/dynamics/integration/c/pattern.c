@@ -1,4 +1,9 @@
 
+/* SHIFTING, 1/s: joint speed allowed in ramps and fades, per rad from the stand to the gait's
+ * mean.
+ * SHORT_OF: share of the speed bound up to which the clock lets joints go.
+ * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
+ * FADES: whether two gaits can fade into each other. */
 #define SHIFTING R(2.0)
 #define SHORT_OF R(0.997)
 #define ABOVE R(1.000000001)
@@ -11,14 +16,14 @@ static cpg_real smoothstep(cpg_real s, cpg_real *rate)
     return s * s * (R(3.0) - R(2.0) * s);
 }
 
-/* Plan a level's way to its end from its present value and rate, without overshoot. */
+/* Plan the path of a level from its present value and rate to its end, without overshoot. */
 static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
 {
     cpg_real level = ramp->level, rate = ramp->rate;
     ramp->parts = 0;
     ramp->past = R(0.0);
     if (rate * (end - level) < R(0.0)) {
-        /* Turned round half way: brake first, within half of the room that is left. */
+        /* The level moves away from its end: brake first, within half of the room that is left. */
         const cpg_real turn = level + R(0.5) * ((rate > R(0.0) ? R(1.0) : R(0.0)) - level);
         const cpg_ramp_part part = {level, rate, turn, R(2.0) * (turn - level) / rate};
         ramp->part[ramp->parts++] = part;
@@ -26,14 +31,14 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
         rate = R(0.0);
     }
     if (rate != R(0.0)) {
-        /* It stays in between if it takes no longer than this. */
+        /* The path does not overshoot if it takes no longer than this. */
         time = least(time, R(3.0) * (end - level) / rate);
     }
     const cpg_ramp_part part = {level, rate, end, time};
     ramp->part[ramp->parts++] = part;
 }
 
-/* Value and rate at a share s of a way that ends at rest. */
+/* Value and rate at a share s of the duration of a path that ends at rest. */
 static cpg_real come_to_rest(const cpg_ramp_part *way, cpg_real s, cpg_real *rate)
 {
     cpg_real slope;
@@ -58,7 +63,7 @@ static void advance_ramp(cpg_ramp *ramp, cpg_real clock)
     ramp->level = come_to_rest(&part, s, &ramp->rate);
 }
 
-/* The pattern slows where it would outrun the gaits at the next substep. */
+/* Factor of the clock, 0 to 1, at which no joint exceeds its speed bound in the next substep. */
 static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t leading)
 {
     (void)leading;
@@ -82,7 +87,7 @@ static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t leading)
     return R(1.0) / worst;
 }
 
-/* One part of a tick in which gaits fade or the ramp moves. */
+/* Compute one substep of a tick in which gaits fade or the ramp moves. */
 static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 {
     const cpg_real clock = R(0.5) * dt * (c->slowing + c->slower);
@@ -114,7 +119,7 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 #endif
     }
 #ifdef CPG_HOST
-    /* First to the stand: the gait swings about it, not about where the joints were. */
+    /* Go to the stand first: the gait swings about it, not about where the joints were found. */
     if (leading) {
         advance_ramp(&c->lead, clock);
     } else
@@ -156,7 +161,7 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
     }
 }
 
-/* One gait, at the stand or in full swing: nothing to mix. Return 0, and nothing else, if the
+/* Compute a tick of one gait, at the stand or in full swing. Return 0, and fill nothing, if the
  * network left its orbit. */
 static uint8_t cruise(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 {
