@@ -449,7 +449,7 @@ class BridgeNode(StartedNode):
         return response
 
     def _check_graph(self) -> None:
-        """Look for others who command the robot, and for what endangers it."""
+        """Log network hazards; sit down if another node commands the robot."""
         if (hazard := self.graph_hazard()) and not self._hazard:
             self._hazard = hazard
             self.get_logger().error(hazard)
