@@ -377,7 +377,7 @@ class Odometry:
         fill_quaternion(self._tilt[0], self._tilt[1], self.pose[3], out)
 
     def pose_covariance(self, out: np.ndarray) -> np.ndarray:
-        """Fill the covariance of x, y, z, roll, pitch and yaw, m and rad, shape (6, 6), as in ROS."""
+        """Fill the covariance of x, y, z, roll, pitch and yaw, m and rad, (6, 6), as in ROS."""
         out[:] = 0.0
         for row, k in enumerate((0, 1, 5)):
             for column, other in enumerate((0, 1, 5)):

@@ -102,7 +102,7 @@ def _deviation(tables, memory, sensors, planned, run, level):
 
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
-    """Fill the changes of the strides; missing speed in m/s, wanted and measured heading in rad."""
+    """Fill the changes of the strides; missing speed in m/s, headings in rad."""
     stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
