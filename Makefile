@@ -45,7 +45,7 @@ LEFT_OUT := deep or alone or browser or docs
 AGAIN := --reruns 1 --rerun-show-tracebacks -r aR
 # Compiled while linters run, before tests in several processes would at once; what a build has
 # compiled, and an earlier run, is there.
-KERNELS := feedback delayed quadruped biped balance delayed6 phase hopf matsuoka
+KERNELS := feedback balance networks
 
 .PHONY: build run demo shell test test-deep test-export browser mutants docs figures coverage \
 	bench wheel messages unitree clean

@@ -28,7 +28,7 @@ import tempfile
 from cpg_ros.common.cache_folder import writing
 from cpg_ros.common.errors import CpgError
 
-OPTIONS = ('-std=c99', '-O2', '-shared', '-fPIC')
+OPTIONS = ('-std=c99', '-O3', '-shared', '-fPIC')
 COMPILERS = ('cc', 'gcc', 'clang')
 
 

@@ -26,10 +26,9 @@ import numpy as np
 
 # When each leg of a gait swings, and how far it has got, by the stride phase of the first leg.
 
-#: POINTS: number of phases of a stride in the tables.
+#: Points of a stride.
 POINTS = 512
-#: TOGETHER: legs of a pair swing together if one alone swings for less than this share of a
-#: stride.
+#: Legs of a pair swing together if they differ for less than this share of the stride.
 TOGETHER = 0.2
 
 
@@ -46,7 +45,7 @@ class Timetable:
     """
 
     def __init__(self, plan: GaitPlan, geometry: Geometry) -> None:
-        """Tabulate a gait: a leg swings while its foot goes forward relative to the body."""
+        """Look at a gait: a leg swings while its foot goes forward, seen from the body."""
         robot, theta = plan.robot, np.arange(POINTS) / POINTS
         phases = theta[:, None] - plan.readout.start + plan.orbit.phases[robot.cells]
         self.angles, self.in_place = (
@@ -83,7 +82,7 @@ def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))
 
 
-#: SLOTS: most gaits known at the same time; ROWS: most rows of a steering table.
+#: Gaits known at the same time, and most rows of a steering table.
 SLOTS, ROWS = 8, 32
 
 
@@ -120,7 +119,7 @@ class GaitTables(NamedTuple):
 
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
-        """Return tables in which all slots are empty."""
+        """Nothing known of any gait."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
                    np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
@@ -129,7 +128,7 @@ class GaitTables(NamedTuple):
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
-        """Fill the slot of a gait.
+        """Take in a gait.
 
         Raises:
             InputError: its tables have more rows than there is room for.

@@ -38,17 +38,18 @@ from cpg_ros.feedback.laws import (
     virtual_stiffness,
 )
 from cpg_ros.feedback.laws.law import low_passed
-from cpg_ros.motion.strides import approach
 import numpy as np
 
-#: LEAD: phase by which corrections lead the pattern, cycles, as joints lag behind their commands.
+#: Joints lag behind their commands, so corrections lead the pattern by this, cycles.
 LEAD = 0.04
-#: SLOWEST: least factor of the stride frequency.
+#: The wanted velocity is approached with this time constant, s.
+APPROACH = 0.2
+#: The stride frequency is never scaled to less than this.
 SLOWEST = 0.2
 
 
 class PlannedMotion(NamedTuple):
-    """Plan of the pattern and commands, for each run.
+    """What the pattern plans and what is commanded, of each run.
 
     Attributes:
         angles: of the joints, rad, shape (runs, joints).
@@ -71,7 +72,7 @@ class PlannedMotion(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """Difference of the body's motion from the expected one: m/s, rad/s, rad."""
+    """By how much the body's motion differs from the expected one: m/s, rad/s, rad."""
 
     vx: float
     vy: float
@@ -82,8 +83,19 @@ class Deviation(NamedTuple):
 
 
 @jit
+def _approach(target, dt, now, rate):
+    """Advance a velocity and its rate by dt in s towards a target, as strides are (cpg_steer)."""
+    decay = math.exp(-dt / APPROACH)
+    for k in range(len(now)):
+        gap = now[k] - target[k]
+        pull = rate[k] + gap / APPROACH
+        now[k] = target[k] + (gap + pull * dt) * decay
+        rate[k] = (rate[k] - pull * dt / APPROACH) * decay
+
+
+@jit
 def _deviation(tables, memory, sensors, planned, run, level):
-    """Return the deviation from the gaits' efference copies and the wanted sideways speed."""
+    """Return what differs from the gaits' efference copies and the wanted sideways speed."""
     old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
     phase, forward = planned.phase[run], memory.wanted_velocity[run, 0, 0]
     expected, turning, rpy = memory.expected, sensors.angular_velocity[run], sensors.rpy[run]
@@ -102,7 +114,7 @@ def _deviation(tables, memory, sensors, planned, run, level):
 
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
-    """Fill the changes of the strides; missing speed in m/s, headings in rad."""
+    """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
     stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
@@ -144,8 +156,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run], memory.doubt,
                memory.leg_velocities, memory.scratch)
         wanted, velocity = memory.wanted_velocity[run], planned.velocity[run]
-        # The wanted velocity is approached as strides are.
-        approach(velocity, velocity[:0], dt, wanted[0], wanted[1])
+        _approach(velocity, dt, wanted[0], wanted[1])
         old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
         slot, phase, left = new if mix > 0.5 else old, planned.phase[run], wanted[0, 1]
         off = _deviation(tables, memory, sensors, planned, run, level)

@@ -24,10 +24,12 @@ from functools import cache
 from typing import Any
 
 from cpg_ros.common.c_library import load
-from cpg_ros.dynamics.integration.c_kernel import lane_of, library_of, version
+from cpg_ros.dynamics.integration.c_kernel import library_of, version
 from cpg_ros.dynamics.integration.c_text import part
 from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.mesh.collocation import solver
 from cpg_ros.networks import equations as generated
+from cpg_ros.networks.registry import find_network
 import numpy as np
 
 #: Most gaits fading into one another at once; a further one waits for a place.
@@ -62,7 +64,7 @@ Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart * 2, 'part'),
                (ctypes.c_uint8, 'parts'))
 Core = _struct(
     'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
-    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive joint_leg offset'),
+    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive offset'),
     (_POINTER * 3, 'limits'),
     (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
                'behind'), (Ramp, 'ramp lead'),
@@ -82,8 +84,8 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 def _sources() -> dict[str, str]:
     """Return the files of the core, name -> text."""
     defines = f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_LEAD {TABLE}\n#define HOLD {HOLD!r}'
-    names = 'host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'host_track', 'pattern', \
-        'host'
+    names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'host_track',
+             'pattern', 'host')
     # Both readouts stand in it.
     own = {'waveform': '#define look look_waveform\n', 'host_phases': '#undef look\n',
            'phase': '#define look look_phases\n'}
@@ -108,6 +110,20 @@ def core() -> ctypes.CDLL:
         if name not in ('cpg_track_advance', 'cpg_confine'):
             function.restype = None
     return library
+
+
+def precompile(name: str) -> None:
+    """Compile or load what a generator of a network runs.
+
+    Args:
+        name: as find_network takes it, and errors as of that.
+
+    """
+    network = find_network(name)
+    core()
+    library_of(network)
+    if not network.delay_parameter:
+        solver()
 
 
 def confine(wanted: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt: float,
@@ -188,13 +204,13 @@ class CTrack:
 
     def run(self, which: str, stepper: Stepper) -> None:
         """Take a stepper's arrays as one of the networks of the struct: net, home or seed."""
-        network = type(stepper.network)
-        lane = lane_of(network, stepper.system, stepper.ring)
+        lane = stepper.lane
         self._kept[which] = stepper, lane
         arrays = stepper.clock, stepper.now, *stepper.ring[1:]
         setattr(self.struct, which, Net(lane.address, *(one.ctypes.data for one in arrays),
                                         stepper.ring.x.size))
-        self.struct.advance = ctypes.cast(library_of(network).advance, _POINTER).value
+        self.struct.advance = ctypes.cast(
+            library_of(type(stepper.network)).advance, _POINTER).value
 
 
 def look(gait: CGait, components: int, now: np.ndarray, strides: float, clocks: np.ndarray,

@@ -214,12 +214,11 @@ class Pattern:
         self._behind = np.zeros(self._offset.size, dtype=bool)
         # Arrays that only the core uses: last rates; the jump that it absorbs, and its rate.
         own = np.zeros((3, self._offset.size))
-        leg = robot.leg_of_joint.astype(np.int16)
-        self._kept = own, leg
+        self._kept = own
         for name, array in zip(
                 ('wanted', 'rate', 'goal', 'found', 'correction', 'last_rate', 'jump', 'jump_rate',
-                 'offset', 'position', 'velocity', 'behind', 'joint_leg'),
-                (*rows, *own, self._offset, self.position, self.velocity, self._behind, leg),
+                 'offset', 'position', 'velocity', 'behind'),
+                (*rows, *own, self._offset, self.position, self.velocity, self._behind),
                 strict=True):
             setattr(self._struct, name, array.ctypes.data)
         for k, row in enumerate(self._limits):
@@ -291,6 +290,10 @@ class Pattern:
         if self._found.any():
             self._core.cpg_lead_in(self._address, time)
 
+    def begin_at(self, phase: float) -> None:
+        """Put the first leg at a phase in cycles, before the first advance."""
+        self._newest.reseed(phase)
+
     # -- requests from other threads ------------------------------------------------------
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
@@ -356,7 +359,7 @@ class Pattern:
         older, newest = (tracks := self._tracks)[-2:][0], tracks[-1]
         if older is newest:
             return newest.plan, newest.plan, 0.0
-        return older.plan, newest.plan, smoothstep(newest.progress)[0]
+        return older.plan, newest.plan, smoothstep(newest.progress)
 
     @property
     def phases(self) -> np.ndarray:
@@ -405,18 +408,30 @@ class Pattern:
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s and fill position, velocity and phases."""
+        if self.correct is not None:
+            self.follow(dt, self.correct(self.plan_tick(dt)))
+            return
+        self._take_drift()
+        self._core.cpg_advance(self._address, dt)
+
+    def plan_tick(self, dt: float) -> np.ndarray:
+        """Begin to advance by dt in s; return where joints are wanted, rad, to be corrected."""
+        self._take_drift()
+        self._core.cpg_plan(self._address, dt)
+        return self._wanted
+
+    def follow(self, dt: float, goal: np.ndarray) -> None:
+        """Take joints to what a correction makes of plan_tick's angles, rad, shape (joints,)."""
+        self._goal[:] = goal
+        self._core.cpg_follow(self._address, dt, 1)
+
+    def _take_drift(self) -> None:
         if self._asked.value:
             self._asked.value = 0
             while self._drift:
                 self._run(self._tracks[-1:])
                 self._newest.drift_to(self._drift.pop())
                 self._absorb()
-        if self.correct is None:
-            self._core.cpg_advance(self._address, dt)
-        else:
-            self._core.cpg_plan(self._address, dt)
-            self._goal[:] = self.correct(self._wanted)
-            self._core.cpg_follow(self._address, dt, 1)
 
     def resume(self, stall: float) -> None:
         """Resume after a stall in s from where the pattern stopped, slowly at first.

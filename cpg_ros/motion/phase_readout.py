@@ -32,12 +32,9 @@ derivatives of the positions whatever the network does, and whatever is done to 
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from cpg_ros.dynamics.integration.c_kernel import library_of
-from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion.core import CGait, core, look
+from cpg_ros.motion.core import CGait, look
 from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TURN, WaveReadout
-from cpg_ros.networks.registry import find_network
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -254,18 +251,3 @@ def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
         begin[leg] = known.crests[wave]
         fraction[leg] = stance(evaluate(known.terms[wave], GRID), float(begin[leg]))
     return begin, fraction
-
-
-def precompile(name: str) -> None:
-    """Compile or load what a generator of a network runs: the core, and what steps the network.
-
-    Args:
-        name: as find_network takes it, and errors as of that.
-
-    """
-    core()
-    network = next(iter(find_network(name).presets().values())).network
-    if not network.delay:
-        # Its orbits are first looked for by simulation.
-        simulate(network, np.zeros(network.components), network.step, network.step)
-    library_of(type(network))

@@ -15,55 +15,17 @@
 """Steering a gait: how long each leg's stride is, and how fast strides follow one another."""
 
 import ctypes
-import math
 from typing import TypeVar
 
-from cpg_ros.dynamics.integration.compilation import jit_entry
 from cpg_ros.motion.core import core, Drive
 import numpy as np
 
 Real = TypeVar('Real', float, np.ndarray)
 
 
-def smoothstep(s: Real) -> tuple[Real, Real]:
-    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
-    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
-
-
-def come_to_rest(start: Real, rate: Real, end: Real | float, time: float, s: float
-                 ) -> tuple[Real, Real]:
-    """Value and rate at a fraction of the cubic from a start and its rate to rest at an end."""
-    fraction, slope = smoothstep(s)
-    return (start + fraction * (end - start) + s * (1.0 - s)**2 * time * rate,
-            slope * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * rate)
-
-
-#: Targets are approached with this time constant, s.
-TIME_CONSTANT = 0.2
-
-
-@jit_entry
-def approach(targets, trim, dt, now, rate):
-    """Advance strides and pace towards their targets by dt in s.
-
-    Args:
-        targets: targets, shape (legs + 1,).
-        trim: added to those of the strides, shape (legs,) or (0,).
-        dt: s.
-        now: the strides and the pace, shape (legs + 1,); overwritten.
-        rate: their derivatives, 1/s; overwritten.
-
-    """
-    # e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target.
-    decay = math.exp(-dt / TIME_CONSTANT)
-    for k in range(len(now)):
-        target = targets[k]
-        if k < len(trim):
-            target = min(max(target + trim[k], -1.0), 1.0)
-        gap = now[k] - target
-        pull = rate[k] + gap / TIME_CONSTANT
-        now[k] = target + (gap + pull * dt) * decay
-        rate[k] = (rate[k] - pull * dt / TIME_CONSTANT) * decay
+def smoothstep(s: Real) -> Real:
+    """Smooth step from 0 to 1: 3 s^2 - 2 s^3."""
+    return s * s * (3.0 - 2.0 * s)
 
 
 class StrideCommand:

@@ -20,7 +20,6 @@ import sys
 import time
 from typing import Any
 
-from cpg_ros.dynamics.integration.c_kernel import KERNELS
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
@@ -43,7 +42,6 @@ from cpg_ros.ros.generator_parameters import (
     COMMANDS,
     exclusive,
     gait_spec,
-    KERNEL,
     NETWORK,
     network_for,
     Planner,
@@ -204,13 +202,12 @@ class Generator(StartedNode):
         given = {name: one.value for name, one in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
             given.get('network', NETWORK.default), given.get('robot')))
-        self._declare({'network': NETWORK, 'kernel': KERNEL})
-        self._one_of('kernel', KERNELS)
+        self._declare({'network': NETWORK})
         try:
             network = find_network(self._value('network'))
         except NetworkError as error:
             raise StartError(f'network {error}') from error
-        compile_kernels(self._value('network'), self._value('kernel'), self)
+        compile_kernels(self._value('network'), self)
         self._declare(specs(network))
         self._declare({'exclusive': exclusive(self._value('command'))})
         presets = presets_of(network, self._value('presets'))
@@ -570,7 +567,7 @@ class Generator(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    known = {'network': NETWORK, 'kernel': KERNEL, **specs(find_network(NETWORK.default)),
+    known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
              ENABLED: switch.SWITCH, **switch.TOPICS}
     return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
                "networks and the feedback's gains are listed by ros2 param describe.", known, args,

@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.common.errors import CpgError, InputError
-from cpg_ros.dynamics.integration.c_kernel import KERNELS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.motion.body_file import GAIT_SPEEDS
 from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
@@ -42,9 +41,6 @@ NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_onl
                                   'append a number of legs, as in delayed6, for a variant; '
                                   "without one, the robot file's number of legs is used where the "
                                   'file asks for that variant'))
-KERNEL = Spec('auto', 'what solves for gaits: code compiled by numba, or C (c); auto takes numba '
-              'where it is installed; what moves the joints is C in any case',
-              read_only=True, constraints=one_of(KERNELS))
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:

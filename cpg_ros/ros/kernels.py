@@ -22,9 +22,10 @@ import threading
 import time
 from typing import Any
 
-from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.dynamics.integration.c_kernel import c_kernels
 from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
-from cpg_ros.motion.phase_readout import precompile
+from cpg_ros.dynamics.integration.simulate import use
+from cpg_ros.motion.core import precompile
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import StartError
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -75,31 +76,27 @@ class StartProgress:
         self._node.destroy_publisher(self._publisher)
 
 
-#: How long a network's kernels, those of the feedback and those of a biped's take, on one core of
-#: 2023, s.
-NETWORK, FEEDBACK, BALANCE = 20.0, 25.0, 15.0
+#: How long the kernels of the feedback and those of a biped's take, on one core of 2023, s.
+FEEDBACK, BALANCE = 25.0, 15.0
 #: How often it is seen whether a compiling process has ended, s.
 LOOK = 0.05
 
 
-def compile_kernels(network: str, kernel: str, node: Node) -> None:
-    """Compile or load the kernels of a network, named as for find_network.
+def compile_kernels(network: str, node: Node) -> None:
+    """Compile or load what runs a network, named as for find_network: in C, without numba.
 
     Args:
         network: its name.
-        kernel: one of KERNELS, by which they are made.
-        node: that waits for them.
+        node: that waits for it.
 
     Raises:
-        CpgError: what they are made by is not installed.
+        CpgError: there is no C compiler.
 
     """
-    choose(kernel)
+    use(c_kernels)
     if not COMPILED:
-        node.get_logger().info('numba is not installed: the network is stepped in C, and there is '
-                               'no feedback')
-    with announced(node, f"the network '{network}'", NETWORK):
-        precompile(network)
+        node.get_logger().info('numba is not installed: there is no feedback')
+    precompile(network)
 
 
 @contextmanager

@@ -22,7 +22,6 @@ import copy
 import os
 from typing import Any
 
-from cpg_ros.feedback.efference_copy import periodic
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
@@ -148,8 +147,6 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
             strides: Sequence[float] = (), pace: float = 1.0, ramp: float = 1.0) -> np.ndarray:
     """Work out the angles that a generator publishes from the stand on.
 
-    The ramp is the generator's own; after it the orbit is what it is, and is looked up.
-
     Args:
         plan: the gait.
         duration: s.
@@ -168,22 +165,10 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
         drive, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
         drive.set_target(stride, pace, at_once=True)
     pattern = Pattern(plan, ramp, drive=drive)
-    steps = round(duration / timestep)
-    found = np.empty((steps, len(robot.order)))
-    done = 0
-    while done < steps and pattern.level < 1.0:
+    found = np.empty((round(duration / timestep), len(robot.order)))
+    for row in found:
         pattern.advance(timestep)
-        found[done] = pattern.position
-        done += 1
-    if done < steps:
-        ahead = (pattern.phases[0] - plan.readout.start
-                 + plan.frequency * pace * timestep * np.arange(1, steps - done + 1))
-        still, stride = plan.in_place.angles, stride[robot.leg_of_joint, None]
-        angles = still + stride * (plan.readout.angles - still)
-        base = robot.column('offset') + plan.shift
-        phases = plan.orbit.phases[robot.cells]
-        found[done:] = (base[:, None] + np.array([
-            periodic(row, ahead + phase) for row, phase in zip(angles, phases, strict=True)])).T
+        row[:] = pattern.position
     return found[:, robot.places]
 
 

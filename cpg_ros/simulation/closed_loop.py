@@ -20,19 +20,17 @@ many runs takes their sensor data. A run that has ended takes no more steps.
 
 from collections.abc import Mapping, Sequence
 import math
-from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import jit, jit_entry
-from cpg_ros.feedback.efference_copy import between_phases, EfferenceCopy
+from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.gait_tables import POINTS, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.laws.virtual_stiffness import targets
 from cpg_ros.feedback.tick import PlannedMotion
+from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.strides import approach, smoothstep
+from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.simulation.bodies import BatchPhysics
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.run_metrics import BEGINNING, cost_of_transport, motor_power, torques
@@ -42,130 +40,92 @@ from cpg_ros.simulation.terrain import add_ground
 from cpg_ros.simulation.tuning.foot_path import read_geometry
 import numpy as np
 
-# The patterns of many runs: orbits looked up, ramped in, steered, switched, held to limits.
+# The patterns of many runs: ramped in, steered, switched, corrected, held to limits.
 
 #: From the stand into the gait, and from one gait into another, s.
 RAMP, TRANSITION = 1.0, 1.0
 
-_smoothstep = jit(smoothstep)
 
-
-class _Gaits(NamedTuple):
-    """The gaits that all runs know, at even phases, and the joints that they move."""
-
-    angles: np.ndarray
-    in_place: np.ndarray
-    frequency: np.ndarray
-    leg: np.ndarray
-    offset: np.ndarray
-
-
-class _Drives(NamedTuple):
-    """A StrideCommand (motion.strides), and what else changes a run."""
-
-    target: np.ndarray
-    now: np.ndarray
-    rate: np.ndarray
-    faded: np.ndarray
-
-
-class PatternBatch:
+class Patterns:
     """As many patterns as runs, which know the same gaits.
 
     Attributes:
-        planned: the motion before any correction; its arrays are overwritten by advance.
-        level: 0 at the stand, 1 in the full gait.
-        limits: lowest and highest angles of the joints, rad, shape (joints,) each.
+        planned: the motion before any correction; its arrays are overwritten by plan.
 
     """
 
-    def __init__(self, plans: Mapping[str, GaitPlan], tables: Sequence[Timetable],
-                 scenarios: Sequence[Scenario], dt: float) -> None:
-        """Stand; the first plan is the one that all runs begin with."""
-        self._programs, self._names, self._dt = list(plans.values()), list(plans), dt
-        robot, runs = self._programs[0].robot, len(scenarios)
-        self._gaits = _Gaits(
-            np.stack([one.angles for one in tables]), np.stack([one.in_place for one in tables]),
-            np.array([one.frequency for one in self._programs]), robot.leg_of_joint,
-            robot.column('offset'))
-        self.limits = robot.column('lower'), robot.column('upper')
-        self._reach = robot.column('velocity') * dt
-        self._last = np.tile(self._gaits.offset, (runs, 1))
+    def __init__(self, plans: Mapping[str, GaitPlan], feedback: Feedback,
+                 scenarios: Sequence[Scenario], dt: float, trimmed: bool) -> None:
+        """Stand; the first plan is the one that all runs begin with.
+
+        Args:
+            plans: gaits by name.
+            feedback: that has learnt them.
+            scenarios: one a run.
+            dt: of a tick, s.
+            trimmed: whether the feedback changes strides and clocks.
+
+        """
+        self._plans, self._feedback, self._dt, self._trimmed = plans, feedback, dt, trimmed
+        first, runs = next(iter(plans.values())), len(scenarios)
+        self._patterns = [Pattern(first, RAMP, drive=StrideCommand(len(first.robot.legs)))
+                          for _ in scenarios]
         self.planned = PlannedMotion(
-            self._last.copy(), np.array([one.phase for one in scenarios]),
-            np.zeros((runs, 2), dtype=np.int64), np.ones(runs),
+            np.zeros((runs, len(first.robot.joints))), np.zeros(runs),
+            np.zeros((runs, 2), dtype=np.int64), np.zeros(runs),
             np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs))
-        strides = np.ones((runs, len(robot.legs) + 1))
-        self._drives = _Drives(strides, strides.copy(), np.zeros_like(strides), np.ones(runs))
-        for run in range(runs):
-            self._steer(run)
-        self._drives.now[:] = strides
-        self._time = self.level = 0.0
+        self._position = self.planned.angles.copy()
+        for run, (pattern, one) in enumerate(zip(self._patterns, scenarios, strict=True)):
+            pattern.begin_at(one.phase)
+            if trimmed and pattern.drive is not None:
+                pattern.drive.trim = feedback.memory.stride[run]
+            self._steer(run, first)
+        self._time = 0.0
         self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(
             [(wish[0], run, '', wish[1:]) for run, one in enumerate(scenarios)
              for wish in one.commands]
             + [(when, run, name, ()) for run, one in enumerate(scenarios)
                for when, name in one.switches], reverse=True)
 
-    def _steer(self, run: int) -> None:
-        plan, target = self._programs[self.planned.gaits[run, 1]], self._drives.target[run]
-        target[:] = 1.0
+    def _steer(self, run: int, plan: GaitPlan) -> None:
         if plan.motion.steering is not None:
-            target[:-1], target[-1] = plan.steer(self.planned.velocity[run, 0],
-                                                    self.planned.turn[run])
+            self._patterns[run].steer(*plan.steer(self.planned.velocity[run, 0],
+                                                  self.planned.turn[run]))
+        else:
+            self._patterns[run].steer(np.ones(len(plan.robot.legs)), 1.0)
 
-    def advance(self, stride: np.ndarray, frequency_scale: np.ndarray) -> None:
-        """Advance by one time step.
+    @property
+    def level(self) -> float:
+        """0 at the stand, 1 in the full gait: the least of all runs."""
+        return min(pattern.level for pattern in self._patterns)
 
-        Args:
-            stride: added to each leg's stride, shape (runs, legs).
-            frequency_scale: factor of each run's clock, shape (runs,).
-
-        """
+    def plan(self) -> None:
+        """Advance by one time step and fill what is planned."""
+        planned, feedback = self.planned, self._feedback
         self._time += self._dt
         while self._events and self._events[-1][0] <= self._time:
             _, run, name, wish = self._events.pop()
+            plan = self._plans[name] if name else self._patterns[run].plan
             if name:
-                self.planned.gaits[run] = self.planned.gaits[run, 1], self._names.index(name)
-                self._drives.faded[run] = 0.0
+                self._patterns[run].apply(plan, TRANSITION)
             else:
-                self.planned.velocity[run], self.planned.turn[run] = wish[:2], wish[2]
-            self._steer(run)
-        self.level = smoothstep(min(1.0, self._time / RAMP))[0]
-        _advance(self._gaits, self._drives, stride, frequency_scale, self.level, self._dt,
-                 self.planned)
+                planned.velocity[run], planned.turn[run] = wish[:2], wish[2]
+            self._steer(run, plan)
+        planned.heading[:] += planned.turn * self._dt
+        for run, pattern in enumerate(self._patterns):
+            if self._trimmed:
+                pattern.frequency_scale = feedback.memory.frequency_scale[run]
+            planned.angles[run] = pattern.plan_tick(self._dt)
+            planned.phase[run] = pattern.phases[0]
+            old, new, planned.mix[run] = pattern.fading
+            planned.gaits[run] = feedback.slot(old), feedback.slot(new)
 
-    def confine(self, angles: np.ndarray) -> np.ndarray:
-        """Hold angles to the joints' limits and speeds."""
-        near = np.clip(angles, self._last - self._reach, self._last + self._reach)
-        return np.clip(near, *self.limits, out=self._last)
-
-
-@jit_entry
-def _advance(gaits, drives, strides, frequency_scales, level, dt, planned):
-    """Advance each run by dt in s and fill what is planned; see PatternBatch.advance."""
-    angles, still, frequency = gaits.angles, gaits.in_place, gaits.frequency
-    drive, faded = drives.now, drives.faded
-    for run in range(len(faded)):
-        old, new, clock = planned.gaits[run, 0], planned.gaits[run, 1], frequency_scales[run] * dt
-        faded[run] = min(1.0, faded[run] + clock / TRANSITION)
-        mix = planned.mix[run] = _smoothstep(faded[run])[0]
-        if faded[run] == 1.0:
-            old = planned.gaits[run, 0] = new
-        approach(drives.target[run], strides[run], clock, drive[run], drives.rate[run])
-        mixed = frequency[old] + mix * (frequency[new] - frequency[old])
-        phase = planned.phase[run] = (planned.phase[run] + mixed * drive[run, -1] * clock) % 1.0
-        planned.heading[run] += planned.turn[run] * dt
-        low, high, on = between_phases(phase * POINTS, POINTS)
-        for joint in range(len(gaits.offset)):
-            stride, found = drive[run, gaits.leg[joint]], 0.0
-            for gait, fraction in ((old, 1.0 - mix), (new, mix)):
-                rest = still[gait, low, joint] + on * (still[gait, high, joint]
-                                                       - still[gait, low, joint])
-                full = angles[gait, low, joint] + on * (angles[gait, high, joint]
-                                                        - angles[gait, low, joint])
-                found += fraction * (rest + stride * (full - rest))
-            planned.angles[run, joint] = gaits.offset[joint] + level * found
+    def follow(self, angles: np.ndarray) -> np.ndarray:
+        """Return angles, rad, shape (runs, joints), within the joints' limits and speeds."""
+        for pattern, goal, position in zip(self._patterns, angles, self._position, strict=True):
+            pattern.follow(self._dt, goal)
+            position[:] = pattern.position
+        return self._position
 
 
 class ClosedLoopBatch(BatchPhysics):
@@ -190,7 +150,6 @@ class ClosedLoopBatch(BatchPhysics):
         self.plans = {plan.name: plan for plan in plans}
         self.geometry = geometry_of(self._robot, self._robot.geometry
                                     or read_geometry(self.body, self.parts))
-        self._tables = [Timetable(plan, self.geometry) for plan in plans]
 
     @property
     def plan(self) -> GaitPlan:
@@ -223,7 +182,8 @@ class ClosedLoopBatch(BatchPhysics):
             feedback.learn(plan, expected.get(name))
         memory, state_of = feedback.memory, BodyState(self.geometry, runs)
         estimated = memory.velocity if gains is not None else state_of.velocity
-        pattern = PatternBatch(self.plans, self._tables, scenarios, dt)
+        pattern = Patterns(self.plans, feedback, scenarios, dt, gains is not None)
+        limits = self._robot.column('lower'), self._robot.column('upper')
         models = [self.model(one) for one in scenarios]
         stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
             self.model(one, gains.stiffen_kp) for one in scenarios]
@@ -249,10 +209,8 @@ class ClosedLoopBatch(BatchPhysics):
                   (('place', 2), ('rpy', 3), ('velocity', 3), ('estimated', 3),
                    ('angular_velocity', 3), ('phase', 1), ('kp_scale', 1), ('stiff', 1))}
         delay = 0.0 if noise is None else noise.delay
-        none, calm = np.zeros((runs, legs)), np.ones(runs)
         for k in range(steps):
-            pattern.advance(*(none, calm) if gains is None
-                            else (memory.stride, memory.frequency_scale))
+            pattern.plan()
             senses.joint_positions[:] = state[:, angle_at]
             senses.joint_velocities[:] = state[:, rate_at]
             np.negative(sensors[:, 2:3 * legs:3], out=senses.foot_forces)
@@ -266,10 +224,9 @@ class ClosedLoopBatch(BatchPhysics):
             else:
                 angles = pattern.planned.angles
                 state_of.update(noticed, dt)
-            angles = pattern.confine(angles)
+            angles = pattern.follow(angles)
             if gains is not None and gains.virtual_stiffness and memory.stiff.any():
-                angles = targets(angles, noticed.joint_positions, memory.stiff, gains,
-                                 pattern.limits)
+                angles = targets(angles, noticed.joint_positions, memory.stiff, gains, limits)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
             for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('rpy', senses.rpy),
                                ('velocity', velocity), ('estimated', estimated),

@@ -58,6 +58,6 @@ class Approach:
         done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
         done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
         self._there = bool((done == steps).all())
-        fraction, _ = smoothstep(done / steps)
+        fraction = smoothstep(done / steps)
         return np.where((done == steps)[self._legs], commanded,
                         self._start + fraction[self._legs] * way)

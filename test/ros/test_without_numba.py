@@ -15,10 +15,9 @@
 """A generator where numba cannot be imported: it walks by the exported C, without feedback."""
 
 import os
+from pathlib import Path
 import shutil
 
-from cpg_ros.dynamics.integration import kernel
-from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import find_network
 from graph import until
@@ -39,8 +38,7 @@ def hidden(monkeypatch, tmp_path):
 def test_it_walks_all_gaits_at_1_khz(hidden, start):
     process, watcher = start('-p', 'robot:=unitree_go2', '-p', 'rate:=1000.0', '-p',
                              'combined_topic:=commands', '-p', 'transition:=0.3')
-    assert 'numba is not installed: the network is stepped in C, and there is no feedback' \
-        in process.log
+    assert 'numba is not installed: there is no feedback' in process.log
     robot = load_robot('unitree_go2')
     accepted = []
     for name in find_network('delayed').presets():
@@ -59,25 +57,12 @@ def test_it_walks_all_gaits_at_1_khz(hidden, start):
     assert result.reason == 'no feedback: it needs numba, which is not installed'
 
 
-def test_numba_that_is_asked_for_is_one_line(hidden, start):
-    process = start('-p', 'kernel:=numba', watch=False)
-    assert process.wait() != 0
-    (line,) = process.log.splitlines()
-    assert 'needs numba' in line and 'pip install numba' in line
-
-
-def test_other_kernels_are_refused(start):
-    process = start('-p', 'kernel:=fortran', watch=False)
-    assert process.wait() != 0
-    assert "kernel 'fortran' is not one of auto, numba, c" in process.log
-
-
-def test_c_that_is_asked_for_steps_the_network_beside_numba(stepped):
-    try:
-        _, watcher = stepped('-p', 'kernel:=c')
-        network = find_network('delayed')
-        assert kernel.kernels(network) is c_kernels(network)
-        assert np.ptp(watcher.record(2.0)[1], axis=0).max() > 0.4
-        assert watcher.get('kernel') == ['c']
-    finally:
-        choose('numba')
+@pytest.mark.parametrize('network', ['delayed', 'quadruped'])
+def test_without_feedback_numba_is_not_loaded(start, monkeypatch, tmp_path, network):
+    """From an empty cache on: orbits are solved for, judged and stepped in C."""
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
+    process, watcher = start('-p', f'network:={network}')
+    assert np.ptp(watcher.next_phases(20), axis=0).max() > 0.0
+    maps = Path(f'/proc/{process.pid}/maps').read_text()
+    assert 'pattern-' in maps and 'llvmlite' not in maps
+    assert list(tmp_path.rglob('*.so')) and not list(tmp_path.rglob('*.nbc'))

@@ -64,10 +64,10 @@ def plans(robot, network, gaits=()):
     return found
 
 
-def data_of(made, form='network', real='float64', tolerance=None, step=None):
+def data_of(made, form='network', real='float64', tolerance=None, step=None, steering=False):
     """Return the constants of plans."""
     return GaitData([replace(one, step=step) for one in made],
-                    CFormat(form, real, tolerance or TOLERANCES[real]))
+                    CFormat(form, real, tolerance or TOLERANCES[real], steering))
 
 
 def project_of(data, substep=0.001):

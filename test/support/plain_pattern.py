@@ -14,8 +14,9 @@
 
 """The tick of the pattern in plain Python and numpy, to compare the core in C with.
 
-A network is a Stepper, which numba's kernels step; nothing of the core is used. Without `drive`,
-`correct` and stalls where they are not given, a tick is that of Pattern.advance.
+A network is a Stepper, whose steps are compared with numba's elsewhere; nothing else of the core
+is used. Without `drive`, `correct` and stalls where they are not given, a tick is that of
+Pattern.advance.
 """
 
 import math

@@ -26,10 +26,8 @@ import hashlib
 import platform
 
 from cpg_ros.common.c_library import load
-from cpg_ros.common.errors import InputError, needed
-from cpg_ros.dynamics.integration import kernel
+from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.c_text import FOLDER, part
-from cpg_ros.dynamics.integration.compilation import COMPILED
 from cpg_ros.dynamics.integration.kernel import Kernels, Ring, Samples, System
 from cpg_ros.networks import equations as generated
 from cpg_ros.networks.equations import equations_of
@@ -37,8 +35,6 @@ from cpg_ros.networks.network import Network
 import numpy as np
 
 MOST_NODES = 2**15 - 1
-#: By which kernels are made: numba where it is installed, else C.
-KERNELS = ('auto', 'numba', 'c')
 
 
 def _sources(network: type[Network]) -> dict[str, str]:
@@ -128,27 +124,18 @@ def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Rin
 
 @cache
 def c_kernels(network: type[Network]) -> Kernels:
-    """Return a network's kernels in C, for ``integration.kernel.use``.
+    """Return a network's kernels in C, in place of those of numba.
 
     Raises:
         NoCompiler: they are not on disk, and there is no compiler, or it fails.
 
     """
     library, components = library_of(network), network.cells * network.variables
-    kind, last = _track_of(components), None
+    kind = _track_of(components)
 
     def set_slope(system: System, ring: Ring, head: int) -> None:
         for one in _split(system, ring, ring.x.shape[1] // components):
             library.set_slope(Lane(kind, *one).pointer, head)
-
-    def advance(system: System, ring: Ring, clock: np.ndarray, duration: float, out: np.ndarray
-                ) -> None:
-        nonlocal last
-        lane = last
-        # Of the same stepper as the last time, mostly: its addresses are known.
-        if lane is None or lane.system is not system or lane.ring is not ring:
-            last = lane = Lane(kind, system, ring)
-        library.advance(lane.pointer, clock.ctypes.data, duration, out.ctypes.data)
 
     def integrate(system: System, ring: Ring, head: int, steps: int, noise: float, seed: int,
                   record: Samples, row: int) -> int:
@@ -174,17 +161,4 @@ def c_kernels(network: type[Network]) -> Kernels:
                                             record.slopes[mine]), row)
         return end
 
-    return Kernels(set_slope, advance, integrate, integrate, integrate_many)
-
-
-def choose(wanted: str = 'auto') -> None:
-    """Let one of KERNELS make the kernels of this process from now on.
-
-    Raises:
-        MissingLibraryError: numba is asked for, and not installed.
-
-    """
-    if wanted == 'numba':
-        needed('numba')
-    in_c = wanted == 'c' or (wanted == 'auto' and not COMPILED)
-    kernel.use(c_kernels if in_c else kernel.numba_kernels)
+    return Kernels(set_slope, integrate, integrate_many)

@@ -14,10 +14,12 @@
 
 """How the numerical kernels are compiled, and the elementary functions they share.
 
-By numba; where that is missing they are plain Python, whose steps are made in C
-(integration.kernel), and which is too slow for feedback and simulation (see ``compiled``).
+By numba, which is loaded when the first of them runs: what the generator needs without feedback is
+C. Where numba is missing they are plain Python, which is too slow for feedback and simulation.
 """
 
+from contextlib import AbstractContextManager, nullcontext
+from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 import math
 
@@ -25,57 +27,65 @@ import numpy as np
 
 #: Whether kernels are machine code.
 COMPILED = find_spec('numba') is not None
-if COMPILED:
-    from cpg_ros.dynamics.integration.machine_code import (
-        cached_on_disk,
-        inline,
-        jit,
-        jit_entry,
-        on_compile,
-        prange,
-        specialised,
-    )
-else:
-    from cpg_ros.dynamics.integration.plain_code import (
-        cached_on_disk,
-        inline,
-        jit,
-        jit_entry,
-        on_compile,
-        prange,
-        specialised,
-    )
-
-__all__ = ['COMPILED', 'bound_by_first_call', 'cached_on_disk', 'exp', 'fetch', 'inline', 'jit',
-           'jit_entry', 'on_compile', 'prange', 'renamed', 'specialised', 'tanh']
 
 
-def bound_by_first_call(kernel):
-    """Return a kernel that is bound, see above, to arguments like those of its first call."""
-    code = None
-
-    def call(*arguments):
-        nonlocal code
-        if code is None:
-            code = specialised(kernel, *arguments)
-        return code(*arguments)
-    return call
+def _numba():
+    # It takes half a second and 60 MB.
+    from cpg_ros.dynamics.integration import machine_code
+    return machine_code
 
 
-def renamed(function, key: str):
-    """Give a function that is compiled once for each network a name of its own for this one.
+class Kernel:
+    """A function that numba compiles when it is first called, by Python or by another one."""
 
-    numba names machine code by the function's qualified name and a running number. Code that two
-    processes have put into the disk cache under one name is taken for the same when a third one
-    loads both: a network would run another's equations, on arrays of another length.
+    def __init__(self, function, decorator: str) -> None:
+        """Take a function, and the name of its decorator in machine_code."""
+        update_wrapper(self, function)
+        self.py_func, self._decorator = function, decorator
 
-    Args:
-        function: to be renamed.
-        key: of the network's equations.
+    @cached_property
+    def code(self):
+        """What numba makes of the function, or without numba the function."""
+        return getattr(_numba(), self._decorator)(self.py_func) if COMPILED else self.py_func
 
+    @property
+    def _numba_type_(self):
+        """What numba takes it for where another kernel calls it."""
+        return self.code._numba_type_
+
+    def __call__(self, *arguments):
+        """Return the function's result; not a number where plain Python has none."""
+        if COMPILED:
+            return self.code(*arguments)
+        try:
+            return self.py_func(*arguments)
+        except (ArithmeticError, ValueError):
+            return math.nan
+
+
+def jit(function):
+    """Compile a function that others call."""
+    return Kernel(function, 'jit')
+
+
+def jit_entry(function):
+    """Compile an entry point of the package, whose machine code is kept on disk."""
+    return Kernel(function, 'jit_entry')
+
+
+def specialised(kernel: Kernel, *arguments):
+    """Return a kernel's machine code for arguments like these, to be called as it is.
+
+    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
+    than a small kernel does. The machine code does not look: the arguments it is called with must
+    be of these types, arrays of these numbers of dimensions and orders in memory.
     """
-    function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
-    return function
+    return _numba().specialised(kernel.code, *arguments) if COMPILED else kernel
+
+
+def on_compile(compiling) -> AbstractContextManager:
+    """Call a function for each function that is not on disk yet, before it is compiled."""
+    return _numba().on_compile(compiling) if COMPILED else nullcontext()
 
 
 _LOG2E = 1.0 / math.log(2.0)

@@ -35,14 +35,6 @@ from types import FunctionType
 from typing import Any, NamedTuple
 
 from cpg_ros.common.errors import needed
-from cpg_ros.dynamics.integration.compilation import (
-    bound_by_first_call,
-    cached_on_disk,
-    inline,
-    jit,
-    prange,
-    renamed,
-)
 from cpg_ros.networks import equations as generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
@@ -105,22 +97,12 @@ def _field_code():
     return kernel_source
 
 
-def _compiled(decorate, network, alone=False):
-    """Compile the stepping of a network with a numba decorator.
-
-    Args:
-        decorate: numba's decorator.
-        network: to be stepped.
-        alone: a single lane, so that the loops over components have a known length.
-
-    Returns:
-        The functions past_state, restart and steps_of.
-
-    """
+def _compiled(numba, network):
+    """Return restart and steps_of of a network, compiled; numba is the module machine_code."""
     equations = equations_of(network)
 
     def own(function):
-        return decorate(renamed(function, equations.key))
+        return numba.jit(numba.renamed(function, equations.key))
 
     code = generated.load(equations.key, 'kernel',
                           lambda: _field_code().kernel_source(equations))
@@ -208,7 +190,7 @@ def _compiled(decorate, network, alone=False):
         """
         step, x, after, before = ring
         every, states, slopes = record
-        n = components if alone else x.shape[1]
+        n = x.shape[1]
         lanes = n // components
         past = np.empty(n)
         middle = np.zeros(driven_rows * n // variables)
@@ -257,53 +239,18 @@ def _compiled(decorate, network, alone=False):
             drive(n, past, system.p, lanes, work, driven)
         field(n, system, driven, ring.x[head], 0.0, ring.x[head], work, ring.after[head])
 
-    return past_state, restart, steps_of
+    return restart, steps_of
 
 
-# What the entry points below use of a network, which ``kernels`` puts in place of these.
-_past_state: Any = None
+# What the entry points below use, which ``numba_kernels`` puts in place of these.
+prange: Any = range
 _restart: Any = None
 _steps: Any = None
-_steps_of_one: Any = None
 
 
 def set_slope(system, ring, head):
     """Recompute the slope that leaves the head node, after parameters have changed."""
     _restart(system, ring, head)
-
-
-def advance(system, ring, clock, duration, out):
-    """Advance the output instant of one lane by duration and evaluate there.
-
-    clock is (head, ahead): the newest node and its distance beyond the output instant, in
-    [0, step). out receives x, x', x'' at that instant, shape (3, components).
-    """
-    step, x, after, before = ring
-    head = int(clock[0])
-    ahead = clock[1] - duration
-    if ahead < 0.0:
-        steps = math.ceil(-ahead / step)
-        nothing = np.empty((0, 0, 0))
-        # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
-        head = _steps(system, ring, head, steps, 0.0, Samples(1, nothing, nothing), 0)
-        ahead = max(0.0, ahead + steps * step)
-    clock[0] = head
-    clock[1] = ahead
-    start = head - 1 if head > 0 else x.shape[0] - 1
-    s = 1.0 - ahead / step
-    _past_state(x.shape[1], ring, head, ahead / step, 0, 1, out[0])
-    for i in range(x.shape[1]):
-        rise = (x[head, i] - x[start, i]) / step
-        out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
-                     + 6.0 * s * (1.0 - s) * rise + s * (3.0 * s - 2.0) * before[head, i])
-        out[2, i] = ((6.0 * s - 4.0) * after[start, i] + 6.0 * (1.0 - 2.0 * s) * rise
-                     + (6.0 * s - 2.0) * before[head, i]) / step
-
-
-def integrate_one(system, ring, head, steps, noise, seed, record, row):
-    """Return what integrate does for a single trajectory, in one piece, loops unrolled."""
-    np.random.seed(seed)
-    return _steps_of_one(system, ring, head, steps, noise, record, row)
 
 
 def integrate(system, ring, head, steps, noise, seed, record, row):
@@ -339,8 +286,6 @@ class Kernels:
     """
 
     set_slope: Callable[..., None]
-    advance: Callable[..., None]
-    integrate_one: Callable[..., int]
     integrate: Callable[..., int]
     integrate_many: Callable[..., int]
 
@@ -349,18 +294,15 @@ class Kernels:
 def numba_kernels(network: type[Network]) -> Kernels:
     """Return the compiled entry points of a kind of network, compiled when they are first used.
 
-    A trajectory by itself has code of its own, built in one piece, its loops unrolled; lanes run
-    through loops of any length in vector registers, which need functions of their own.
-
     Raises:
         MissingLibraryError: numba is not installed.
 
     """
     needed('numba')
-    _, _, steps_of_one = _compiled(inline, network, alone=True)
-    past_state, restart, steps = _compiled(jit, network)
-    names = {'_past_state': past_state, '_restart': restart, '_steps': steps,
-             '_steps_of_one': steps_of_one}
+    # What steps in C alone does not load numba.
+    from cpg_ros.dynamics.integration import machine_code as numba
+    restart, steps = _compiled(numba, network)
+    names = {'prange': numba.prange, '_restart': restart, '_steps': steps}
     key = equations_of(network).key
 
     def of_network(function, **options):
@@ -371,23 +313,8 @@ def numba_kernels(network: type[Network]) -> Kernels:
         """
         copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__)
         copy.__doc__ = function.__doc__
-        return bound_by_first_call(cached_on_disk(renamed(copy, key), generated.folder(key),
-                                                  **options))
+        return numba.bound_by_first_call(numba.cached_on_disk(
+            numba.renamed(copy, key), generated.folder(key), **options))
 
-    return Kernels(of_network(set_slope), of_network(advance), of_network(integrate_one),
-                   of_network(integrate), of_network(integrate_many, parallel=True))
-
-
-# What makes the kernels of this process.
-_maker: Callable[[type[Network]], Kernels] = numba_kernels
-
-
-def use(maker: Callable[[type[Network]], Kernels]) -> None:
-    """Set the kernel backend of this process."""
-    global _maker
-    _maker = maker
-
-
-def kernels(network: type[Network]) -> Kernels:
-    """Return the entry points of a kind of network, made when they are first used."""
-    return _maker(network)
+    return Kernels(of_network(set_slope), of_network(integrate),
+                   of_network(integrate_many, parallel=True))

@@ -25,15 +25,14 @@ from numba import config, njit, prange, typeof
 from numba.core import event
 from numba.core.caching import FunctionCache
 
-__all__ = ['cached_on_disk', 'inline', 'jit', 'jit_entry', 'on_compile', 'prange', 'specialised']
+__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'on_compile', 'prange',
+           'renamed', 'specialised']
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
-#: For what is built into its caller, where a loop of known length can be unrolled.
-inline = njit(inline='always', **OPTIONS)
 
 
 class _Disk(FunctionCache):
@@ -75,13 +74,36 @@ def jit_entry(function):
 
 
 def specialised(kernel, *arguments):
-    """Return a kernel's machine code for arguments like these, to be called as it is.
-
-    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
-    than a small kernel does. The machine code does not look: the arguments it is called with must
-    be of these types, arrays of these numbers of dimensions and orders in memory.
-    """
+    """Return a kernel's machine code for arguments like these."""
     return kernel.compile(tuple(typeof(argument) for argument in arguments))
+
+
+def bound_by_first_call(kernel):
+    """Return a kernel that is bound to arguments like those of its first call."""
+    code = None
+
+    def call(*arguments):
+        nonlocal code
+        if code is None:
+            code = specialised(kernel, *arguments)
+        return code(*arguments)
+    return call
+
+
+def renamed(function, key: str):
+    """Give a function that is compiled once for each network a name of its own for this one.
+
+    numba names machine code by the function's qualified name and a running number. Code that two
+    processes have put into the disk cache under one name is taken for the same when a third one
+    loads both: a network would run another's equations, on arrays of another length.
+
+    Args:
+        function: to be renamed.
+        key: of the network's equations.
+
+    """
+    function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
+    return function
 
 
 class _Notice(event.Listener):

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.dynamics.integration import kernel
-from cpg_ros.dynamics.integration.kernel import Ring, Samples, System
+from cpg_ros.dynamics.integration.c_kernel import c_kernels
+from cpg_ros.dynamics.integration.compilation import COMPILED
+from cpg_ros.dynamics.integration.kernel import Kernels, numba_kernels, Ring, Samples, System
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -32,8 +33,16 @@ History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
 
 #: Trajectories that advance together in vector registers.
 LANES = 8
+#: What makes the kernels of batches in this process: numba's have noise, and step lanes at once.
+_maker: Callable[[type[Network]], Kernels] = numba_kernels if COMPILED else c_kernels
 #: Work between two updates of the progress bar, in component steps.
 CHUNK = 20_000_000
+
+
+def use(maker: Callable[[type[Network]], Kernels]) -> None:
+    """Set what makes the kernels of this process: c_kernels are ready at once, without numba."""
+    global _maker
+    _maker = maker
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -197,7 +206,8 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     gain, basis = (0.0, np.zeros((1, components))) if lock is None else (
         float(lock[0]), lock[1].basis)
 
-    compiled = kernel.kernels(type(networks[0]))
+    # A single run takes as long in C, which compiles in a fraction of numba's time.
+    compiled = (c_kernels if batch == 1 and not noise else _maker)(type(networks[0]))
     head = nodes - 1
     systems = [System(one_p, one_tau, gain, basis)
                for one_p, one_tau in zip(flat_p, tau, strict=True)]
@@ -216,10 +226,8 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
             seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
-                alone = lanes == 1 and networks[0].variables == 1
-                one_block = compiled.integrate_one if alone else compiled.integrate
-                head = one_block(systems[0], rings[0], head, chunk, noise, seeds[0], record,
-                                 done + 1)
+                head = compiled.integrate(systems[0], rings[0], head, chunk, noise, seeds[0],
+                                          record, done + 1)
             else:
                 head = compiled.integrate_many(
                     System(flat_p, tau, gain, basis), Ring(step, *flat), head,

@@ -19,7 +19,7 @@ import copy
 import math
 
 from cpg_ros.common.errors import InputError
-from cpg_ros.dynamics.integration import kernel
+from cpg_ros.dynamics.integration.c_kernel import lane_of, library_of
 from cpg_ros.dynamics.integration.kernel import Ring, System
 from cpg_ros.dynamics.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
@@ -37,6 +37,7 @@ class Stepper:
         now: x, x', x'' at the output instant, shape (3, components), overwritten by ``advance``.
         system: the network as kernels take it, and its symmetry lock.
         ring: the history.
+        lane: both, as C takes them.
         clock: the newest node, and the model time from the output instant to it, shape (2,).
 
     """
@@ -91,13 +92,19 @@ class Stepper:
         if gain and symmetry is None:
             raise ValueError('a symmetry gain needs the symmetry class')
         self.network, self.gain, self.symmetry = network, gain, symmetry
-        self._kernels = kernel.kernels(type(network))
+        self._library = library_of(type(network))
         self._tau[0] = network.delay
         self.system = System(
             network.coefficients, self._tau, float(gain),
             np.zeros((1, network.components)) if symmetry is None else symmetry.basis)
         self.ring = Ring(self.step, self._x, self._after, self._before)
-        self._kernels.set_slope(self.system, self.ring, int(self.clock[0]))
+        self.lane = lane_of(type(network), self.system, self.ring)
+        self._addresses = self.clock.ctypes.data, self.now.ctypes.data
+        self._restart()
+
+    def _restart(self) -> None:
+        """Recompute the slope that leaves the newest node."""
+        self._library.set_slope(self.lane.pointer, int(self.clock[0]))
 
     def advance(self, duration: float) -> np.ndarray:
         """Advance by a duration in model time (0 or more).
@@ -106,7 +113,8 @@ class Stepper:
 
         The array returned is the same one every time.
         """
-        self._kernels.advance(self.system, self.ring, self.clock, duration, self.now)
+        clock, now = self._addresses
+        self._library.advance(self.lane.pointer, clock, duration, now)
         return self.now
 
     def copy(self) -> 'Stepper':
@@ -129,7 +137,7 @@ class Stepper:
     def disturb(self, offset: np.ndarray) -> None:
         """Add an offset, shape (components,), to the newest state; the history before it stays."""
         self._x[int(self.clock[0])] += offset
-        self._kernels.set_slope(self.system, self.ring, int(self.clock[0]))
+        self._restart()
 
     def superpose(self, motion: Callable[[np.ndarray], np.ndarray],
                   slope: Callable[[np.ndarray], np.ndarray]) -> None:
@@ -149,4 +157,4 @@ class Stepper:
         slopes = slope(times)
         self._after[oldest_first] += slopes
         self._before[oldest_first] += slopes
-        self._kernels.set_slope(self.system, self.ring, newest)
+        self._restart()

@@ -15,11 +15,16 @@
 """The compiled part of collocation: every interval's linear equations, and their chain.
 
 They are small and many. Gaussian elimination written out, with the right-hand sides as further
-columns, takes a fraction of the time of a call of LAPACK for each. Where numba is missing it is
-LAPACK nevertheless.
+columns, takes a fraction of the time of a call of LAPACK for each: it is C (``c/mesh.c``).
 """
 
-from cpg_ros.dynamics.integration.compilation import COMPILED, jit_entry
+import ctypes
+from functools import cache
+
+from cpg_ros.common.c_library import load
+from cpg_ros.dynamics.integration.c_kernel import version
+from cpg_ros.dynamics.integration.c_text import part
+from cpg_ros.networks import equations as generated
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
@@ -144,88 +149,28 @@ def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
     return np.array(sorted({*fixed, *free}))
 
 
-@jit_entry
-def _solved(a, lengths, jacobians, sources, answers):
-    """Fill answers as transfer has them; tell whether no pivot vanished."""
-    n, s, d = jacobians.shape[:3]
-    k = sources.shape[3]
-    size = s * d
-    width = size + d + k
-    work = np.empty((size, width))
-    inverse = np.empty(size)
-    for i in range(n):
-        for p in range(s):
-            for row in range(d):
-                line = work[p * d + row]
-                for q in range(s):
-                    factor = -lengths[i] * a[p, q]
-                    for c in range(d):
-                        line[q * d + c] = factor * jacobians[i, q, row, c]
-                line[p * d + row] += 1.0
-                for c in range(d):
-                    line[size + c] = 0.0
-                line[size + row] = 1.0
-                for c in range(k):
-                    line[size + d + c] = sources[i, p, row, c]
-        for column in range(size):
-            best = column
-            for row in range(column + 1, size):
-                if abs(work[row, column]) > abs(work[best, column]):
-                    best = row
-            # The comparison is false for NaN, too.
-            if not abs(work[best, column]) > 0.0:
-                return False
-            if best != column:
-                for c in range(column, width):
-                    work[column, c], work[best, c] = work[best, c], work[column, c]
-            inverse[column] = 1.0 / work[column, column]
-            above = work[column, column + 1:]
-            for row in range(column + 1, size):
-                factor = work[row, column] * inverse[column]
-                line = work[row, column + 1:]
-                for c in range(width - column - 1):
-                    line[c] -= factor * above[c]
-        for column in range(size - 1, -1, -1):
-            above = work[column, size:]
-            for c in range(d + k):
-                above[c] *= inverse[column]
-            for row in range(column):
-                factor = work[row, column]
-                line = work[row, size:]
-                for c in range(d + k):
-                    line[c] -= factor * above[c]
-        for p in range(s):
-            for row in range(d):
-                for c in range(d + k):
-                    answers[i, p, row, c] = work[p * d + row, size + c]
-    return True
+@cache
+def solver() -> ctypes.CDLL:
+    """Return the functions of ``c/mesh.c``.
+
+    Raises:
+        NoCompiler: they are not on disk, and there is no C compiler, or it fails.
+
+    """
+    library = load(generated.folder(), f'mesh-{version()}', lambda: {'mesh.c': part('mesh.c')},
+                   'the solver of orbits')
+    whole, array = ctypes.c_int, ctypes.c_void_p
+    library.mesh_transfer.argtypes = *[whole] * 4, *[array] * 6
+    library.mesh_sum.argtypes = *[whole] * 4, *[array] * 5
+    library.mesh_chain.argtypes = *[whole] * 3, *[array] * 2
+    library.mesh_round.argtypes = *[whole] * 2, *[array] * 4
+    return library
 
 
-@jit_entry
-def _summed(weights, lengths, jacobians, answers, steps):
-    """Add to steps what summed returns."""
-    n, s, d = jacobians.shape[:3]
-    for i in range(n):
-        for p in range(s):
-            for row in range(d):
-                for middle in range(d):
-                    factor = lengths[i] * weights[p] * jacobians[i, p, row, middle]
-                    for c in range(answers.shape[3]):
-                        steps[i, row, c] += factor * answers[i, p, middle, c]
-
-
-@jit_entry
-def _chained(steps, reached):
-    """Fill reached from its first row on."""
-    n, d, width = steps.shape
-    for i in range(n):
-        for row in range(d):
-            for c in range(width):
-                reached[i + 1, row, c] = steps[i, row, c] if c >= d else 0.0
-            for middle in range(d):
-                factor = steps[i, row, middle]
-                for c in range(width):
-                    reached[i + 1, row, c] += factor * reached[i, middle, c]
+def addresses(*arrays: np.ndarray) -> list[int]:
+    """Return where arrays are in memory, all of which are C-contiguous and of floats."""
+    assert all(array.flags.c_contiguous and array.dtype == float for array in arrays)
+    return [array.ctypes.data for array in arrays]
 
 
 def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) -> np.ndarray:
@@ -243,27 +188,20 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
         LinAlgError: an interval's equations are singular.
 
     """
-    n, s, d = jacobians.shape[:3]
-    if not COMPILED:
-        matrices = np.eye(s * d) - np.einsum('i,pq,iqrc->iprqc', lengths, A, jacobians
-                                             ).reshape(n, s * d, s * d)
-        ones = np.broadcast_to(np.tile(np.eye(d), (s, 1)), (n, s * d, d))
-        sides = np.concatenate([ones, sources.reshape(n, s * d, -1)], axis=2)
-        return np.linalg.solve(matrices, sides).reshape(n, s, d, -1)
-    answers = np.empty((n, s, d, d + sources.shape[-1]))
-    if not _solved(A, lengths, np.ascontiguousarray(jacobians),
-                   np.ascontiguousarray(sources), answers):
+    n, s, d, k = sources.shape
+    answers, work = np.empty((n, s, d, d + k)), np.empty((s * d, s * d + d + k))
+    given = [np.ascontiguousarray(one) for one in (A, lengths, jacobians, sources)]
+    if not solver().mesh_transfer(n, s, d, k, *addresses(*given, work, answers)):
         raise np.linalg.LinAlgError('an interval is singular')
     return answers
 
 
 def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
     """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
-    if not COMPILED:
-        weights = np.multiply.outer(lengths, WEIGHTS)[..., None, None]
-        return (weights * jacobians @ answers).sum(axis=1)
-    steps = np.zeros((jacobians.shape[0], jacobians.shape[2], answers.shape[-1]))
-    _summed(WEIGHTS, lengths, np.ascontiguousarray(jacobians), answers, steps)
+    n, s, d, k = answers.shape
+    steps = np.zeros((n, d, k))
+    given = [np.ascontiguousarray(one) for one in (lengths, jacobians, answers)]
+    solver().mesh_sum(n, s, d, k, *addresses(WEIGHTS, *given, steps))
     return steps
 
 
@@ -277,10 +215,6 @@ def chained(steps: np.ndarray) -> np.ndarray:
     n, d, width = steps.shape
     reached = np.zeros((n + 1, d, width))
     reached[0, :, :d] = np.eye(d)
-    if COMPILED:
-        _chained(steps, reached)
-        return reached
-    for i in range(n):
-        reached[i + 1] = steps[i, :, :d] @ reached[i]
-        reached[i + 1, :, d:] += steps[i, :, d:]
+    steps = np.ascontiguousarray(steps)
+    solver().mesh_chain(n, d, width, *addresses(steps, reached))
     return reached

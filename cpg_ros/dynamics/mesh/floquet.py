@@ -29,10 +29,9 @@ from functools import lru_cache
 from itertools import pairwise
 
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.integration.compilation import COMPILED, jit_entry
 from cpg_ros.dynamics.isotypic import split
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.collocation import chained, summed, transfer
+from cpg_ros.dynamics.mesh.collocation import addresses, chained, solver, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import evaluate, MeshOrbit, MOST_INTERVALS, path_of, Reduced
 from cpg_ros.dynamics.mesh.solve import kinks
 from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
@@ -115,59 +114,6 @@ ALIKE = 1e4
 ROUNDS = 40
 
 
-@jit_entry
-def _round(factors, columns, whole):
-    """Take the columns through all factors; whole becomes the product of what is triangular.
-
-    Gram and Schmidt's method twice over, which loses no orthogonality.
-    """
-    d = columns.shape[0]
-    moved = np.empty((d, d))
-    upper = np.empty((d, d))
-    before = np.empty((d, d))
-    for k in range(factors.shape[0]):
-        for j in range(d):
-            for i in range(d):
-                total = 0.0
-                for middle in range(d):
-                    total += factors[k, i, middle] * columns[middle, j]
-                moved[i, j] = total
-        upper[:] = 0.0
-        for j in range(d):
-            for _ in range(2):
-                for column in range(j):
-                    along = 0.0
-                    for i in range(d):
-                        along += moved[i, column] * moved[i, j]
-                    upper[column, j] += along
-                    for i in range(d):
-                        moved[i, j] -= along * moved[i, column]
-            size = 0.0
-            for i in range(d):
-                size += moved[i, j]**2
-            size = np.sqrt(size)
-            upper[j, j] = size
-            for i in range(d):
-                moved[i, j] /= size
-        columns[:] = moved
-        before[:] = whole
-        for i in range(d):
-            for j in range(i, d):
-                total = 0.0
-                for middle in range(i, j + 1):
-                    total += upper[i, middle] * before[middle, j]
-                whole[i, j] = total
-
-
-def _round_by_lapack(factors: np.ndarray, columns: np.ndarray, whole: np.ndarray) -> None:
-    """Do what _round does, where numba is missing."""
-    for factor in factors:
-        columns[:], upper = np.linalg.qr(factor @ columns)
-        signs = np.sign(np.diag(upper))
-        columns *= signs
-        whole[:] = signs[:, np.newaxis] * upper @ whole
-
-
 def eigenvalues(factors: np.ndarray) -> np.ndarray:
     """Return the eigenvalues of ``F_n ... F_2 F_1``.
 
@@ -180,10 +126,11 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
     """
     factors, d = np.ascontiguousarray(factors), factors.shape[-1]
     # Any columns do that lie in no space of their own.
-    columns = np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0]
+    columns = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0])
+    work = np.empty((3, d, d))
     for _ in range(ROUNDS):
         start, whole = columns.copy(), np.eye(d)
-        (_round if COMPILED else _round_by_lapack)(factors, columns, whole)
+        solver().mesh_round(len(factors), d, *addresses(factors, columns, whole, work))
         back = start.T @ columns
         if not np.isfinite(back).all():
             return np.full(d, np.nan, dtype=complex)

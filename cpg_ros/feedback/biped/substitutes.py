@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Substitutes for measurements of a biped that do not arrive, for as long as it needs to stop.
+"""What a biped takes for a measurement that does not arrive, for as long as it needs to stop.
 
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
 the inertial unit: it is level and still, so the joints say how the base leans and turns. Loads on
@@ -29,15 +29,13 @@ import numpy as np
 
 #: Inputs in the order of their ages.
 IMU, JOINTS, FEET = range(3)
-#: EXTRAPOLATED: age, s, up to which a measurement is extrapolated by its rate; later it is
-#: replaced.
+#: Measurements this old go on as their rates say, s; older ones are replaced.
 EXTRAPOLATED = 0.05
-#: FOLLOWED: rate at which a predicted sole approaches its path, 1/s; DAMPED: damping of the least
-#: squares that give the rates of the joints.
+#: Rate at which a predicted sole approaches its path, 1/s, and damping of the prediction's rates.
 FOLLOWED, DAMPED = 20.0, 1e-3
-#: FASTEST: largest rate of a predicted joint, rad/s.
+#: Largest rate of a predicted joint, rad/s.
 FASTEST = 15.0
-#: ADOPTED: duration of the transition to orientation and angular velocity from the sole, s.
+#: Time in which orientation and angular velocity of the sole's come to be used, s.
 ADOPTED = 0.02
 
 
@@ -63,7 +61,7 @@ class Substitutes:
 
     def fill(self, measured: SensorData, ages: np.ndarray, memory: BipedMemory, dt: float
              ) -> SensorData:
-        """Return the present measurements, with substitutes for those that are late.
+        """Return the measurements of now.
 
         Args:
             measured: the last valid ones.
@@ -85,7 +83,7 @@ class Substitutes:
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
         if late[IMU] and late[JOINTS]:
-            # Neither input tells how the base turns: let its angular velocity fade.
+            # Nothing says how the base turns.
             sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
         if ages[FEET] > EXTRAPOLATED:
             weight = GRAVITY * memory.pose.carried[0]
@@ -93,7 +91,7 @@ class Substitutes:
         return sensors
 
     def _move(self, memory: BipedMemory, dt: float) -> None:
-        """Predict the joints of the legs dt in s later."""
+        """Let the joints of the legs go on from where they were for dt in s."""
         pose, rates = memory.pose, self.sensors.joint_velocities[0]
         rates[:] = 0.0
         for leg, chain in enumerate(self._links.chains):
@@ -110,7 +108,7 @@ class Substitutes:
         self.sensors.joint_positions[0] = self._angles
 
     def _turn(self, measured: SensorData, time: float) -> None:
-        """Extrapolate the orientation by the angular velocity for a time in s."""
+        """Let the orientation go on with the angular velocity for a time in s."""
         roll, pitch, _ = measured.rpy[0]
         x, y, z = measured.angular_velocity[0]
         c, s, cosine = np.cos(roll), np.sin(roll), max(np.cos(pitch), 0.1)
@@ -118,7 +116,7 @@ class Substitutes:
         self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
 
     def _lean_on_sole(self, memory: BipedMemory, fraction: float) -> None:
-        """Set lean and rates of the base from the joints of the leg that bears more."""
+        """Take the base to lean and turn as the joints of the leg that bears more say."""
         sensors, pose = self.sensors, self._pose
         self._kinematics(self._links, self._still, sensors.joint_positions[0],
                          (self._still, sensors.joint_velocities[0]), pose, self._center,

@@ -87,9 +87,13 @@ class CProject:
             track += self._field.parameters + 3 + (2 * self.nodes + 2) * components
             if self.data.network.readout != 'waveform':
                 track += 6 * self.data.network.cells
+        steers = self.data.format.steering
         size = 4 if self.data.format.real == 'float32' else 8
-        # The number of a ramp's parts, and that of a track's gait, take as much as a number each.
-        return 4 + joints + size * (3 * joints + 17 + self.tracks * (track + 1))
+        # The number of a ramp's parts, that of a track's gait, the flag of what steers and a
+        # track's pointer to it take as much as a number each.
+        track += 1 + steers * (1 + joints)
+        return 4 + joints + size * (3 * joints + 17 + steers * (3 * legs + 4)
+                                    + self.tracks * track)
 
     def _sizes(self) -> dict[str, object]:
         data, robot, network = self.data, self.data.robot, self.data.network
@@ -112,6 +116,8 @@ class CProject:
                 'CPG_WEIGHTS': data.weights, 'CPG_MAPS': len(robot.joints)}
             if data.retimed:
                 values['CPG_RETIMED'] = ''
+            if data.format.steering:
+                values['CPG_STEERING'] = ''
             readout = data.plans[0].readout
             if isinstance(readout, PhaseReadout):
                 values |= {'CPG_PHASE_READOUT': '',
@@ -141,8 +147,9 @@ class CProject:
             return 'common', 'table_track', 'pattern', 'control'
         readout = (('observe', 'waveform') if self.data.network.readout == 'waveform' else
                    ('phase',))
+        steering = ('steering',) if self.data.format.steering else ()
         return ('common', 'kink', 'network', 'seed', 'joints', *readout, 'network_track',
-                'pattern', 'control')
+                *steering, 'pattern', 'control')
 
     def _source(self) -> str:
         texts = [part(f'{name}.c') for name in self.parts]
@@ -223,7 +230,7 @@ for (;;) {{                          /* {rate:g} times a second */
     cpg_advance(&c{dt});
     /* {result}: {joints} ... */
 }}
-{switch}cpg_enable(&c, 0, {ramp});          /* down to the stand */
+{switch}{steer}cpg_enable(&c, 0, {ramp});          /* down to the stand */
 ```
 
 Call all functions from one thread, or interrupt. There is no watchdog: a state that leaves the
@@ -264,7 +271,9 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
         result='c.position[joint] in 2^-13 rad' if fixed else
         'c.position[joint] in rad and c.velocity[joint] in rad/s',
         joints=comment(', '.join(joint.name for joint in data.robot.joints[:3])),
-        switch=f'{switch}   /* cross-fade in 1 s */\n' if switch else '')
+        switch=f'{switch}   /* cross-fade in 1 s */\n' if switch else '',
+        steer='cpg_steer(&c, strides, pace);   /* each leg, -1 to 1; the pace, 0 to 2 */\n'
+        if data.format.steering else '')
 
 
 # Gaits as skill arrays of Petoi's OpenCat: one cycle in frames of whole degrees.

@@ -28,7 +28,8 @@ import sys
 from cpg_ros.common.command_line import note, number, Parser, refuse_repeated, run, say, table
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.dynamics.integration.c_kernel import choose
+from cpg_ros.dynamics.integration.c_kernel import c_kernels
+from cpg_ros.dynamics.integration.simulate import use
 from cpg_ros.motion.export.c_project import CProject, readme, skills, SUBSTEP
 from cpg_ros.motion.export.fixed_point import FixedData, FixedProject
 from cpg_ros.motion.export.gait_data import CFormat, GaitData
@@ -68,6 +69,8 @@ def _parser() -> Parser:
     parser.add_argument('--real', choices=('float32', 'float64', 'fixed'), default='float32',
                         help='type of all numbers; fixed, with --form table, has whole numbers '
                         'for processors of 8 bits (default: %(default)s)')
+    parser.add_argument('--steering', action='store_true', help='strides and pace can be changed: '
+                        'for --form network')
     parser.add_argument('--step', type=number, metavar='T', help="model time per step (default: "
                         "the network's own); a longer one saves time and, with a delay, memory")
     parser.add_argument('--substep', type=number, metavar='S',
@@ -97,10 +100,13 @@ def _refuse_options(args: argparse.Namespace) -> None:
                              f'{high:g}')
     if args.target == 'petoi':
         for option, usual in (('form', 'network'), ('real', 'float32'), ('step', None),
-                              ('substep', None), ('rate', None), ('tolerance', None)):
+                              ('substep', None), ('rate', None), ('tolerance', None),
+                              ('steering', False)):
             if getattr(args, option) != usual:
                 raise InputError(f'argument --{option}: not for --target petoi, which has frames '
                                  'of whole degrees')
+    elif args.steering and args.form != 'network':
+        raise InputError('argument --steering: needs --form network')
     elif args.real == 'fixed':
         if args.form != 'table':
             raise InputError('argument --real: fixed needs --form table')
@@ -159,13 +165,13 @@ def _project(args: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CProj
         rate = args.rate or 50.0
         return FixedProject(FixedData(plans, rate), title), rate
     tolerance = args.tolerance or TOLERANCES[args.real]
-    data = GaitData(plans, CFormat(args.form, args.real, tolerance))
+    data = GaitData(plans, CFormat(args.form, args.real, tolerance, args.steering))
     return CProject(data, title, args.substep or SUBSTEP), args.rate or 1000.0
 
 
 def _export(args: argparse.Namespace) -> int:
     _refuse_options(args)
-    choose()
+    use(c_kernels)
     plans = _plans(args)
     if args.target == 'petoi':
         _write(args.out, {'petoi_skills.h': skills(plans, _title(plans))})

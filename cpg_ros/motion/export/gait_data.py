@@ -46,12 +46,14 @@ class CFormat:
         form: ``network``, or ``table`` for their orbits alone.
         real: ``float32`` or ``float64``.
         tolerance: by which tables may differ from what they are of, over its half range.
+        steering: whether strides and pace can be changed.
 
     """
 
     form: str = 'network'
     real: str = 'float32'
     tolerance: float = 1e-4
+    steering: bool = False
 
 
 def c_name(name: str) -> str:
@@ -168,8 +170,10 @@ class GaitData:
         """Take gaits whose plans are of one robot and one network."""
         self.plans, self.format = plans, c_format
         self.network, self.robot = plans[0].orbit.network, plans[0].robot
-        used = np.flatnonzero(np.any([plan.readout.joints.weights.any(axis=0) for plan in plans],
-                                     axis=0))
+        weights = [plan.readout.joints.weights for plan in plans]
+        if c_format.steering:
+            weights += [plan.in_place.joints.weights for plan in plans]
+        used = np.flatnonzero(np.concatenate(weights).any(axis=0))
         highest = int(used.max()) + 1 if used.size else 1
         #: Readout weights of a joint that are exported, and whether phases are retimed.
         self.weights = next(order for order in WEIGHTS if order >= highest)
@@ -231,6 +235,8 @@ class GaitData:
         one.put('phase', orbit.phases)
         one.put('wave', orbit.waves)
         one.put('weights', plan.readout.joints.weights[:, :self.weights])
+        if self.format.steering:
+            one.put('in_place', plan.in_place.joints.weights[:, :self.weights])
         maps = self.maps(plan)
         if self.retimed:
             one.put('maps', np.tile([1.0, 0.0, 0.0], (len(self.robot.joints), 1))
@@ -298,6 +304,9 @@ class GaitData:
                   'CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS] = '
                   f'{braces([robot.column(key) for key in LIMITS], real)};']
         if self.format.form == 'network':
+            if self.format.steering:
+                legs = braces(robot.leg_of_joint, real)
+                lines.append(f'CPG_ROM uint8_t cpg_joint_leg[CPG_JOINTS] = {legs};')
             lines += [f'CPG_ROM uint8_t cpg_joint_cell[CPG_JOINTS] = {braces(robot.cells, real)};',
                       f'CPG_ROM uint8_t cpg_leg_cell[CPG_LEGS] = {braces(robot.leg_cells, real)};']
         return '\n'.join([*lines, ''])

@@ -23,6 +23,7 @@ from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.export.gait_data import GaitData
 from cpg_ros.motion.pattern import Pattern, SUBSTEP
 from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.strides import StrideCommand
 import numpy as np
 
 STEPS, EVERY_STEP = 400, 40
@@ -40,6 +41,8 @@ class Golden(ShortRepr):
         states: of the network every EVERY_STEP steps from there, shape (n, components).
         dt: of a tick, s.
         events: tick -> gait to switch to from then on; -1 ramps to the stand.
+        strides: each event's strides of the legs, then the pace, shape (events, legs + 1); None
+            without steering.
         every: ticks from one sample to the next.
         positions: of the joints after each so many ticks, rad, shape (n, joints).
         network_tolerance: of the states.
@@ -51,6 +54,7 @@ class Golden(ShortRepr):
     states: np.ndarray
     dt: float
     events: dict[int, int]
+    strides: np.ndarray | None
     every: int
     positions: np.ndarray
     network_tolerance: float
@@ -88,12 +92,16 @@ def schedule(gaits: int, dt: float) -> dict[int, int]:
 
 
 def run_pattern(plans: Sequence[GaitPlan], dt: float, events: dict[int, int],
-                substep: float = SUBSTEP) -> np.ndarray:
+                strides: np.ndarray | None, substep: float = SUBSTEP) -> np.ndarray:
     """Return the joints' positions after each tick, rad, shape (ticks, joints)."""
-    pattern, found = Pattern(plans[0], RAMP), []
-    pattern.substep = substep
+    drive = None if strides is None else StrideCommand(len(plans[0].robot.legs))
+    pattern, found = Pattern(plans[0], RAMP, drive=drive), []
+    pattern.substep, steered = substep, iter(() if strides is None else strides)
     for tick in range(max(events) + round(1.5 * RAMP / dt)):
         event = events.get(tick)
+        if event is not None and drive is not None:
+            *stride, pace = next(steered)
+            pattern.steer(np.array(stride), pace)
         if event == -1:
             pattern.enable(False, RAMP)
         elif event is not None:
@@ -117,14 +125,20 @@ def golden_of(data: GaitData, dt: float, substep: float = SUBSTEP) -> Golden:
     start, states = network_states(plans[0])
     events = schedule(len(plans), dt)
     every = max(1, round(0.1 / dt))
-    positions = run_pattern(plans, dt, events, substep)[every - 1::every]
+    strides = None
+    if data.format.steering:
+        draws, legs = np.random.default_rng(SEED), len(data.robot.legs)
+        # Numbers that both types have.
+        strides = np.round(draws.uniform([-1.0] * legs + [0.5], [1.0] * (legs + 1),
+                                         (len(events), legs + 1)) * 64.0) / 64.0
+    positions = run_pattern(plans, dt, events, strides, substep)[every - 1::every]
     exact = data.format.real == 'float64' and data.format.form == 'network'
     # Of float32 what a coarser table leaves, too. Where the pattern slows, each part of a tick
     # follows from the last one: the longer they are, the more of a rounding is left in the phase.
     tolerance = (1e-5 if exact else 1e-3) + 10.0 * data.format.tolerance
     if not exact and substep > SUBSTEP:
         tolerance += 0.75 * substep
-    return Golden(start, states, dt, events, every, positions,
+    return Golden(start, states, dt, events, strides, every, positions,
                   0.0 if data.format.form == 'table' else 1e-11 if exact else 1e-4,
                   tolerance)
 
@@ -156,13 +170,13 @@ static int pattern(void)
     static cpg c;
     static const int ticks[@EVENTS@] = @TICKS@;
     static const int gaits[@EVENTS@] = @GAITS@;
-    static const @TYPE@ positions[@SAMPLES@][CPG_JOINTS] = @POSITIONS@;
+@STRIDES@    static const @TYPE@ positions[@SAMPLES@][CPG_JOINTS] = @POSITIONS@;
     double worst = 0.0;
     int event = 0;
     cpg_start(&c, 0, @TIME@(@RAMP@));
     for (int tick = 0; tick < @SAMPLES@ * @EVERY@; tick++) {
         if (event < @EVENTS@ && ticks[event] == tick) {
-            if (gaits[event] < 0) {
+@STEER@            if (gaits[event] < 0) {
                 cpg_enable(&c, 0, @TIME@(@RAMP@));
             } else {
                 cpg_switch(&c, (uint8_t)gaits[event], @TIME@(@TRANSITION@));
@@ -198,6 +212,11 @@ def golden_test(golden: Golden, real: str, title: str) -> str:
             + (NETWORK_TEST if both else '') + TEST)
     events = golden.events
     for key, value in (
+            ('STRIDES', '' if golden.strides is None else
+             '    static const cpg_real strides[@EVENTS@][CPG_LEGS + 1] = '
+             f'{braces(golden.strides, real)};\n'),
+            ('STEER', '' if golden.strides is None else
+             '            cpg_steer(&c, strides[event], strides[event][CPG_LEGS]);\n'),
             ('START', braces(golden.start, real)), ('STATES', len(golden.states)),
             ('STATE_ROWS', braces(golden.states, real)), ('EVERY_STEP', EVERY_STEP),
             ('NETWORK_TOLERANCE', f'{golden.network_tolerance:g}'), ('EVENTS', len(events)),

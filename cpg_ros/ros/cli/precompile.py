@@ -14,9 +14,9 @@
 
 """Compile what the first start of a generator would otherwise wait for.
 
-``make build`` runs it once for each installation: the networks of the shipped robots with two and
-four legs, and the feedback of either. Whatever is not done in time is compiled when it is first
-used.
+``make build`` runs it once for each installation: the networks in C, and the feedback of robots
+with points and with soles for feet by numba. Whatever is not done in time is compiled when it is
+first used.
 """
 
 from collections.abc import Sequence
@@ -26,25 +26,25 @@ import sys
 import time
 
 from cpg_ros.common.command_line import say
-from cpg_ros.dynamics.integration.c_kernel import choose
 from cpg_ros.dynamics.integration.compilation import COMPILED
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.feedback import warm_up, warm_up_judges
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.motion.phase_readout import precompile
+from cpg_ros.motion.core import precompile
 from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.registry import NETWORKS
 
+#: The networks of the shipped robots.
+SHIPPED = (*NETWORKS, 'delayed6')
 #: What is compiled, those that the demonstration needs first, and the longest it may take, s.
-PARTS, LIMIT = (('delayed', 'feedback', 'quadruped', 'biped', 'balance') if COMPILED else
-                ('delayed', 'quadruped', 'biped')), 85.0
+PARTS, LIMIT = ('networks', *(('feedback', 'balance') if COMPILED else ())), 85.0
 #: Of the feedback and of a biped's: their kernels are the same for every robot with such legs.
 ROBOT, BIPED = 'unitree_go2', 'humanoid'
 
 
 def compile_part(part: str) -> None:
-    """Compile or load the kernels of a network, of the feedback, or those that balance a biped."""
-    choose()
+    """Compile or load what runs a network or all, the feedback, or what balances a biped."""
     if part == 'feedback':
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
@@ -54,7 +54,8 @@ def compile_part(part: str) -> None:
         # The first tick compiles.
         biped.advance(SensorData.zeros(1, len(biped.robot.legs), len(biped.order)), 1e-3)
     else:
-        precompile(part)
+        for network in SHIPPED if part == 'networks' else [part]:
+            precompile(network)
 
 
 def compile_parts(parts: Sequence[str]) -> None:

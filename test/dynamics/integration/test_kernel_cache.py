@@ -30,25 +30,24 @@ from depth import in_depth
 from graph import EXECUTABLE, Process
 import pytest
 
-WARM = 'from cpg_ros.motion.phase_readout import precompile; precompile({network!r})'
 STEP = """
 import numpy as np
-from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.networks.registry import PRESETS
 network = next(iter(PRESETS[{network!r}].values())).network
-Stepper(network, np.zeros(network.components)).advance(0.1)
+simulate(network, np.zeros((2, network.components)), network.step, network.step)
 """
 CHECK = """
 import numpy as np
-from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.networks.registry import PRESETS
 for name in {names}:
     network = next(iter(PRESETS[name].values())).network
     start = 0.1 * np.arange(network.components) % 0.7
-    stepper = Stepper(network, start)
-    state, slope, _ = stepper.advance(3.0 * network.step)
-    assert np.abs(state - start).max() > 1e-4, name
-    assert np.allclose(slope, network.rates(state), atol=1e-12), name
+    run = simulate(network, [start, start], 3.0 * network.step, network.step)
+    x, slope = run.x[1, -1], run.slopes[1, -1]
+    assert np.abs(x - start).max() > 1e-4, name
+    assert np.allclose(slope, network.rates(x), atol=1e-12), name
 print('agree')
 """
 
@@ -64,7 +63,7 @@ def test_networks_compiled_apart_keep_their_own_code(tmp_path):
     # numba told them apart by a number that is the same in either process: one network's loop ran
     # on the other's arrays. They start together, as nodes of one launch file do.
     given, names = environment(NUMBA_CACHE_DIR=str(tmp_path)), ('quadruped', 'biped', 'quadruped')
-    together = [subprocess.Popen([sys.executable, '-c', WARM.format(network=network)], env=given)
+    together = [subprocess.Popen([sys.executable, '-c', STEP.format(network=network)], env=given)
                 for network in names]
     assert [one.wait() for one in together] == [0, 0, 0]
     before = sorted(tmp_path.rglob('*.nbc'))
@@ -145,10 +144,11 @@ def test_a_changed_source_is_generated_and_compiled_again(copied):
 
 OWN = """
 import numpy as np
-from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.dynamics.integration.simulate import simulate
 import one
 from own import TwoLegs
-state, slope, _ = Stepper(TwoLegs(1.0, 2.0, 0.1), np.array([1.0, 0.5, 0.0, 0.0])).advance(0.01)
+run = simulate(TwoLegs(1.0, 2.0, 0.1), 2 * [np.array([1.0, 0.5, 0.0, 0.0])], 0.01)
+state, slope = run.x[1, -1], run.slopes[1, -1]
 # Of x of the first leg, whose square rate is 1 - x^2 - y^2.
 x, y = state[0], state[2]
 print(np.round((slope[0] + 2.0 * y - 0.1 * state[1]) / x / (1.0 - x ** 2 - y ** 2), 9))
@@ -190,7 +190,7 @@ def test_what_compiled_code_takes_from_other_files_is_watched():
                 used = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
                 seen |= {imported[name] for name in used & set(imported)
                          if imported[name].startswith('cpg_ros.')}
-    assert 'cpg_ros.motion.strides' in seen
+    assert {'cpg_ros.feedback.kinematics', 'cpg_ros.dynamics.integration.compilation'} & seen
     assert {'.'.join(module.split('.')[:2]) for module in seen} <= watched
 
 
@@ -313,7 +313,7 @@ import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
 """
 #: Code that compiles, and a size, in bytes, within which some of its files have room.
-COMPILING = {'one': ('import one', 3000), 'network': (WARM.format(network='delayed'), 20_000)}
+COMPILING = {'one': ('import one', 3000), 'network': (STEP.format(network='delayed'), 20_000)}
 
 
 @pytest.mark.parametrize('compiled', ['one', *in_depth('network')])

@@ -21,9 +21,9 @@ from c_export import needs_gcc
 from cpg_ros.common import c_library
 from cpg_ros.common.c_library import NoCompiler
 from cpg_ros.common.errors import CpgError
-from cpg_ros.dynamics.integration import kernel
-from cpg_ros.dynamics.integration.c_kernel import c_kernels, choose
-from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.integration.c_kernel import c_kernels
+from cpg_ros.dynamics.integration.kernel import numba_kernels, Samples
+from cpg_ros.dynamics.integration.simulate import simulate, use
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.motion.pattern import Pattern
@@ -38,45 +38,43 @@ SEED = 3535
 
 
 @pytest.fixture
-def args():
-    """Choose what makes the kernels; numba does again at the end."""
-    yield choose
-    choose('numba')
+def made_by():
+    """Choose what makes the kernels of simulations; numba does again at the end."""
+    yield use
+    use(numba_kernels)
+
+
+NOTHING = Samples(1, *np.empty((2, 0, 0, 0)))
 
 
 @needs_gcc
 @pytest.mark.parametrize('network', ['delayed', 'biped', 'hopf',
                                      *in_depth('quadruped', 'matsuoka', 'phase', 'delayed6')])
-def test_each_step_is_the_one_of_numba(network, args):
+def test_each_step_is_the_one_of_numba(network):
     """From the same history, with changes of the delay and of the lock in it."""
-    draws, worst = np.random.default_rng(SEED), 0.0
+    draws, numba = np.random.default_rng(SEED), numba_kernels(find_network(network))
     for preset in find_network(network).presets().values():
         own, symmetry = preset.network, preset.network.symmetry(preset.gait)
-        args('numba')
         one = Stepper(own, 0.3 * draws.uniform(-1.0, 1.0, own.components),
                       max_delay=2.0 * max(own.delay, own.step))
-        for tick in range(60):
-            if tick % 20 == 10:
+        for step in range(60):
+            if step % 20 == 10:
                 longer = {own.delay_parameter: own.delay * draws.uniform(1.0, 2.0)} \
                     if own.delay else {}
-                args('numba')
                 one.set(own.replace(**longer), draws.uniform(0.0, 2.0), symmetry)
-            args('c')
             other = one.copy()
-            duration = own.step * draws.uniform(0.1, 1.0)
-            assert one.ahead == other.ahead
-            found, wanted = other.advance(duration).copy(), one.advance(duration)
-            scale = np.abs(wanted).max(axis=1, keepdims=True)
-            worst = max(worst, (np.abs(found - wanted) / scale)[0].max())
-            assert np.abs(found[0] - wanted[0]).max() < 1e-12
-            assert np.abs(found[1:] - wanted[1:]).max() < 1e-10 * scale.max()
-            assert np.abs(other.newest() - one.newest()).max() < 1e-12
-    print(f'\n| {network} | {worst:.1e} |')
+            head = int(other.clock[0])
+            numba.set_slope(other.system, other.ring, head)
+            head = numba.integrate(other.system, other.ring, head, 1, 0.0, np.uint64(0), NOTHING,
+                                   0)
+            one.advance(own.step)
+            assert int(one.clock[0]) == head
+            assert np.abs(one.newest() - other.ring.x[head]).max() < 1e-12
 
 
 @needs_gcc
 @pytest.mark.parametrize('network', ['delayed', 'hopf'])
-def test_batches_are_those_of_numba(network, args):
+def test_batches_are_those_of_numba(network, made_by):
     """More than one block of lanes, each with a history and a delay of its own."""
     own = find_network(network).presets()['walk'].network
     draws = np.random.default_rng(SEED)
@@ -85,8 +83,8 @@ def test_batches_are_those_of_numba(network, args):
     starts = 0.1 * draws.uniform(-1.0, 1.0, (11, own.components))
     lock = 0.5, own.symmetry('walk')
     found = []
-    for wanted in ('numba', 'c'):
-        args(wanted)
+    for maker in (numba_kernels, c_kernels):
+        made_by(maker)
         found.append(simulate(networks, starts, 60 * own.step, own.step, lock=lock, every=3))
         found.append(simulate(own, starts[0], 60 * own.step, own.step))
     for one, other in zip(found[:2], found[2:], strict=True):
@@ -106,11 +104,9 @@ def test_a_compiler_that_is_missing_or_fails_is_one_line(monkeypatch, tmp_path):
                            (broken, 'cannot make the kernels .* no disk')):
         monkeypatch.setenv('CC', str(compiler))
         found = without_numba("""
-from cpg_ros.dynamics.integration.c_kernel import choose
 from cpg_ros.networks.registry import find_network
 from cpg_ros.dynamics.integration.stepper import Stepper
 import sys
-choose()
 network = find_network('delayed').presets()['trot'].network
 try:
     Stepper(network, [0.1] * network.components)
@@ -140,12 +136,10 @@ def without_numba(text, *arguments):
 
 WALK = """
 from cpg_ros.common.errors import CpgError
-from cpg_ros.dynamics.integration.c_kernel import choose
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network
 from cpg_ros.motion.robot_file import load_robot
-choose()
 robot, network, duty = load_robot(sys.argv[1]), find_network(sys.argv[2]), float(sys.argv[3])
 plans = []
 for name, preset in network.presets().items():
@@ -198,29 +192,9 @@ def test_all_gaits_walk_without_numba_as_they_do_with_it(robot, network, duty):
     assert off < 1e-9 and int(faults) == pattern.faults == 1
 
 
-@needs_gcc
-def test_what_is_asked_for_steps_the_network(args):
-    network = find_network('delayed')
-    for wanted, maker in (('c', c_kernels), ('auto', kernel.numba_kernels),
-                          ('numba', kernel.numba_kernels)):
-        args(wanted)
-        assert kernel.kernels(network) is maker(network)
-
-
-def test_without_numba_and_without_c_a_step_is_one_line():
-    found = without_numba("""
-from cpg_ros.networks.registry import find_network
-from cpg_ros.dynamics.integration.stepper import Stepper
-network = find_network('delayed').presets()['trot'].network
-Stepper(network, [0.1] * network.components)""")
-    assert found.returncode == 1
-    (line,) = found.stderr.splitlines()
-    assert 'needs numba' in line and 'pip install numba' in line
-
-
-def test_every_network_is_made_in_c_and_solved_by_it(args):
+def test_every_network_is_made_in_c_and_solved_by_it(made_by):
     """The orbit that C's steps lead to has the period of the one that is solved for."""
-    args('c')
+    made_by(c_kernels)
     for name in NETWORKS:
         preset = next(iter(find_network(name).presets().values()))
         orbit = solve_orbit(preset.network, preset.gait)

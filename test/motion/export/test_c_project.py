@@ -129,13 +129,16 @@ def test_each_step_of_every_preset_is_the_steppers(tmp_path, robot, network):
 @pytest.mark.parametrize('robot, network, gaits', ROBOTS[:1] + in_depth(*ROBOTS[1:]))
 def test_ten_switches_are_those_of_the_generator(tmp_path, robot, network, gaits):
     made = plans(robot, network, gaits)
-    for form, real, degrees in (('network', 'float64', 2e-4), ('network', 'float32', 0.05),
-                                ('table', 'float32', 0.05)):
-        data = data_of(made, form, real)
+    for form, real, steering, degrees in (
+            ('network', 'float64', False, 2e-4), ('network', 'float32', False, 0.05),
+            ('network', 'float64', True, 2e-4), ('network', 'float32', True, 0.05),
+            ('table', 'float32', False, 0.05)):
+        data = data_of(made, form, real, steering=steering)
         text = output(compiled(tmp_path, data, golden_of(data, 0.002)))
         off = float(re.search(r'rad, ([\d.e+-]+) degrees', text)[1])
-        print(f'\n| {robot}, {network}, {", ".join(gaits)} | {form}, {real} | {off:.1e} |')
-        assert 'pattern: 10 switches' in text and off < degrees, (form, real, text)
+        print(f'\n| {robot}, {network}, {", ".join(gaits)} | {form}, {real}, '
+              f'steering {steering} | {off:.1e} |')
+        assert 'pattern: 10 switches' in text and off < degrees, (form, real, steering, text)
 
 
 @needs_gcc

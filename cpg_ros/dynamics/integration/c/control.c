@@ -16,6 +16,14 @@ void cpg_start(cpg *c, uint8_t gait, cpg_real ramp)
     }
     c->held = c->waiting = c->followed = 0;
     c->tracks = 1;
+#ifdef CPG_STEERING
+    for (int16_t k = 0; k <= CPG_LEGS; k++) {
+        c->drive.now[k] = c->drive.target[k] = R(1.0);
+        c->drive.rate[k] = R(0.0);
+    }
+    c->drive.at_once = 0;
+    c->track[0].stride = c->drive.now;
+#endif
     c->track[0].transition = c->track[0].progress = R(0.0);
     align(&c->track[0], gait, R(0.0));
     c->slowing = c->slower = R(1.0);
@@ -37,6 +45,26 @@ void cpg_switch(cpg *c, uint8_t gait, cpg_real transition)
     }
 }
 
+#ifdef CPG_STEERING
+/* A comparison that NaN fails keeps the target. */
+static void aim(cpg_real *target, cpg_real value, cpg_real low, cpg_real high)
+{
+    if (value >= low || value < low) {
+        *target = within(value, low, high);
+    }
+}
+
+void cpg_steer(cpg *c, const cpg_real *stride, cpg_real pace)
+{
+    for (int16_t leg = 0; leg < CPG_LEGS; leg++) {
+        aim(&c->drive.target[leg], stride[leg], R(-1.0), R(1.0));
+    }
+    aim(&c->drive.target[CPG_LEGS], pace, R(0.0), R(2.0));
+    /* Nothing moves at the stand. */
+    c->drive.at_once = !(c->ramp.level > R(0.0));
+}
+#endif
+
 const cpg_real *cpg_leg_phases(const cpg *c)
 {
     return c->track[c->tracks - 1].legs;
@@ -48,6 +76,9 @@ static void take_waiting(cpg *c)
         cpg_track *t = &c->track[c->tracks];
         t->transition = c->transition;
         t->progress = R(0.0);
+#ifdef CPG_STEERING
+        t->stride = c->drive.now;
+#endif
         align(t, (uint8_t)(c->waiting - 1), c->track[c->tracks - 1].phase);
         c->tracks++;
         c->waiting = 0;
@@ -58,6 +89,12 @@ void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS];
     dt = time_within(dt, R(0.0), LONGEST_TICK);
+#ifdef CPG_STEERING
+    /* Of this struct, also where it has been copied. */
+    for (int16_t n = 0; n < c->tracks; n++) {
+        c->track[n].stride = c->drive.now;
+    }
+#endif
     take_waiting(c);
     if (c->tracks == 1 && c->ramp.parts == 0) {
         cruise(c, dt, wanted, rate);

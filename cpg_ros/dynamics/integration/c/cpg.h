@@ -34,6 +34,10 @@ typedef struct {
     cpg_real angle[CPG_JOINTS];     /* from the stand, rad */
     cpg_real rise[CPG_JOINTS];      /* its derivative by phase, rad per cycle */
     cpg_real legs[CPG_LEGS];        /* phase of each leg, cycles */
+#ifdef CPG_STEERING
+    const cpg_real *stride;
+    cpg_real reach[CPG_JOINTS];     /* derivative of the angle by the stride, rad */
+#endif
 #ifdef CPG_TABLE
     cpg_real orbit_phase;           /* cycles */
 #else
@@ -50,6 +54,14 @@ typedef struct {
 #endif
 #endif
 } cpg_track;
+
+#ifdef CPG_STEERING
+/* Strides of the legs, then the pace, on the way to their targets. */
+typedef struct {
+    cpg_real now[CPG_LEGS + 1], rate[CPG_LEGS + 1], target[CPG_LEGS + 1];
+    uint8_t at_once;
+} cpg_drive;
+#endif
 
 typedef struct {
     cpg_real start, rate, end, time;
@@ -74,6 +86,9 @@ typedef struct cpg {
     cpg_ramp ramp;
     cpg_real slowing, slower, frequency, transition;
     cpg_real last_rate[CPG_JOINTS];
+#ifdef CPG_STEERING
+    cpg_drive drive;
+#endif
 } cpg;
 
 /* Stand, every joint at its offset, then go into a gait within ramp s. */
@@ -89,6 +104,12 @@ void cpg_switch(cpg *c, uint8_t gait, cpg_real transition);
 
 /* Ramp into the gait (1), or down to the stand (0), within a time in s. */
 void cpg_enable(cpg *c, uint8_t enabled, cpg_real ramp);
+
+#ifdef CPG_STEERING
+/* Change the strides of the legs, -1 to 1, CPG_LEGS of them, and the pace, 0 to 2: factors of those
+ * that the gait has. What is no number changes nothing. */
+void cpg_steer(cpg *c, const cpg_real *stride, cpg_real pace);
+#endif
 
 /* Return the phases of the legs in cycles, 0 where the leg's cell peaks, CPG_LEGS of them. */
 const cpg_real *cpg_leg_phases(const cpg *c);
@@ -131,6 +152,9 @@ typedef struct {
     cpg_real phase[CPG_CELLS];    /* cycles */
     uint8_t wave[CPG_CELLS];
     cpg_real weights[CPG_JOINTS][CPG_WEIGHTS];
+#ifdef CPG_STEERING
+    cpg_real in_place[CPG_JOINTS][CPG_WEIGHTS];  /* for strides of length 0 */
+#endif
 #ifdef CPG_RETIMED
     cpg_real maps[CPG_MAPS][3];   /* k, centre and own: what the duty factor makes of a phase */
 #endif
@@ -153,7 +177,14 @@ typedef struct {
 extern CPG_ROM cpg_gait cpg_gaits[CPG_GAITS];
 #define gait_of(t) (&cpg_gaits[(t)->gait])
 #define TRACK(n) (&c->track[n])
+#ifdef CPG_STEERING
+#define STEERED(c) 1
+#define DRIVE(c) (&(c)->drive)
+#define LEGS_OF(c) CPG_LEGS
+extern CPG_ROM uint8_t cpg_joint_leg[CPG_JOINTS];
+#else
 #define speed_of(c, t, joint, frequency) ((t)->rise[joint] * (frequency))
+#endif
 extern CPG_ROM cpg_real cpg_offset[CPG_JOINTS];
 extern CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS];  /* lowest, highest, fastest */
 #ifndef CPG_TABLE

@@ -6,6 +6,10 @@ typedef double cpg_real;
 
 @DEFINES@
 #define CPG_HOST
+#define CPG_STEERING
+#define STEERED(c) ((c)->drive != 0)
+#define DRIVE(c) ((c)->drive)
+#define LEGS_OF(c) ((int16_t)(c)->drive->legs)
 #define CPG_ROM const
 #define CPG_WEIGHTS 6
 #define CPG_VARIABLES 2
@@ -17,6 +21,7 @@ typedef double cpg_real;
 #define CPG_JOINTS (gait->joints)
 #define cpg_joint_cell (gait->joint_cell)
 #define cpg_leg_cell (gait->leg_cell)
+#define cpg_joint_leg (gait->joint_leg)
 #define gait_of(t) ((t)->gait)
 #define TRACK(n) (c->track[n])
 
@@ -69,7 +74,6 @@ typedef struct {
     int32_t joints, tracks, held, ticks_held, faults, followed, recovering, jumped;
     cpg_track *track[CPG_TRACKS];
     cpg_drive *drive;
-    const int16_t *joint_leg;
     const cpg_real *offset, *limits[3], *found;
     cpg_real *position, *velocity, *wanted, *rate, *last_rate, *goal, *correction;
     cpg_real *jump, *jump_rate;

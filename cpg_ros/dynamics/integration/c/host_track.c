@@ -80,43 +80,9 @@ void cpg_track_reseed(cpg_track *t, cpg_real phase)
     t->phase_carry = t->settling = t->astray = 0.0;
 }
 
-/* Strides and pace approach their targets with this time constant, s. */
-#define TIME_CONSTANT 0.2
-
-/* e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target. */
 void cpg_steer(cpg_drive *drive, cpg_real dt)
 {
-    const cpg_real decay = exp(-dt / TIME_CONSTANT);
-    for (int16_t k = 0; k <= drive->legs; k++) {
-        cpg_real target = drive->target[k];
-        if (drive->at_once) {
-            drive->now[k] = target;
-            drive->rate[k] = 0.0;
-            continue;
-        }
-        if (drive->trim && k < drive->legs) {
-            target = within(target + drive->trim[k], -1.0, 1.0);
-        }
-        const cpg_real gap = drive->now[k] - target, pull = drive->rate[k] + gap / TIME_CONSTANT;
-        drive->now[k] = target + (gap + pull * dt) * decay;
-        drive->rate[k] = (drive->rate[k] - pull * dt / TIME_CONSTANT) * decay;
-    }
-}
-
-/* Advance what steers, if anything does; return the pace. */
-static cpg_real steered(cpg *c, cpg_real dt)
-{
-    if (!c->drive) {
-        return 1.0;
-    }
-    cpg_steer(c->drive, dt);
-    return c->drive->now[c->drive->legs];
-}
-
-static cpg_real speed_of(const cpg *c, const cpg_track *t, int16_t joint, cpg_real frequency)
-{
-    const cpg_real speed = t->rise[joint] * frequency;
-    return c->drive ? speed + c->drive->rate[c->joint_leg[joint]] * t->reach[joint] : speed;
+    approach(drive, (int16_t)drive->legs, dt);
 }
 
 static void recover(cpg *c, cpg_track *t)

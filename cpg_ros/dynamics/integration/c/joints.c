@@ -46,11 +46,11 @@ static void drive_joint(cpg_track *t, CPG_ROM cpg_gait *gait, int16_t joint,
 {
     cpg_real angle = joint_value(gait->weights[joint], signal[0], signal[1], signal[2], signal[3],
                                  &t->rise[joint]);
-#ifdef CPG_HOST
+#ifdef CPG_STEERING
     if (t->stride) {
         /* angle = in_place + stride (angle - in_place), and so its derivatives. */
         cpg_real lift;
-        const cpg_real longer = t->stride[gait->joint_leg[joint]] - R(1.0);
+        const cpg_real longer = t->stride[cpg_joint_leg[joint]] - R(1.0);
         t->reach[joint] = angle - joint_value(gait->in_place[joint], signal[0], signal[1],
                                               signal[2], signal[3], &lift);
         t->rise[joint] += longer * (t->rise[joint] - lift);

@@ -102,8 +102,10 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
         share_rate[n] /= t->transition;
         frequency += share[n] * (gait_of(t)->frequency - frequency);
     }
-#ifdef CPG_HOST
+#ifdef CPG_STEERING
     frequency *= steered(c, dt);
+#endif
+#ifdef CPG_HOST
     leading = c->lead.parts > 0;
     moving = moving || leading;
 #endif
@@ -169,7 +171,7 @@ static uint8_t cruise(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
     cpg_real frequency = gait_of(t)->frequency;
     c->slowing = c->slower = R(1.0);
     c->followed = 0;
-#ifdef CPG_HOST
+#ifdef CPG_STEERING
     frequency *= steered(c, dt);
 #endif
     const cpg_real strides = R(0.5) * (c->frequency + frequency) * dt;

@@ -1,0 +1,47 @@
+/* Strides and pace approach their targets with this time constant, s. */
+#define TIME_CONSTANT R(0.2)
+
+/* e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target. */
+static void approach(cpg_drive *drive, int16_t legs, cpg_real dt)
+{
+    const cpg_real decay = F(exp)(-dt / TIME_CONSTANT);
+    const uint8_t at_once = drive->at_once != 0;
+    for (int16_t k = 0; k <= legs; k++) {
+        cpg_real target = drive->target[k];
+        if (at_once) {
+            drive->now[k] = target;
+            drive->rate[k] = R(0.0);
+            continue;
+        }
+#ifdef CPG_HOST
+        if (drive->trim && k < legs) {
+            target = within(target + drive->trim[k], -1.0, 1.0);
+        }
+#endif
+        const cpg_real gap = drive->now[k] - target, pull = drive->rate[k] + gap / TIME_CONSTANT;
+        drive->now[k] = target + (gap + pull * dt) * decay;
+        drive->rate[k] = (drive->rate[k] - pull * dt / TIME_CONSTANT) * decay;
+    }
+    if (at_once) {
+        drive->at_once = 0;
+    }
+}
+
+/* Advance what steers, if anything does; return the pace. */
+static cpg_real steered(cpg *c, cpg_real dt)
+{
+    if (!STEERED(c)) {
+        return R(1.0);
+    }
+    const int16_t legs = LEGS_OF(c);
+    approach(DRIVE(c), legs, dt);
+    return DRIVE(c)->now[legs];
+}
+
+static cpg_real speed_of(const cpg *c, const cpg_track *t, int16_t joint, cpg_real frequency)
+{
+    CPG_ROM cpg_gait *gait = gait_of(t);
+    (void)gait;
+    const cpg_real speed = t->rise[joint] * frequency;
+    return STEERED(c) ? speed + DRIVE(c)->rate[cpg_joint_leg[joint]] * t->reach[joint] : speed;
+}
