@@ -24,7 +24,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Connection
 
-#: How often to take the messages, s, and how many of a topic may wait for the disk.
+#: EVERY: period in which the caller takes the messages, s; DEPTH: most messages of a topic that
+#: wait for the disk.
 EVERY, DEPTH = 0.02, 5000
 
 

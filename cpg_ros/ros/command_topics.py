@@ -33,10 +33,11 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-# The topic ``kp_scale``: the factor of the servos' proportional gain that the feedback wants.
+# The topic ``kp_scale``: the factor of the servos' proportional gain that the feedback requests.
 
 KP_SCALE_TOPIC = 'kp_scale'
-#: While it is not 1, it is repeated this often; without a message for STALE it is 1 again, s.
+#: REPEAT: period in which a factor other than 1 is published, s; STALE: time without a message
+#: after which receivers use 1 again, s.
 REPEAT, STALE = 0.02, 0.1
 LARGEST_SCALE = LAW.gains['stiffen_kp'].high
 
@@ -78,7 +79,7 @@ class KpScaleSubscription:
         return self._scale
 
 
-# The topic ``held/joint_states``: where the joints that are no leg's are to be driven.
+# The topic ``held/joint_states``: target angles of the joints that belong to no leg.
 
 HELD_TOPIC = 'held/joint_states'
 

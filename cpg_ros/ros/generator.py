@@ -173,14 +173,15 @@ class Diagnostics:
 
 
 NAME = 'cpg_generator'
-#: When a signal ends the node, the ramp takes this long, and the node ends by the later time, s.
+#: After a signal that ends the node. LAST_RAMP: duration of the ramp to the stand, s;
+#: LAST_DEADLINE: time after which the node ends, s.
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
-#: A biped that balances slows down, stands and crouches first: by this time, s.
+#: LAST_CROUCH: the same deadline for a biped that balances, s: it slows down, stands and crouches.
 LAST_CROUCH = 8.0
-#: Two nodes know of one another this long after the later one joined the graph, s: they are
-#: announced every 3 s, and the first announcements of a busy machine are lost at times.
+#: DISCOVERY: time after which two nodes have discovered each other, s: announcements repeat every
+#: 3 s, and a busy machine may lose the first ones.
 DISCOVERY = 3.5
-#: How often the pose to begin from is searched for, s.
+#: SEARCH: period in which the node looks for the joints' initial pose, s.
 SEARCH = 0.05
 
 

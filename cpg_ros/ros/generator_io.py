@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Walking by the topic cmd_vel: speed, turning, and standing without a command."""
+"""The generator's topics: messages of every tick, measured joint angles, and cmd_vel."""
 
 from collections.abc import Callable, Sequence
 import math
@@ -38,10 +38,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 # The generator's messages: joint states, phases and commands every tick, and cells.
 
-#: Names under which ros2_control's controllers listen by default.
+#: COMMAND_TOPICS: kind of command -> topic on which ros2_control's controllers listen by default.
 COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',
                   'forward_position': 'forward_position_controller/commands'}
-#: The cells are published at most this many times a second, as often as people can see.
+#: FASTEST: largest rate at which the cells are published, Hz; more than people can see.
 FASTEST = 50.0
 
 
@@ -158,7 +158,7 @@ def labelled(names: tuple[str, ...], places: np.ndarray) -> Template:
 
 # The joint angles that the robot's own driver publishes.
 
-#: Older joint states say nothing about where the joints are now, s.
+#: FRESH: age up to which joint states count as the joints' present angles, s.
 FRESH = 1.0
 
 

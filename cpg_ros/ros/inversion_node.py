@@ -51,7 +51,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 NAME = 'cpg_inversion'
-#: Seconds that a generator gets to answer.
+#: PATIENCE: longest time for a generator to answer, s.
 PATIENCE = 3.0
 
 SPECS = {

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether the joints follow the generator, by the joint states that the robot measures."""
+"""Monitoring whether the measured joints follow the generator's commands."""
 
 
 from collections.abc import Callable
@@ -25,9 +25,10 @@ from cpg_ros.ros.node.health import STEADY
 import numpy as np
 from rclpy.node import Node
 
-#: How often commanded and measured angles are compared, s, and how old measured ones may be.
+#: PERIOD: period in which commanded and measured angles are compared, s; FRESH: largest age of the
+#: measured angles, s.
 PERIOD, FRESH = 0.1, 0.2
-#: Joints follow again once they have done so for this long, s.
+#: AGAIN: time without a fault, s, after which the joints count as following again.
 AGAIN = 3.0
 
 

@@ -31,9 +31,9 @@ from cpg_ros.ros.node.node_base import StartError
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
-# What a node that starts waits for, on /diagnostics, where pages find it.
+# Progress of a node that starts, on /diagnostics, where pages find it.
 
-#: How often it says so, s.
+#: EVERY: period in which the progress is published, s.
 EVERY = 1.0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the launch files share: launch arguments that become the parameters of a node."""
+"""Launch arguments that become the parameters of a node, shared by the launch files."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -25,7 +25,7 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
-#: What a value of a type is called.
+#: Type -> name of such a value in messages.
 WHAT = {int: 'a whole number', float: 'a number', bool: 'true or false', list: 'a list as [a, b]'}
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.

@@ -121,13 +121,14 @@ class Measurements:
             self._transformed = stamp
 
 
-# A thread in which a simulation and the node that commands it take turns.
+# Lockstep: a thread in which a simulation and the node that commands it take turns.
 
-#: How long to wait for the commands of an instant, s: at first, and while none come.
+#: Longest wait for the commands of an instant, s. PATIENCE: at first; IMPATIENCE: after an instant
+#: without commands.
 PATIENCE, IMPATIENCE = 1.0, 0.02
 #: Interval at which to look for commands, s.
 LOOK = 5e-5
-#: A delay behind real time of up to this is made up for, s; a longer one slows the robot down.
+#: MOST_BEHIND: longest delay behind real time that is made up for, s; the rest slows the robot.
 MOST_BEHIND = 0.05
 
 
@@ -220,11 +221,11 @@ class Lockstep(TickThread):
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
 PUSH = 0.1
-#: Least real_time_factor but 0.
+#: SLOWEST: least real_time_factor other than 0.
 SLOWEST = 1e-3
-#: A robot is up again after a fall once it has not been down for this long, s.
+#: BOUNCE: time after the last instant of a fall, s, from which on the robot counts as upright.
 BOUNCE = 1.0
-#: From the stand to commands that are elsewhere, s of simulated time.
+#: APPROACH: duration of the way from the stand to the first commanded pose, s of simulated time.
 APPROACH = 1.0
 
 #: Kinds of ground, and the friction of the last one.
@@ -387,7 +388,7 @@ class RobotSim(StartedNode):
         self.get_logger().info('standing at the origin')
 
     def _begin_again(self) -> None:
-        """Put it at the origin, in its stand, from where it approaches the commanded pose."""
+        """Put the robot at the origin, in its stand, and let it approach the commanded pose."""
         self._body.reset()
         self._approach.begin(self._body.stand)
         self._since, self._fallen, self._upright_from = self._now, False, -1.0

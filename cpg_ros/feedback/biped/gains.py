@@ -135,7 +135,7 @@ class BipedGains(_Fields):  # type: ignore[misc]
 
     @classmethod
     def of_body(cls, body: BipedBody, gait: str = 'walk') -> 'BipedGains':
-        """Return the gains of a gait that a robot file has, or the usual ones for its size.
+        """Return a gait's gains from a robot file, or the usual ones for the robot's size.
 
         Raises:
             InputError: as of `of`.
@@ -148,7 +148,7 @@ class BipedGains(_Fields):  # type: ignore[misc]
     @classmethod
     def of(cls, changes: Mapping[str, float], gait: str = 'walk',
            scale: tuple[float, float] = (1.0, 1.0)) -> 'BipedGains':
-        """Return the usual gains of a gait with changes, which spare those that only it has.
+        """Return a gait's usual gains with changes; gains that only this gait has stay.
 
         Args:
             changes: gains by name, in their units.

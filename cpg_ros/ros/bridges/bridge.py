@@ -109,17 +109,18 @@ class StartSequence(threading.Thread):
             raise StartRefused(self._reason)
 
 
-#: At the end, the robot is damped for this long, s.
+#: REST: time in damping, s, after which the robot is at rest and the bridge may end.
 REST = 1.0
 #: How often the network is checked for others who command the robot, s.
 CHECK = 0.1
-#: How long a start waits for the first state, s.
+#: STATE: longest time that a start waits for the first robot state, s.
 STATE = 10.0
-#: Two programs on a network have discovered each other after this time, s.
+#: DISCOVERY: time after which two programs on a network have discovered each other, s.
 DISCOVERY = 1.0
-#: The network forgets a bridge that was killed after this time, s.
+#: FORGOTTEN: time after which the graph no longer lists a bridge that was killed, s.
 FORGOTTEN = 25.0
-#: Signals within this time, s, are one: Ctrl-C comes from the terminal and from what launched us.
+#: ONE_PRESS: time, s, within which signals count as one: Ctrl-C in a terminal signals the launch
+#: process as well, which sends the signal again.
 ONE_PRESS = 0.5
 
 

@@ -67,11 +67,10 @@ class SafetyChecks:
 
 # The target angles of a generator, interpolated from one to the next.
 
-#: A target may differ from the one before by this much, rad, beyond what the joints can move
-#: in the time between.
+#: LEAP: largest jump of a target, rad, beyond the distance that the joint's speed limit allows in
+#: the time since the last target.
 LEAP = 0.05
-#: Longest time between two targets over which they are interpolated, or that allows for a jump,
-#: s.
+#: LONGEST: longest time between two targets, s, that is interpolated and that counts for LEAP.
 LONGEST = 0.05
 
 
@@ -186,11 +185,11 @@ class BridgeState(Enum):
     DAMPING = 'damping'
 
 
-#: States in which the bridge holds the joints at angles.
+#: ACTIVE: states in which the bridge holds the joints at target angles.
 ACTIVE = (BridgeState.RISING, BridgeState.STANDING, BridgeState.FOLLOWING, BridgeState.SITTING)
 
-#: Without a new measurement for this many periods, the last command is held: the torque that
-#: another angle would cause is not known.
+#: STALE: number of periods without a measurement after which the last command is held, as the
+#: torque that another angle would cause is unknown.
 STALE = 2.5
 
 

@@ -46,9 +46,9 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
-#: How often it checks that a bridge that has not driven yet still runs, s.
+#: LOOK: period in which it checks that a bridge that has not driven yet still runs, s.
 LOOK = 1.0
-#: Score with which the kernel spares a process when memory runs out: see proc(5).
+#: SPARED: oom_score_adj at which the kernel spares a process when memory runs out, see proc(5).
 SPARED = '-1000'
 
 

@@ -30,9 +30,9 @@ import numpy as np
 
 # Connections between processes of one user on this computer, one name for each robot.
 
-#: Connections that wait to be accepted.
+#: WAITING: most connections that wait to be accepted.
 WAITING = 8
-#: Bytes in transit; few, so that a process that does not read is soon noticed.
+#: BUFFER: size of the send buffer, bytes; small, so that a process that does not read is noticed.
 BUFFER = 4096
 #: The kernel's struct ucred: process, user, group.
 _CREDENTIALS = struct.Struct('3i')
@@ -164,7 +164,8 @@ class RobotInterface:
 
 # Monitoring of a process's ticks by its watchdog.
 
-#: A tick is missing this many periods after the last one: two should have come, and had time to.
+#: MISSING: number of periods after the last tick at which the bridge counts as silent: two ticks
+#: are then overdue.
 MISSING = 2.5
 
 
@@ -237,11 +238,11 @@ class TickMonitor:
         return True
 
 
-#: A watchdog has this long to get ready, s: it loads ROS.
+#: READY: longest time for a watchdog to get ready, s, as it loads ROS.
 READY = 20.0
-#: A watchdog that reads nothing for this long hangs, s.
+#: HANGS: time without reading after which a watchdog counts as hung, s.
 HANGS = 0.5
-#: Exit code of a watchdog whose name another program has.
+#: NAME_TAKEN: exit code of a watchdog whose name another program uses.
 NAME_TAKEN = 3
 
 

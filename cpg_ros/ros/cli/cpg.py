@@ -40,8 +40,8 @@ if TYPE_CHECKING:
     from cpg_ros.ros.node.client import NodeClient
     from rclpy.node import Node
 
-#: How long a node may take to answer, s: somebody waits for the word, but an announcement of DDS
-#: that was lost comes again only after 3 s.
+#: PATIENCE: longest time for a node to answer a completion, s: DDS repeats a lost announcement
+#: only after 3 s.
 PATIENCE = 4.0
 
 
@@ -142,8 +142,8 @@ eval "$(cpg completion)" makes the shell complete all of it, parameters and topi
 exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments."""
 
 
-#: The node that actions are for, and how long it may take to be found, and then to answer, s:
-#: a setting of the generator may compile a network first.
+#: NODE: node that actions address by default; WAIT: longest time to find it, s; ANSWER: longest
+#: time for its answer, s, as a setting of the generator may compile a network first.
 NODE, WAIT, ANSWER = '/cpg_generator', 5.0, 60.0
 
 

@@ -52,16 +52,17 @@ from rclpy.utilities import try_shutdown
 
 # The demonstration's course: rough ground, a ramp and blocks, with pushes on the way.
 
-#: Arguments of robot_sim and of the generator, beside those of every demonstration.
+#: GROUND: additional arguments of robot_sim on the course; GENERATOR: those of the generator.
 GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
 GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
-#: Where each stage begins, m.
+#: STAGES: distance at which each stage begins, m, and its name.
 STAGES = ((0.6, 'rough ground'), (3.0, 'a ramp up'), (4.2, 'and down'), (5.5, 'blocks'))
-#: Where the robot is pushed to the left, or to the right with a minus, N s.
+#: PUSHES: distance of each push, m, and its impulse to the left, N s.
 PUSHES = ((1.5, 15.0), (2.4, -15.0), (6.2, 12.0))
-#: Duration of a push in s, end of the course in m, speed in m/s, longest run in s.
+#: PUSH: duration of a push, s; END: end of the course, m; SPEED: forward speed, m/s; LONGEST:
+#: longest run, s.
 PUSH, END, SPEED, LONGEST = 0.1, 7.5, 0.4, 60.0
-#: A robot has fallen if its base leans further than the angle of this cosine.
+#: FALLEN: cosine of the lean beyond which the robot has fallen.
 FALLEN = 0.5
 
 
@@ -118,16 +119,16 @@ TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
 TWO_LEGS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
 GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
-#: The Unitree G1 is in a package of its own; the other humanoid is ours.
+#: BIPEDS: name -> biped; the model of the Unitree G1 is in a package of its own.
 BIPEDS = {name: DemoRobot(name, name, name, TWO_LEGS, steered=True, network='biped')
           for name in ('unitree_g1', 'humanoid')}
 HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
-#: A node must answer within this time, s, and the page, for which nothing is compiled: a first
-#: start compiles for about a minute.
+#: PATIENCE: longest time for the nodes to get ready, s; a first start compiles for about a minute.
+#: PAGE: longest time for the page to answer, s.
 PATIENCE, PAGE = 300.0, 20.0
-#: Where the page is, if the port is free.
+#: PORT: port of the page, if it is free.
 PORT = 8080
-#: The generator and the body are in step at this rate, Hz.
+#: RATE: rate at which generator and simulation run in lockstep, Hz.
 RATE = 500
 
 

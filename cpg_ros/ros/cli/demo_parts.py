@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The demonstration of a robot of one's own: its robot file is made, and its gaits are tuned.
+"""Parts of the demonstration: its node, its processes, and the way to drive a user's own robot.
 
 Each step is an executable of its own, whose files stay in a folder and are used again.
 """
@@ -145,7 +145,7 @@ def running(*arguments: str) -> Iterator[subprocess.Popen]:
 
 
 class Interruption:
-    """What ends the demonstration from outside: a signal, or the end of a node.
+    """Watches for the end of the demonstration: a signal, or the end of one of its nodes.
 
     A signal is only recorded, and acted upon where that is safe: an exception raised while a node
     starts would leave that node behind.
@@ -182,16 +182,17 @@ class Interruption:
                 raise DemoError(f'a node ended with exit code {node.returncode}')
 
 
-#: Gaits that a robot is driven in, of those that its network has.
+#: DRIVEN: gaits in which a robot of one's own is driven, if its network has them.
 DRIVEN = ('trot', 'walk', 'tripod', 'wave')
-#: How long a robot file takes, and of a gait's tuning what is done besides designs, and a design
-#: on one core and on all of them, s, on a machine of 2023.
+#: Durations on a machine of 2023, s. MADE: of making a robot file; BESIDES: fixed part of a gait's
+#: tuning; PLANNED: part of each design that runs on one core; SIMULATED: part that is divided by
+#: the number of cores.
 MADE, BESIDES, PLANNED, SIMULATED = 5.0, 30.0, 0.3, 0.6
-#: Designs that are tried for each gait.
+#: EVALUATIONS: number of designs that are tried for each gait.
 EVALUATIONS = 120
-#: Options of gains, which the simulation takes as well.
+#: SERVO_GAINS: options of gains, which the simulation takes as well.
 SERVO_GAINS = 'kp', 'kd'
-#: How long a step that is stopped may take to end, s.
+#: PATIENCE: longest time for a stopped step to end, s.
 PATIENCE = 10.0
 
 
@@ -241,7 +242,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def name_of(args: Namespace) -> str:
-    """Return what the files of a robot of one's own are called, '' if none is chosen.
+    """Return the name of a user's own robot, from its file; '' if none is chosen.
 
     Raises:
         CpgError: there is no such file, it is no URDF, or options do not go together.

@@ -41,7 +41,8 @@ EXECUTABLES = {'generator': 'ros.generator', 'robot_sim': 'ros.robot_sim',
                'tune': 'simulation.tuning.tune', 'calibrate': 'simulation.robot_setup.calibrate',
                'atlas': 'analysis.atlas.atlas',
                'export': 'motion.export.export'}
-#: What does with kernels in plain Python, and steps in C; for the others that is far too slow.
+#: WITHOUT_NUMBA: executables that also run without numba, with kernels in plain Python and steps
+#: in C; for the others these are far too slow.
 WITHOUT_NUMBA = ('generator', 'export', 'unitree_bridge', 'check_robot')
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics of a graph: their list, messages and rates."""
+"""Topics of a graph: list, messages, rates, bags and schedules that are played."""
 
 from array import array
 import asyncio
@@ -107,7 +107,7 @@ def _publisher(node: Node, connection: Connection) -> Publisher:
 
 #: How often the graph is searched for new topics, s.
 SEARCH_PERIOD = 0.5
-#: Topics that come with every node and that nobody wants.
+#: USUAL: topics of every node, which are not recorded unless they are named.
 USUAL = ('/rosout', '/parameter_events')
 
 
@@ -148,9 +148,9 @@ def _subscribed(node: Node, recorder: BagRecorder, topics: Sequence[str]) -> lis
             and node.count_publishers(topic) and recorder.subscribe(topic, kinds[0])]
 
 
-# A running generator set to what a schedule says, when it says it.
+# Schedules: parameters of a running generator, set at given times.
 
-#: How long a setting may take: a network may have to be compiled, s.
+#: ANSWER: longest time for a setting, s, as a network may have to be compiled.
 ANSWER = 60.0
 
 
@@ -195,9 +195,10 @@ def _words(entry: Entry) -> str:
                      for name, value in entry.parameters.items())
 
 
-#: How long the graph is looked at before its topics are listed, s: discovery takes a moment.
+#: DISCOVERY: time for discovery before topics are listed, s.
 DISCOVERY = 1.0
-#: How long messages are counted, s, how often they are taken, s, and how many may wait until then.
+#: COUNT: time for which messages are counted, s; COUNT_PERIOD: period in which they are taken, s;
+#: DEPTH: most messages that wait until then.
 COUNT, COUNT_PERIOD, DEPTH = 3.0, 0.02, 1000
 
 

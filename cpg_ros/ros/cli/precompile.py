@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Compile what the first start of a generator would otherwise wait for.
+"""Compile the kernels that the first start of a generator would otherwise wait for.
 
 ``make build`` runs it once for each installation: the networks in C, and the feedback of robots
 with points and with soles for feet by numba. Whatever is not done in time is compiled when it is

@@ -33,11 +33,11 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.ros.feedback.sensor_input import SensorInput
 import numpy as np
 
-#: The wanted heading is at most this far ahead of the measured one, rad.
+#: FURTHEST: largest difference between wanted and measured heading, rad.
 FURTHEST = 0.5
-#: After a fraction of 0, displacements are as good as 0 after this time, s.
+#: DIES_OUT: time at a share of 0 after which all displacements have decayed, s.
 DIES_OUT = 0.3
-#: Fraction of a stride, on average, in which the contacts must agree with the gait.
+#: AGREES: least mean share of legs whose contacts agree with the gait.
 AGREES = 0.5
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
@@ -158,7 +158,7 @@ class FeedbackLoop(SensorLoop):
             pattern.correct = self._correct
 
     def _judge(self, now: float) -> None:
-        """Find out what interrupts the feedback."""
+        """Determine the faults that interrupt the feedback."""
         inputs = self._inputs
         found, self.waiting = inputs.faults(now)
         if not found and (mounted := self._rates.verdict(inputs.sensor_data, self._dt)):

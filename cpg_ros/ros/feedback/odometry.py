@@ -25,9 +25,10 @@ from rclpy.node import Node
 
 # Messages of odometry: nav_msgs/Odometry and, where tf2_msgs is installed, the transform.
 
-#: Numbers of a position, an orientation w x y z, a twist, and the covariances of pose and twist.
+#: Sizes. POSE: of a position; ORIENTATION: of a quaternion w x y z; TWIST: of a twist; COVARIANCE:
+#: of a covariance of pose or twist.
 POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
-#: Time between two estimates of the pose that are published, and between two transforms, s.
+#: PERIOD: period in which odometry and transform are published, s.
 PERIOD = 0.02
 
 

@@ -43,7 +43,7 @@ from std_msgs.msg import Float64MultiArray
 
 # Finds the numbers in messages that were taken as bytes.
 
-#: Bytes of the encapsulation, from behind which everything is aligned.
+#: HEADER: bytes of the encapsulation; fields are aligned relative to its end.
 HEADER = 4
 
 
@@ -164,14 +164,14 @@ def legs_of(data: bytes, legs: Sequence[str]) -> np.ndarray:
 
 #: Sources of the loads on the feet.
 CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
-#: All feet may be unloaded for this time, s.
+#: FLIGHT: longest time for which all feet may be unloaded, s.
 FLIGHT = 0.3
-#: Limits of joints that are held, rad and rad/s.
+#: Limits of joints that are held. TURNED: of the angle, rad; SWUNG: of the speed, rad/s.
 TURNED, SWUNG = 2.0 * math.pi, 20.0
-#: Numbers of a Wrench; the place of one foot among one.
+#: WRENCH: number of values of a Wrench; FIRST: index 0, for checks of a single foot.
 WRENCH, FIRST = 6, np.zeros(1, dtype=int)
-#: Takes a message and the time since the last one, s; returns what is wrong with it, its numbers,
-#: and whether they may repeat.
+#: Takes a message and the time since the last one, s; returns the fault or '', the bytes of its
+#: values, and whether these may repeat.
 Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
 
 

@@ -46,10 +46,10 @@ from rclpy.parameter import Parameter
 # The parameters of the feedback: its laws, their gains, and the topics it subscribes to.
 
 PREFIX = 'feedback.'
-#: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
-#: ``ros2 param dump`` could not nest them.
+#: ENABLED: name of the switch; FORMER: its name in earlier releases. FORMER is also the beginning
+#: of other names, which ``ros2 param dump`` cannot nest.
 ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
-#: Its default is false where the feedback cannot be on.
+#: SWITCH: the switch; its default is false for robots without feedback.
 SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
               'is not calibrated, if the generator itself publishes the topic joint_states '
               "that it would measure from, or if it commands a robot's controllers (command)")
@@ -95,7 +95,7 @@ def of_gains(usual: Gains) -> dict[str, Spec]:
                for name, gain in GAIN_OF.items()}}
 
 
-#: Those of a Go2.
+#: GAINS: the same for a Go2.
 GAINS = of_gains(Gains())
 SPECS = {**TOPICS, **GAINS}
 #: The same of bipeds with soles; the generator's parameter ``frequency`` is their clock's.

@@ -100,11 +100,11 @@ def discover(node: Node) -> Graph:
                  with_names(BRIDGE), frozenset(topics))
 
 
-#: How long a service may take to be found, and a node to answer, s.
+#: PATIENCE: longest time to find a service, and again for it to answer, s.
 PATIENCE = 5.0
-#: How long a node is waited for in silence, s.
+#: SILENCE: time without a service after which the user is told of the wait, s.
 SILENCE = 1.0
-#: How often it is seen whether a service is there or has answered, s.
+#: POLL: period in which services and responses are checked, s.
 POLL = 0.01
 
 

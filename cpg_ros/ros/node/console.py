@@ -37,8 +37,8 @@ import threading
 import time
 
 OUT, ERROR = STREAMS = 1, 2
-#: In memory that both processes share, 8 bytes each, for each stream: whether something is being
-#: relayed, and how many lines are lost.
+#: WORDS: words of 8 bytes for each stream in shared memory: whether output is being relayed, and
+#: the number of lost lines.
 WORDS = 2
 #: The signals that end nodes; the relay ends when all who could write have ended.
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Other nodes that publish on the topics that move the robot."""
+"""A node's health on /diagnostics, and other publishers on the topics that move the robot."""
 
 from collections.abc import Callable, Mapping, Sequence
 import time
@@ -25,9 +25,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 # A node's health, once a second on /diagnostics, and the clock of such timers.
 
-#: For timers that must not stop with simulated time, nor follow a system clock that is set.
+#: Clock of timers that must not stop with simulated time, nor jump with the system clock.
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
-#: The part of a node whose status says what its start waits for.
+#: START: name of the status that reports the progress of a node's start.
 START = 'start'
 #: Level, message and values of a status.
 Health = tuple[bytes, str, Mapping[str, object]]
@@ -60,11 +60,11 @@ class HealthPublisher:
         self._publisher.publish(message)
 
 
-#: How often they are searched for, s.
+#: LOOK: period in which other publishers are searched for, s.
 LOOK = 0.25
-#: A publisher may be known this long before the name of its node, s.
+#: NAMING: longest time from the discovery of a publisher to that of its node's name, s.
 NAMING = 1.0
-#: What a node is called whose name the graph does not know.
+#: NAMELESS: text for a node whose name the graph does not know.
 NAMELESS = 'a node of unknown name'
 #: Names that the graph gives to a node until it learns the name, and to any program without ROS.
 PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,

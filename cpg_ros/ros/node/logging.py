@@ -47,8 +47,8 @@ PATIENCE = 0.2
 CAPACITY = 1000
 #: Format of a line if RCUTILS_CONSOLE_OUTPUT_FORMAT is not set.
 FORMAT = '[{severity}] [{time}] [{name}]: {message}'
-#: rclpy's own logger, which is left what rcl has to say, writes no file: it would wait for the
-#: disk.
+#: NO_FILE: argument that keeps rclpy's own logger, which only rcl still uses, from writing a file:
+#: it would wait for the disk.
 NO_FILE = '--disable-external-lib-logs'
 #: Quality of service of /rosout.
 ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL,
@@ -56,7 +56,7 @@ ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL,
 #: ANSI colors as rcutils has them.
 COLORS = {LoggingSeverity.DEBUG: 32, LoggingSeverity.INFO: 0, LoggingSeverity.WARN: 33,
           LoggingSeverity.ERROR: 31, LoggingSeverity.FATAL: 31}
-#: Files whose frames are not the place that logs.
+#: INNER: files of the logger itself, whose frames are skipped to find the caller.
 INNER = __file__, rcutils_logger.__file__
 
 
@@ -193,7 +193,7 @@ class LogQueue:
             self._console.drain(end - time.monotonic())
 
 
-#: One for the process, as its streams are.
+#: The queue of this process, as its streams are shared, too.
 QUEUE = LogQueue()
 
 

@@ -69,9 +69,9 @@ def message_fields(kind: str) -> str:
         raise UnknownType(f'the fields of {kind} are not known here') from None
 
 
-#: What CDR aligns an integer to, and the encapsulation before a message takes, bytes.
+#: WORD: alignment of an integer in CDR, and size of the encapsulation of a message, bytes.
 WORD = 4
-#: Words in front of the numbers: seconds and nanoseconds of a stamp, and of a duration.
+#: Indices of words. STAMP, DURATION: seconds and nanoseconds; NUMBERS: first word of the numbers.
 STAMP, DURATION, NUMBERS = (0, 1), (2, 3), 4
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a tick does outside the interpreter: ``tick.c``, compiled, and the middleware's functions.
+"""The part of a tick outside the interpreter: ``tick.c``, compiled, and middleware functions.
 
 Calls into the library let other threads of Python run.
 """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How nodes declare parameters, start, serve and end."""
+"""The base class of nodes: parameters, start, transport, life cycle, service threads and end."""
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
@@ -75,13 +75,14 @@ def exit_code(code: int, *threads: threading.Thread | None) -> int:
 
 # The transport of a process that moves a robot: UDP alone, as shared memory can hold it up.
 
-#: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
+#: TRANSPORT: variable that selects the transport of Fast DDS, and its value here; the user's own
+#: value takes precedence.
 TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
-#: Discovery range of ROS 2, and its predecessor, which goes first.
+#: RANGE: variable of ROS 2's discovery range; LOCAL_ONLY: its predecessor, which takes precedence.
 RANGE, LOCAL_ONLY = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
-#: Files with profiles of Fast DDS, by both names of the variable.
+#: PROFILES: both names of the variable of Fast DDS's profile file.
 PROFILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
-#: What a participant with the range LOCALHOST is, but without shared memory.
+#: LOCALHOST: profile of a participant with the discovery range LOCALHOST, without shared memory.
 LOCALHOST = Path(__file__).with_name('localhost.xml')
 
 
@@ -169,7 +170,7 @@ class Lifecycle(LifecycleNodeMixin):
     on_shutdown = partialmethod(_step, 'shutdown')
 
 
-#: Domains above it have ports that are too high for UDP.
+#: LAST_DOMAIN: largest domain id; the ports of larger ones exceed UDP's range.
 LAST_DOMAIN = 232
 
 

@@ -49,7 +49,7 @@ from rclpy.type_support import check_for_type_support
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
-#: In the constraints of a gait: what follows are presets whose names are not those of gaits.
+#: PRESETS: separates, in the constraints of a gait, gaits from presets with names of their own.
 PRESETS = '; presets: '
 
 
@@ -135,7 +135,7 @@ _pointer, _capsule = ctypes.pythonapi.PyCapsule_GetPointer, ctypes.pythonapi.PyC
 _pointer.restype, _pointer.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
 _capsule.restype = ctypes.py_object
 _capsule.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
-#: A capsule must not outlive what it points to.
+#: Owners of the functions that capsules point to: a capsule must not outlive them.
 _capsule_owners: list[Any] = []
 
 

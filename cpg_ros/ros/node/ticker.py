@@ -33,7 +33,7 @@ from rclpy.node import Node
 
 # Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's.
 
-#: Of mlockall: the pages that are there, and those to come.
+#: Flags of mlockall. MCL_CURRENT: lock all present pages; MCL_FUTURE: lock all future ones.
 MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
 
@@ -139,17 +139,19 @@ def _lock_memory() -> str:
     return 'this system has no mlockall'
 
 
-#: A ticker that is this many periods behind, as after a suspension, leaves them out: a robot must
-#: not be driven through the motion it missed, and never gets more than two ticks at once.
+#: STALL: number of periods behind, as after a suspension, from which on ticks are left out: a
+#: robot must not be driven through the motion it missed, and never gets more than two ticks at
+#: once.
 STALL = 2
-#: Steps of simulated time that are no stall, s: /clock may be that coarse, or lose a message.
+#: COARSE: step of simulated time that is not a stall, s: /clock may be coarse or lose a message.
 COARSE = 0.05
-#: A ticker that makes up for lost time, as a simulation may, makes up for no more than this, s.
+#: MOST_BEHIND: longest delay that a ticker without ``resume``, as in a simulation, makes up for,
+#: s.
 MOST_BEHIND = 1.0
-#: Simulated time that steps back by no more than this (messages out of order, two publishers of
-#: /clock) is waited for until it is past where it was; further back is a jump, s.
+#: JITTER: step back of simulated time, s, above which it is a jump; after a smaller one (messages
+#: out of order, two publishers of /clock) the ticker waits until time is past its last value.
 JITTER = 0.1
-#: A stop does not wait for a /clock that has stood still for this long by the steady clock, s.
+#: STOPPED: time of the steady clock, s, after which a stop no longer waits for a still /clock.
 STOPPED = 0.2
 
 

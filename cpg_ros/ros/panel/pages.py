@@ -134,12 +134,13 @@ def read(text: str | bytes) -> Request:
     return Request(action, values, stamp)
 
 
-#: Largest number of pages that can do everything, and of further ones that can only stop.
+#: MOST: largest number of pages with all rights; MOST_STOPPING: of further pages that can only
+#: stop.
 MOST, MOST_STOPPING = 16, 240
-#: Limits of a page's requests: per second, and at once.
+#: Limits of a page's requests. RATE: per second; BURST: at once.
 RATE, BURST = 60.0, 120.0
-#: Bytes that a page has not received yet: above the first limit it gets no frames; above the
-#: second, or above the first for PATIENCE s, it is disconnected.
+#: A page with more than SLOW unsent bytes gets no frames; one with more than LARGEST, or with more
+#: than SLOW for PATIENCE s, is disconnected.
 SLOW, LARGEST, PATIENCE = 200_000, 16_000_000, 20.0
 #: Longest message to a page, characters: below LARGEST, so that none disconnects a page.
 LONGEST = 8_000_000

@@ -54,9 +54,9 @@ import rclpy
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-# What generators that are still starting wait for, from /diagnostics.
+# Progress of generators that are still starting, from /diagnostics.
 
-#: How long after the last status a node counts as starting, s.
+#: FRESH: time after its last status for which a node counts as starting, s.
 FRESH = 4.0
 
 
@@ -218,11 +218,11 @@ class Recorder:
 
 #: A fit may take this long, s.
 FIT = 120.0
-#: Requests that move the robot, apart from steering, may be this old on arrival, s.
+#: LATE: largest age on arrival, s, of requests in MOVING.
 LATE = 2.0
-#: Requests that move the robot, apart from steering, and so take the lease.
+#: MOVING: requests, other than steering, that move the robot and therefore take the lease.
 MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
-#: Recorded whatever the generator's namespace.
+#: EVERYWHERE: topics that are recorded for a generator in any namespace.
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
 
@@ -334,7 +334,7 @@ def _stamp(request: Request) -> float:
 
 
 NAME = 'cpg_panel'
-#: Frames per second, and interval of looking at the graph, s.
+#: FRAMES: frames per second that pages get; LOOK: period in which the graph is searched, s.
 FRAMES, LOOK = 30.0, 0.5
 
 SPECS = fixed({

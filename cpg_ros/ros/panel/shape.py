@@ -197,7 +197,8 @@ def along(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
 
 # A stick figure for a robot of which only legs and joints are known.
 
-#: From hip to hip along and across, half of them, and the length of a leg, m.
+#: LONG, WIDE: half the distance between hips along and across the body, m; LEG: length of a leg,
+#: m.
 LONG, WIDE, LEG = 0.24, 0.11, 0.42
 BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
 
@@ -352,7 +353,8 @@ def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
 
 # The shape of a robot from its URDF, a file or the text on ``robot_description``.
 
-#: Largest text on ``robot_description``, bytes; triangles and bytes of meshes that are drawn.
+#: LARGEST: largest text on ``robot_description``, bytes; TRIANGLES: most triangles that are drawn;
+#: MESHES: most bytes of all meshes.
 LARGEST, TRIANGLES, MESHES = 4_000_000, 100_000, 500_000_000
 #: Nothing that is drawn is longer or further away, m.
 FURTHEST = 1e4

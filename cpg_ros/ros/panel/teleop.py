@@ -31,9 +31,9 @@ from cpg_ros.ros.panel.pages import Page
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
 
-# Who may move a robot: at most one holder at a time, and anybody can take over.
+# The lease to move a robot: at most one holder at a time, and anybody can take over.
 
-#: A holder that has been silent for this long has lost the lease, s.
+#: SILENCE: time without a command after which the holder loses the lease, s.
 SILENCE = 2.0
 
 
@@ -105,9 +105,9 @@ class Lease:
         self.holder, self.confirmed = who, others
 
 
-#: A command may be this old when it is published, s; an older one counts as zero.
+#: HOLD: largest age of a command when it is published, s; an older one counts as zero.
 HOLD = 0.3
-#: A stop is sent this many times: messages are cheap, a robot that walks on is not.
+#: STOPS: number of times that a stop is published, in case messages are lost.
 STOPS = 5
 #: Frame of the commands, as REP 105 names the robot's.
 FRAME = 'base_link'

@@ -33,7 +33,7 @@ from websockets.http11 import Request, Response
 
 # Access control: pages of this machine on loopback, holders of the token elsewhere.
 
-#: In place of a token: generate one of 128 bits, and show it in the terminal.
+#: AUTO: setting that generates a token of 128 bits and shows it in the terminal.
 AUTO = 'auto'
 #: Least number of characters of a token: that of 128 bits, 6 bits each. Guesses are not delayed: a
 #: delay of an address would also lock out the holder of the token behind the same address.
@@ -111,11 +111,11 @@ TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
 LONGEST = 4096
 #: Path of recordings.
 BAGS = '/bags/'
-#: The browser lets the page load nothing from elsewhere.
+#: POLICY: keeps the browser from loading anything from elsewhere.
 POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
           "connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
           "frame-ancestors 'none'")
-#: Errors of clients would fill the log.
+#: Logger whose records are dropped: errors of clients would fill the log.
 _LOG = logging.getLogger('cpg_ros.ros.panel.socket')
 _LOG.addHandler(logging.NullHandler())
 _LOG.propagate = False

@@ -33,7 +33,8 @@ from cpg_ros.ros.node.parameters import fixed, Spec
 import numpy as np
 
 NAME = Servos.bridge_name()
-#: Servos limit their torque themselves and measure no tilt or temperature.
+#: ABSENT: settings of a bridge that this one lacks: servos limit their torque themselves and
+#: measure no tilt or temperature.
 ABSENT = 'torque_factor', 'tilt', 'hottest', 'sensor_rate'
 SPECS = fixed({
     **{name: spec for name, spec in bridge_specs('', calibration=Spec(

@@ -65,7 +65,7 @@ def open_board(calibration: Calibration) -> ServoBoard:
         raise ServoError(f'{device}: {error.strerror or error}') from error
 
 
-# Whose commands drive the servos: those of one sender, until servo torque is disabled.
+# The owner of the servos: the one sender whose commands drive them until torque is disabled.
 
 class CommandOwner:
     """Accepts the commands of one sender and refuses those of all others.
@@ -123,11 +123,11 @@ SPECS = fixed({
                         'servo torque at once', 0.0, 30.0)})
 #: Least time between two warnings that a servo does not answer, s.
 QUIET = 5.0
-#: Commands that may wait for a tick.
+#: QUEUE: most commands that wait for a tick.
 QUEUE = 100
 #: How often the network is checked for others who command the servos, s.
 LOOK = 0.25
-#: A refused command is reported for this time, s.
+#: SHOWN: time for which /diagnostics reports a refused command, s.
 SHOWN = 2.0
 
 
@@ -176,7 +176,7 @@ class ServoBus(StartedNode):
         return self._owner.sender is not None
 
     def _look(self) -> None:
-        """Look for who else commands the servos."""
+        """Look for other nodes that command the servos."""
         watchdog = f'{self.get_namespace().rstrip("/")}/{Servos.watchdog_name()}'
         self._others = others_on(self, self._commands.topic, 0, 1, watchdog)
         self._senders = others_on(self, self._commands.topic, 0, 1)

@@ -45,7 +45,7 @@ class Kind:
 
 
 _SERIAL = {'baud': (1_000_000, 9600, 4_000_000)}
-#: Kinds of boards. A pulse is limited by its period, too.
+#: BOARDS: name of a board -> its kind. A pulse is limited by its period, too.
 BOARDS = {'pca9685': Kind(15, 20_000, {'address': (0x40, 0x03, 0x77),
                                        'frequency': (50.0, 40.0, 400.0)}),
           'dynamixel': Kind(252, 4095, _SERIAL), 'feetech_sts': Kind(253, 4095, _SERIAL),

@@ -23,14 +23,14 @@ from collections.abc import Iterator, Sequence
 from cpg_ros.ros.bridges.servos.serial_board import Reply, ServoProtocol
 
 HEADER = b'\xff\xff\xfd\x00'
-#: What data that look like a header are followed by: byte stuffing.
+#: Byte stuffing: LOOKALIKE, data that look like a header, is sent as STUFFED.
 LOOKALIKE, STUFFED = b'\xff\xff\xfd', b'\xff\xff\xfd\xfd'
 BROADCAST = 0xFE
-#: Instructions.
+#: Codes of instructions.
 STATUS, SYNC_READ, SYNC_WRITE = 0x55, 0x82, 0x83
-#: Addresses in the control table, and lengths in bytes.
+#: Fields of the control table: address and length in bytes.
 TORQUE_ENABLE, GOAL_POSITION, PRESENT_POSITION = (64, 1), (116, 4), (132, 4)
-#: Before the instruction there are seven bytes; no answer that is asked for here is longer.
+#: HEAD: bytes of a packet before its instruction; LONGEST: largest length of an expected answer.
 HEAD, LONGEST = 7, 64
 
 

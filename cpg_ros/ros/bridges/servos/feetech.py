@@ -26,13 +26,13 @@ from cpg_ros.ros.bridges.servos.serial_board import Reply, ServoProtocol
 
 HEADER = b'\xff\xff'
 BROADCAST = 0xFE
-#: Instructions.
+#: Codes of instructions.
 READ, SYNC_READ, SYNC_WRITE = 0x02, 0x82, 0x83
-#: Addresses in the memory, and lengths in bytes.
+#: Fields of the memory: address and length in bytes.
 TORQUE_SWITCH, GOAL_POSITION, PRESENT_POSITION = (40, 1), (42, 2), (56, 2)
-#: Bit of a position of STS and SMS that means a negative one.
+#: SIGN: bit that marks a negative position of STS and SMS.
 SIGN = 0x8000
-#: No answer that is asked for here has a larger length.
+#: LONGEST: largest length of an expected answer, bytes.
 LONGEST = 32
 
 

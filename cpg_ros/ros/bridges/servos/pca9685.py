@@ -26,15 +26,16 @@ from typing import Protocol
 from cpg_ros.ros.bridges.servos.serial_board import ServoBoard
 import numpy as np
 
-#: Registers, table 4: LED0_ON_L, four for each channel; the last three are those of all channels.
+#: Registers, table 4. MODE1: mode; LED0: first of four registers of channel 0, four more for each
+#: further channel; ALL_OFF_H: switches all channels off; PRE_SCALE: divider of the clock.
 MODE1, LED0, ALL_OFF_H, PRE_SCALE = 0x00, 0x06, 0xFD, 0xFE
-#: Bits of MODE1, table 5: auto-increment of the register, and the oscillator off.
+#: Bits of MODE1, table 5. AUTO_INCREMENT: of the register address; SLEEP: oscillator off.
 AUTO_INCREMENT, SLEEP = 0x20, 0x10
-#: Bit 4 of an OFF_H register, table 7: no pulses.
+#: FULL_OFF: bit 4 of an OFF_H register, table 7: no pulses.
 FULL_OFF = 0x10
-#: Of the internal oscillator, Hz, and counts a pulse's period has.
+#: OSCILLATOR: frequency of the internal clock, Hz; COUNTS: counts of a pulse's period.
 OSCILLATOR, COUNTS = 25e6, 4096
-#: The oscillator runs this long after it was switched on, s (500 us in section 7.3.1.1).
+#: STARTED: time until the oscillator runs once it is on, s (500 us in section 7.3.1.1).
 STARTED = 0.001
 #: Request of ioctl that sets the address of a device, linux/i2c-dev.h.
 I2C_SLAVE = 0x0703

@@ -26,7 +26,7 @@ from typing import Protocol
 from cpg_ros.common.errors import CpgError
 import numpy as np
 
-# What every board of servos can do, and its error.
+# The interface of every board of servos, and its error.
 
 class ServoError(CpgError):
     """A servo or its bus cannot be used; the message says which, and why."""

@@ -86,17 +86,17 @@ class Unitree(RobotInterface):
         return LowCmd()
 
 
-#: Vendor of RTPS packets that is Eclipse cyclonedds.
+#: Vendor id of Eclipse Cyclone DDS in RTPS packets.
 _VENDOR = b'\x01\x10'
-#: Host, version and system: a string that a zero ends.
+#: Host, version and system in a zero-terminated string.
 _VERSION = re.compile(rb'([\x20-\x7e]+)/(\d+)\.(\d+)\.\d+/\w+/\w+\0')
 _GROUP = '239.255.0.1'
-#: First version that the firmware does not bear.
+#: HARMFUL: first major version of Cyclone DDS whose announcements crash the robot's firmware.
 HARMFUL = 11
 
 
 def harmful(packet: bytes) -> str:
-    """Return which participant an announcement is from that would crash the robot's, or ''."""
+    """Return the sender of an announcement that would crash the robot's firmware, or ''."""
     if packet[:4] != b'RTPS' or packet[6:8] != _VENDOR:
         return ''
     for host, major, minor in _VERSION.findall(packet):
@@ -225,11 +225,12 @@ class Sensors:
 
 # The motion modes of a Unitree robot, which must be off while a bridge commands it.
 
-#: Numbers of unitree_api: of the service motion_switcher, and of sport.
+#: Identifiers of requests. CHECK_MODE, RELEASE_MODE: of the service motion_switcher; STAND_DOWN:
+#: of the service sport.
 CHECK_MODE, RELEASE_MODE, STAND_DOWN = 1001, 1003, 1005
-#: How long an answer, and the release of all modes, may take, s.
+#: ANSWER: longest time for an answer, s; RELEASED: longest time to release all modes, s.
 ANSWER, RELEASED = 3.0, 30.0
-#: What the robot needs to lie down, s, and then to give up a mode.
+#: LYING: time that the robot needs to lie down, s; SETTLING: time to release a mode afterwards, s.
 LYING, SETTLING = 4.0, 1.0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message ``unitree_go/msg/LowState``, read from its bytes (little-endian CDR)."""
+"""Unitree's messages as bytes (little-endian CDR): LowCmd, its check sum, and LowState."""
 
 from collections.abc import Sequence
 import zlib
@@ -46,16 +46,17 @@ def crc32(data: bytes) -> int:
 
 #: CDR's header: little-endian.
 HEADER = b'\x00\x01\x00\x00'
-#: Of the message, without the header, in bytes.
+#: COMMAND_SIZE: size of LowCmd without the header, bytes.
 COMMAND_SIZE = 808
 MOTORS = 20
-#: Angle and speed that mean: not controlled (unitree_sdk2's PosStopF and VelStopF).
+#: POSITION_STOP, VELOCITY_STOP: values that leave angle and speed uncontrolled (unitree_sdk2's
+#: PosStopF and VelStopF).
 POSITION_STOP, VELOCITY_STOP = 2.146e9, 16000.0
 #: Mode of a motor under control.
 SERVO_MODE = 1
-#: Where the floats of the first motor begin, and from motor to motor.
+#: _FLOATS: offset of the first motor's floats; _STRIDE: distance from motor to motor, bytes.
 _FLOATS, _STRIDE = 24, 36
-#: After the last motor's ``reserve``; ``crc`` is the last word.
+#: _CRC: offset of ``crc``, the last word, bytes.
 _CRC = 804
 
 
@@ -135,7 +136,7 @@ def _per_foot(name: str, values: Sequence[float], feet: int) -> np.ndarray:
     return np.broadcast_to(np.array(values, dtype=float), feet)
 
 
-#: Of the message with CDR's header of 4 bytes.
+#: STATE_SIZE: size of LowState with CDR's header of 4 bytes, bytes.
 STATE_SIZE = 1180
 _HEADER = 4
 _LITTLE_ENDIAN = 1
@@ -143,9 +144,10 @@ _LITTLE_ENDIAN = 1
 BUTTONS = {name: 1 << k for k, name in enumerate((
     'R1', 'L1', 'start', 'select', 'R2', 'L2', 'F1', 'F2',
     'A', 'B', 'X', 'Y', 'up', 'right', 'down', 'left'))}
-#: Packets that a motor may lose while the bridge drives it.
+#: MOST_LOST: packets that a motor may lose while the bridge drives it.
 MOST_LOST = 100
-#: From the angle of a motor on: CDR packs the mode of the first one more closely.
+#: A motor's fields from its angle on, up to the next motor's mode: CDR packs the first mode
+#: closer.
 _MOTOR = np.dtype({
     'names': ['q', 'dq', 'ddq', 'torque', 'temperature', 'lost', 'next_mode'],
     'formats': ['<f4', '<f4', '<f4', '<f4', 'i1', '<u4', 'u1'],
