@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""C that the system's compiler makes a library of where it is first used, kept in the cache."""
+"""Libraries that the system's C compiler builds when they are first used, kept in the cache."""
 
 from collections.abc import Callable, Mapping
 import ctypes

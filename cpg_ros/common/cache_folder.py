@@ -37,10 +37,10 @@ import tempfile
 from typing import IO
 
 _LOGGER = logging.getLogger(__name__)
-#: Folders that are kept, the last used ones, of about 1 MB; those of running processes always are.
-#: The package's own tests use 31, and each edit of a source makes new ones.
+#: KEPT: number of folders that are kept, of about 1 MB, the last used ones; those of running
+#: processes always are. The package's tests use 31, and each edit of a source makes new ones.
 KEPT = 128
-#: In each folder: locked by the processes that use it, its time is that of the last start.
+#: File in each folder that the processes using it lock; its time is that of the last start.
 _LOCK = 'in_use'
 #: Locks of this process, which the system releases when it ends, however it does.
 _HELD: list[IO[bytes]] = []

@@ -104,7 +104,7 @@ def refuse_repeated(option: str, names: Sequence[str]) -> None:
 
 # Plain text: JSON without numbers that it lacks, and tables in aligned columns.
 
-#: What Python makes of the bytes of a file's name that are not UTF-8.
+#: Characters that stand for bytes of a file's name that are not UTF-8 (surrogate escapes).
 _BYTE = re.compile('[\udc80-\udcff]')
 
 

@@ -27,9 +27,9 @@ from typing import Any, ClassVar
 
 # Results that print in one line, whatever arrays they hold.
 
-#: Longest text of one value, and of all, in characters.
+#: LONGEST: longest text of one value, characters; LONGEST_OF_ALL: longest text of all values.
 LONGEST, LONGEST_OF_ALL = 60, 300
-#: Collections of fewer entries are shown whole, if their text is short.
+#: MOST: number of entries from which on a collection is abbreviated.
 MOST = 9
 
 

@@ -68,7 +68,7 @@ def stored_json(path: Path) -> Any:
         return None
 
 
-# Where the package's shipped files are, installed or in a source tree.
+# Paths of the package's shipped files, installed or in a source tree.
 
 def resource_folder(kind: str) -> Path:
     """Return a folder of files that the package ships: in the sources, or in share/cpg_ros.
@@ -91,9 +91,9 @@ def resource_folder(kind: str) -> Path:
 
 # XML that others write, as a tree: without entities, and no deeper than anything is described.
 
-#: Elements within one another; descriptions of robots have a dozen, assemblies in Collada more.
+#: DEEPEST: deepest nesting of elements; descriptions of robots have a dozen, Collada more.
 DEEPEST = 200
-#: Elements of a document; a robot with meshes has a few thousand.
+#: MOST: most elements of a document; a robot with meshes has a few thousand.
 MOST = 1_000_000
 
 
@@ -156,9 +156,9 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-#: Largest file that is read at once, bytes.
+#: LARGEST: largest file that is read at once, bytes.
 LARGEST = 64_000_000
-#: Kinds of files that are refused.
+#: KINDS: type of a file that is refused -> its name.
 KINDS = {stat.S_IFIFO: 'a pipe', stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device',
          stat.S_IFSOCK: 'a socket'}
 

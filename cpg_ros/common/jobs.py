@@ -34,8 +34,8 @@ from cpg_ros.common.errors import CpgError
 
 # The progress of many jobs: done, failed, rate and time left.
 
-#: Seconds between lines where there is no terminal, between redrawings on one, and before the
-#: first of these.
+#: MINUTE: time between lines if there is no terminal, s; REDRAWN: time between updates on a
+#: terminal, s; PATIENCE: time before the first of these, s.
 MINUTE, REDRAWN, PATIENCE = 60.0, 0.2, 2.0
 
 
@@ -116,11 +116,11 @@ class JobProgress:
                 self._stream.write('\n')
 
 
-#: Longest time between two calls of tick, s.
+#: TICK: longest time between two calls of tick, s.
 TICK = 0.5
-#: Number of workers that may die under a job, while it runs alone, before it is blamed.
+#: DEATHS: number of workers that die under a job, while it runs alone, at which it is blamed.
 DEATHS = 2
-#: Jobs that an executor has room for, where nothing else is known.
+#: ROOM: default number of jobs that an executor has room for.
 ROOM = 8
 
 Job = TypeVar('Job')

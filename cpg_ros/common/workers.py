@@ -109,12 +109,12 @@ def exposed(*addresses: str) -> str:
     return ''
 
 
-#: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
-#: is waited for so long.
+#: ANSWERS: longest time for an address to answer, s; RETURNS: longest wait for a lost scheduler,
+#: s.
 ANSWERS, RETURNS = 6.0, 300.0
-#: Jobs that are under way or wait at a worker, for each of its threads.
+#: AHEAD: jobs per thread of a worker that run or wait there.
 AHEAD = 2
-#: Workers that a cluster is taken to have when none is there yet.
+#: EXPECTED: assumed number of threads of a cluster that has no workers yet.
 EXPECTED = 4
 
 
@@ -316,9 +316,9 @@ def _workers_checked(client: Any, address: str) -> None:
 
 # The options that choose where jobs run, the same for all executables that run many.
 
-#: More processes than this are a mistake.
+#: MOST: largest number of processes; more are a mistake.
 MOST = 1024
-#: What Ctrl-C leaves of jobs whose results are kept as they come.
+#: KEPT: message after Ctrl-C for jobs whose results are kept as they come.
 KEPT = 'stopped; what was finished is kept, and the same command continues from there'
 
 

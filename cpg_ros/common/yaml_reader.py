@@ -27,9 +27,9 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, read_bytes, write_atomically
 import yaml
 
-#: Nodes within one another, and nodes with those that aliases stand for, that are read.
+#: DEEPEST: deepest nesting of nodes; MOST: most nodes, including those that aliases stand for.
 DEEPEST, MOST = 50, 1_000_000
-#: Largest YAML file that is read, bytes: a robot of a hundred joints has 30 thousand.
+#: LARGEST: largest YAML file, bytes: a robot of a hundred joints has 30 thousand.
 LARGEST = 4_000_000
 
 Value = TypeVar('Value')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pseudo-arclength continuation: curves of solutions, followed past their folds.
+"""Pseudo-arclength continuation of curves of solutions past folds; roots of scalar functions.
 
 n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. From a
 point on it the tangent predicts the next one, and Newton's method corrects it in the hyperplane
@@ -30,11 +30,12 @@ from cpg_ros.common.errors import CpgError, ShortRepr
 import numpy as np
 import scipy
 
-# Where functions of one variable change their sign, looked for on a grid and refined.
+# Sign changes of functions of one variable, searched for on a grid and refined.
 
-#: Places are refined to this, absolute and relative to them.
+#: EXACT: absolute and relative tolerance of roots.
 EXACT = 1e-13
-#: A turn on the grid may reach this many times further than it differs from its neighbours.
+#: REACH: an extremum on the grid is refined if its distance from zero is at most this multiple of
+#: its difference from its neighbours.
 REACH = 4.0
 
 
@@ -106,19 +107,19 @@ def _last(function: Callable[[float], float], inside: float, outside: float) -> 
     return inside
 
 
-#: Newton stops at steps this short; what is left then is of the order of its square.
+#: TOLERANCE: size of Newton's step at which it stops; the remaining error is of order its square.
+#: NEWTON: most of these steps.
 TOLERANCE = 1e-9
 NEWTON = 8
-#: Where the tangent may be that of the point before, it stops where the next step would be shorter
-#: than this.
+#: NEGLIGIBLE: size of the predicted next step at which it stops if the tangent need not be new.
 NEGLIGIBLE = 1e-4 * TOLERANCE
-#: Steps along the curve, in the norm of its product: every unknown counts against its scale.
+#: FIRST, SHORTEST, LONGEST: lengths of steps along the curve, each unknown relative to its scale.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
-#: Times that a period has grown from which on steps may grow with it.
+#: GROWN: factor of the period's growth beyond which steps grow with it.
 GROWN = 3.0
-#: Least cosine of the angle between the tangents of two neighbours.
+#: ALIGNED: least cosine of the angle between the tangents of two neighbours.
 ALIGNED = 0.9
-#: No step may take more than this share of the amplitude, so that none leaps over the rest state.
+#: SHARE: largest share of the amplitude that a step may take, so that none leaps over the rest.
 SHARE = 0.6
 
 
@@ -241,7 +242,7 @@ def offsets(curve: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 class NoOrbit(CpgError):
-    """The parameter set has no such gait; the message says what stands against it."""
+    """The parameter set has no such gait; the message gives the reason."""
 
 
 class SolutionCurve(Protocol):

@@ -32,11 +32,11 @@ from cpg_ros.dynamics.floquet import Multipliers, multipliers
 import numpy as np
 import scipy
 
-#: Fraction of the way between two points of a branch to which a crossing is located.
+#: EXACT: tolerance of a crossing, as a share of the way between two points of a branch.
 EXACT = 1e-7
-#: A multiplier whose logarithm stays this small is neutral, not crossing.
+#: NEUTRAL: logarithm of a multiplier's modulus up to which it is neutral and does not cross.
 NEUTRAL = 1e-6
-#: A multiplier is real where its imaginary part is smaller.
+#: REAL: imaginary part up to which a multiplier is real.
 REAL = 1e-3
 
 

@@ -28,9 +28,9 @@ import math
 import numpy as np
 import scipy
 
-# Where the roots of ``h' = L0 h(t) + L1 h(t - tau)`` cross the imaginary axis, in closed form.
+# Crossings of the imaginary axis by roots of ``h' = L0 h(t) + L1 h(t - tau)``, in closed form.
 
-#: How far from the unit circle, and from the axis, a solution may lie by rounding.
+#: ON_CIRCLE: rounding error up to which a solution lies on the unit circle, or on the axis.
 ON_CIRCLE = 1e-7
 
 
@@ -88,12 +88,12 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
     return sorted(crossings, reverse=True)
 
 
-#: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
+#: LARGEST: exponent beyond which exp overflows, and W is computed from a logarithm.
 LARGEST = 690.0
-#: Chebyshev points at first and at most, and by how much Newton's method may move a root that
-#: they have resolved, against its size.
+#: POINTS, MOST_POINTS: initial and largest number of Chebyshev points; RESOLVED: relative change
+#: by Newton's method up to which these points resolve a root.
 POINTS, MOST_POINTS, RESOLVED = 24, 192, 1e-6
-#: Roots looked at first where all to the right of a line are wanted.
+#: FIRST: initial number of roots in the search for all roots right of a line.
 FIRST = 9
 
 

@@ -34,18 +34,20 @@ from cpg_ros.dynamics.solve_orbit import branch_orbits, solve_from_path, solve_o
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: States at random from which a thorough search simulates.
+#: MORE_RANDOM: number of random states from which a thorough search simulates.
 MORE_RANDOM = 37
-#: Orbits of periods this close, relative, whose waveforms have ranges this close, over the size,
-#: are one up to phase and the network's symmetry.
+#: Relative differences up to which two solutions are one orbit, up to phase and symmetry.
+#: SAME_PERIOD: of the periods; SAME_LEVEL: of the waveforms' ranges.
 SAME_PERIOD, SAME_LEVEL = 1e-6, 1e-4
-#: What a simulation settles on is a known orbit if period and waveforms agree so far.
+#: Relative differences up to which a simulation has settled on a known orbit. NEAR_PERIOD: of the
+#: periods; NEAR_WAVEFORM: of the waveforms, over their range.
 NEAR_PERIOD, NEAR_WAVEFORM = 5e-3, 0.02
-#: Starts of the deflated method: a known orbit about its mean, so much larger, so much slower.
+#: SCALED: starts of the deflated method: factors of a known orbit's size about its mean, and of
+#: its period.
 SCALED = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))
-#: No more orbits of a gait are looked for than these.
+#: MOST: number of orbits of a gait at which the search ends.
 MOST = 24
-#: Points of a cycle at which waveforms are compared.
+#: POINTS: points of a cycle at which waveforms are compared.
 POINTS = 120
 
 
@@ -122,7 +124,7 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
 
 
 class _Search:
-    """The orbits of a gait that are known so far, and what has been looked at."""
+    """A search for the orbits of a gait: those known so far, and the extent of the search."""
 
     def __init__(self, network: Network, gait: str) -> None:
         self.network, self.gait, self.symmetry = network, gait, network.symmetry(gait)

@@ -33,14 +33,14 @@ import numpy as np
 
 # How branches of orbits end, and where: what lies beyond the last orbit is extrapolated.
 
-#: A branch that cannot be resolved any more has run into such an orbit if its period has grown
-#: this many times over, and the value moves less than this share of its scale in a period.
+#: A branch that is no longer resolved ends at an orbit of unbounded period if the period has grown
+#: by the factor GROWN, and the value changes by less than STILL of its scale per period.
 GROWN, STILL = 3.0, 1e-2
-#: A step in which the period grows by this share and the value moves by less than this one of its
-#: scale is all that is left to see of such an end.
+#: It has also ended there if, in a step, the period grows by more than the share LONGER while the
+#: value changes by less than ROUNDING of its scale.
 LONGER, ROUNDING = 0.01, 1e-9
-#: The value's slope falls as the period to the power of -3 near a saddle-node; from this power on
-#: its fall is taken for an exponential one.
+#: STEEPER: power of the period's inverse from which on the fall of the value's slope counts as
+#: exponential (homoclinic); near a saddle-node the power is 3.
 STEEPER = 4.0
 
 
@@ -93,7 +93,7 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     if not abs(slopes[-1]) * periods[-1] < STILL * scale:
         return None
     if _winds(slopes):
-        # In ever smaller turns: the last one is the best estimate.
+        # The value spirals in, in ever smaller turns: the last one is the best estimate.
         return float(values[-1])
     fall = np.log(slopes[0] / slopes[2])
     power = fall / np.log(middle[2] / middle[0])
@@ -108,7 +108,7 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
 
 
 def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
-    """Return by which law a branch's period grows without bound, from its last points.
+    """Return the law by which a branch's period grows without bound, from its last points.
 
     Args:
         values: of the parameter, shape (points,).
@@ -138,7 +138,7 @@ def _winds(slopes: np.ndarray) -> bool:
     return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
 
 
-#: Below this amplitude an orbit is as good as its Hopf point.
+#: REST: amplitude below which an orbit counts as its Hopf point.
 REST = 2e-3
 
 

@@ -30,16 +30,18 @@ from cpg_ros.networks.equations import equations_of, Field
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Where equilibria are looked for: close to where the cell's functions bend, and far out.
+#: GRID: values of x at which equilibria are searched for: densely where the cell's functions bend,
+#: and far out, _FAR.
 _FAR = np.geomspace(3.0, 100.0, 400)[1:]
 GRID = np.concatenate([-_FAR[::-1], np.linspace(-3.0, 3.0, 2001), _FAR])
-#: How many states are tried where there is no such x.
+#: STARTS: number of initial states if the rates are not linear in all variables but one.
 STARTS = 400
-#: Longest way of the state in a step along a branch, and how far it may miss, against its size.
+#: LONGEST: longest change of the state in a step along a branch, over its size; MISS: largest
+#: difference of a solution from its prediction, likewise.
 LONGEST, MISS = 0.1, 0.01
-#: An equilibrium that has gone further does not come back.
+#: FURTHEST: size of a state beyond which an equilibrium has gone to infinity.
 FURTHEST = 1e3
-#: Shortest step, in the share of the coupling: at a fold nothing lies beyond it.
+#: SHORTEST: shortest step of the share of the coupling; if it fails, the branch ends in a fold.
 SHORTEST = 1e-5
 
 
@@ -54,7 +56,7 @@ class Quotient(Field[Network]):
     """
 
     def __init__(self, network: Network) -> None:
-        """Look at a network, all of whose couplings are there."""
+        """Prepare for a network, with all of its couplings."""
         super().__init__(network, np.zeros(network.cells, dtype=int))
         self._whole = self._p = [value.flat[0] for value in self._p]
         equations = self._equations
@@ -62,7 +64,7 @@ class Quotient(Field[Network]):
                          for row in equations.rows]
 
     def set_share(self, fraction: float) -> None:
-        """Set the share of the couplings that is there."""
+        """Set the factor of all couplings, 0 to 1."""
         self._p = [fraction * value if coupled else value
                    for value, coupled in zip(self._whole, self._coupled, strict=True)]
 
@@ -108,7 +110,7 @@ class Quotient(Field[Network]):
         return state if size < 1e-11 else None
 
     def newton_from_all(self, states: np.ndarray, most: int = 50) -> np.ndarray:
-        """Return what newton reaches from states, shape (n, variables), of those that arrive."""
+        """Return the equilibria that Newton's method reaches from states, shape (n, variables)."""
         arrived = [states[:0]]
         sizes = np.full(len(states), np.inf)
         with np.errstate(all='ignore'):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Floquet multipliers of a gait: what a small disturbance is multiplied by in a period.
+"""Floquet multipliers of a gait: the factors of small disturbances over a period.
 
 They split into those within the gait's symmetry class, 1 among them, and those transverse to it,
 which the symmetry lock -g (I - P) x shrinks and nothing else does.
@@ -26,13 +26,14 @@ from cpg_ros.dynamics.orbit_method import orbit_method
 import numpy as np
 import scipy
 
-#: From here on a multiplier cannot be distinguished from 1.
+#: ATTRACTS: modulus of a multiplier below which it is distinguishable from 1.
 ATTRACTS = 1.0 - 1e-7
-#: Gains between none and the bound among which the smallest that is enough is looked for.
+#: GAINS: number of gains between 0 and the bound among which the smallest sufficient one is
+#: sought.
 GAINS = 8
-#: How well the sign of the growth is known while it is looked for.
+#: ROUGHLY: error of the growth during that search.
 ROUGHLY = 1e-4
-#: Gains that are tried where no bound is known.
+#: MOST_GAINS: number of gains that are tried where no bound is known.
 MOST_GAINS = 40
 
 
@@ -61,7 +62,7 @@ class Multipliers(ShortRepr):
 
     @property
     def subspaces(self) -> list[np.ndarray]:
-        """Those of each subspace, largest first: the class without the trivial one, then parts."""
+        """Multipliers of the class, without the trivial one, and of each part; largest first."""
         return [by_size(part) for part in (self.within, *self.parts)]
 
     def _summary(self) -> str:

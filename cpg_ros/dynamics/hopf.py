@@ -105,7 +105,7 @@ class NormalForm:
         return self.k1.imag * mu + self.k2.imag * self.radius(mu)**2
 
 
-#: Roots this close to the imaginary axis lie on it, 1/model time or against omega.
+#: ON_AXIS: distance up to which a root lies on the imaginary axis, 1/model time or over omega.
 ON_AXIS = 1e-8
 
 
@@ -390,10 +390,11 @@ def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: floa
 
 # All Hopf points of a network's equilibrium along a line of parameters.
 
-#: Values of the parameters at which the equilibrium is looked at before crossings are refined.
+#: GRID: number of values of the parameters at which the equilibrium is computed before crossings
+#: are refined.
 GRID = 241
-#: With a delay, how many roots of a class are followed beside those that are to the right of the
-#: axis somewhere on the grid.
+#: SPARE: with a delay, number of roots of a class that are followed in addition to those that are
+#: right of the axis somewhere on the grid.
 SPARE = 2
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Periodic orbits of a network in a gait, whatever solves them."""
+"""Periodic orbits of a network in a gait: the base class, deflation, checks and symmetries."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -29,14 +29,14 @@ import numpy as np
 
 # Deflation: Newton's method kept off the orbits that are known.
 
-#: Width w, relative to a known period, of what deflation keeps free about it.
+#: WIDTH: width w, over a known period, of the range about it that deflation keeps free.
 WIDTH = 0.1
-#: The factor is at most this large: near a pole the step says little.
+#: LARGEST: largest factor of Newton's step, which is meaningless near a pole.
 LARGEST = 3.0
 
 
 def deflation_factor(period: float, step: float, periods: Sequence[float]) -> float:
-    """Return what Newton's step is multiplied by; 1 where no orbit is known.
+    """Return the factor of Newton's step; 1 where no orbit is known.
 
     Args:
         period: the current one, in any unit of time.
@@ -54,15 +54,15 @@ def deflation_factor(period: float, step: float, periods: Sequence[float]) -> fl
 
 #: Waveforms over theta in cycles, of a wave and a variable: ``waveform(theta, wave, variable)``.
 Waveforms = Callable[[np.ndarray, int, int], np.ndarray]
-#: Why there is no phase response.
+#: NOT_ISOLATED: message if there is no phase response.
 NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a disturbance other '
                 'than along it does not decay, either')
-#: Points of a cycle among which extremes are looked for before they are refined.
+#: POINTS: points of a cycle among which extremes are searched for before they are refined.
 POINTS = 1024
-#: Points of a cycle at which signals are compared, at least; and parts of a cycle, of which no
-#: orbit may repeat one.
+#: COMPARED: fewest points of a cycle at which signals are compared; PARTS: numbers of equal parts
+#: for which no orbit may repeat itself within its period.
 COMPARED, PARTS = 60, (2, 3, 5)
-#: Two signals this close, over their range, are one.
+#: SAME: difference, over their range, up to which two signals are equal.
 SAME = 1e-4
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Normal forms where orbits lose stability: is the change of gait soft or hard.
+"""Normal forms where orbits lose stability: whether the change of gait is soft or hard.
 
 Near an orbit u of period T, of which a disturbance v has the multiplier mu on the unit circle, the
 states are ``x = u(s) + z v(s) + conj(z v(s)) + ...`` with, at the critical parameters,
@@ -46,7 +46,7 @@ import scipy
 
 # The variational equation about an orbit where it is singular: null vectors and answers.
 
-#: How often null vectors are taken for the borders by which they are found anew.
+#: ROUNDS: iterations in which null vectors become the borders of the next solution for them.
 ROUNDS = 2
 
 
@@ -147,13 +147,14 @@ class Linearised:
         return np.zeros_like(y[0]), past
 
 
-#: Multipliers this near to the circle are on it; powers of one this near to 1 are 1.
+#: CRITICAL: distance from the unit circle up to which a multiplier is on it; RESONANT: distance of
+#: a multiplier's power from 1 up to which there is a resonance.
 CRITICAL, RESONANT = 1e-3, 0.02
-#: A coefficient must not change by more than this share when the mesh is halved.
+#: SAME: largest relative change of a coefficient when the mesh is halved.
 SAME = 0.01
-#: What a multiplier is larger than that grows where another one crosses the circle.
+#: GROWS: modulus from which on another multiplier is outside the circle at a crossing.
 GROWS = 1.001
-#: A quadratic term of this share of what its parts are is none.
+#: NOTHING: share of the largest of its parts up to which a term of the normal form is 0.
 NOTHING = 1e-6
 
 
@@ -216,7 +217,7 @@ def loses_stability(orbit: Orbit) -> bool:
 
 
 def _undecided(orbit: Orbit, multiplier: complex, pair: bool) -> str:
-    """Say what makes a normal form with one disturbance the wrong one, '' if nothing does."""
+    """Return why a normal form of one disturbance is not valid, '' if it is."""
     spectrum = multipliers(orbit)
     there = np.concatenate([spectrum.within, spectrum.transverse])
     if (np.abs(np.abs(there) - 1.0) < CRITICAL).sum() > 1 + pair:
@@ -255,7 +256,7 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
     own = None if alike else linear.fractions(turn, linear.moved(v))[0]
 
     def fraction(rates: np.ndarray) -> complex:
-        """Return the part along v."""
+        """Return the component along v."""
         if own is None:
             return complex(np.linalg.solve(weights, linear.fractions(1.0, rates))[1])
         return complex(linear.fractions(turn, rates)[0] / own)

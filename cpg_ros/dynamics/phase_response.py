@@ -32,7 +32,7 @@ from numpy.polynomial import legendre
 
 # Phase response curves: how far a small input to a variable of a cell shifts a gait's phase.
 
-#: Gauss points of a panel of the integral over the history, and panels of a cycle.
+#: Gauss points and weights of a panel of the integral over the history; panels of a cycle.
 _PLACES, _WEIGHTS = legendre.leggauss(12)
 PANELS = 24
 
@@ -128,7 +128,7 @@ def phase_response(orbit: Orbit) -> PhaseResponse:
     return PhaseResponse(orbit, orbit_method(orbit.network).floquet.adjoint(orbit))
 
 
-#: Even points of a cycle over which averages are taken.
+#: POINTS: number of even points of a cycle over which averages are taken.
 POINTS = 2048
 
 

@@ -25,18 +25,19 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Model time that every set is simulated for, and between the states that are kept.
+#: SPAN: duration of a simulation, model time; KEPT_FRACTION: time between recorded states,
+#: likewise.
 SPAN, KEPT_FRACTION = 500.0, 0.1
-#: Steps of the network's real-time step at once: still more exact than adaptive methods with
-#: their usual tolerances (benchmarks/bench_optimize.py).
+#: COARSE_STEPS: step as a multiple of the network's real-time step; still more exact than adaptive
+#: methods with their usual tolerances (benchmarks/bench_optimize.py).
 COARSE_STEPS = 2.5
-#: Of every component at the start, which breaks all symmetry.
+#: DISTURBANCE: standard deviation of every component at the start, which breaks all symmetry.
 DISTURBANCE = 0.05
-#: Cycles that are averaged, and points of one.
+#: AVERAGED: number of cycles that are averaged; POINTS: points of a cycle.
 AVERAGED, POINTS = 3, 256
-#: Range of the first variable below which nothing oscillates.
+#: ALIVE: range of the first variable below which nothing oscillates.
 ALIVE = 0.05
-#: A state has come back when it is this near, over the range of the states.
+#: RETURNED: distance, over the range of the states, up to which a state has returned.
 RETURNED = 0.1
 
 
@@ -145,22 +146,25 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     return LimitCycle(run, float(begin), period, signals, drift)
 
 
-#: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
+#: SETTLING: number of periods in which the network finds its gait; HOLD: gain of the symmetry lock
+#: meanwhile, 1/model time.
 SETTLING, HOLD = 30, 1.0
-#: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
-#: from so many states in the gait's class at random about it, this far in the mean. Variables that
-#: are beyond 1 at the equilibrium are taken over what they are there.
+#: Initial states of the search for a gait. SIZES: amplitudes of waves about the equilibrium;
+#: RANDOM: number of random states in the gait's class; SCATTER: their standard deviation.
+#: Variables beyond
+#: 1 at the equilibrium are scaled by their values there.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: After how many steps it is looked whether a start has settled, twice as many each time, the
-#: last of them only where that is asked for; how many are taken at once where there is no delay.
+#: LOOKED: numbers of steps after which it is checked whether a start has settled; LONGER: further
+#: ones, on request; COARSER: step without a delay, as a multiple of the real-time step.
 LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
-#: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
-#: their size, where they repeat: neither changes any more.
+#: A run has settled at rates below RESTING, 1/model time, or if its cycles differ by at most
+#: REPEATING of their size.
 RESTING, REPEATING = 1e-9, 1e-3
-#: Range of the first variable below which a network held in a symmetry does not oscillate.
+#: SMALLEST: range of the first variable below which a network held in a symmetry does not
+#: oscillate.
 SMALLEST = 1e-3
-#: How well what the network settles on has to repeat the gait's shifts, over its range, and from
-#: where on it has a further symmetry.
+#: KEPT: largest violation of the gait's shifts by a cycle, over its range; ADDED: violation up to
+#: which a cycle has a further symmetry.
 KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]
@@ -239,7 +243,7 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
     """
     symmetry = network.symmetry(gait)
     step = network.step * (1.0 if network.delay_parameter else COARSER)
-    # As many at a time as advance together.
+    # LANES starts advance together.
     for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
         histories: list[History] = list(some)
         before = 0

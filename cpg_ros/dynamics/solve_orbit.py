@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The orbits of a gait on the branches of its class's Hopf points, at one parameter set.
+"""Solving for the orbit of a gait of any network, also from its class's Hopf points.
 
 With a delay one branch gives many: an orbit of period T at a delay is an orbit at the delay plus
 any whole number of periods (Yanchuk & Perlikowski 2009, Phys. Rev. E 79, 046221). So only the
@@ -35,9 +35,9 @@ from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Hopf points are looked at up to this many times the delay.
+#: FURTHEST: multiple of the delay up to which Hopf points are searched for.
 FURTHEST = 4.0
-#: Points of a branch, at most, and turns, whole periods that a delay is longer by.
+#: POINTS: most points of a branch; TURNS: most whole periods that are added to a delay.
 POINTS, TURNS = 80, 12
 
 

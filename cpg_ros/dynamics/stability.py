@@ -41,7 +41,7 @@ from cpg_ros.networks.network import Network
 
 # Stability of a gait: whether it attracts, and with what symmetry gain.
 
-#: Decay that the lock gain gives transverse disturbances, per model time.
+#: RATE: rate at which transverse disturbances decay with the lock gain, 1/model time.
 RATE = 0.5
 
 

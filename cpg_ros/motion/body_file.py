@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The robot's body in a robot file, for feedback: leg geometry and efference tables.
+"""Parts of a robot file for feedback: biped, own laws and gains, leg geometry, efference tables.
 
 Part ``geometry`` has the lengths and axes of legs that feedback can displace, ``efference`` of a
 gait what the base does by itself in it.
@@ -32,12 +32,12 @@ import numpy as np
 # A biped in a robot file, part ``biped``: links and their masses, soles, servos, gains.
 
 BASE = 'base'
-#: Types of fields, with what a file must have there.
+#: Types of fields, annotated with the length of a list or a check of a number.
 Vector = Annotated[tuple[float, ...], 3]
 Positive = Annotated[float, positive]
 NotNegative = Annotated[float, lambda value: '' if value >= 0.0 else (
     f'{value:g} must be at least 0')]
-#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried on the G1, m/s.
+#: GAIT_SPEEDS: gait in which feedback balances a biped -> range of forward speed of the G1, m/s.
 GAIT_SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
           'two_legged_jump': (-0.05, 0.05)}
 
@@ -183,7 +183,7 @@ def biped_tree(biped: BipedBody) -> dict[str, Any]:
 
 @dataclass(frozen=True, repr=False)
 class OwnFeedback(ShortRepr):
-    """What a robot's feedback has of its own, where that is not the usual.
+    """Laws and gains of a robot's feedback that differ from the usual ones.
 
     Attributes:
         enabled: whether the feedback is on where nothing else is said.
@@ -212,12 +212,13 @@ def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
     return reader.record(OwnFeedback, tree, 'feedback', imu_mount=mount)
 
 
-#: Bins of the stride in an efference table, and most speeds that it has.
+#: BINS: bins of the stride in an efference table; SPEEDS: most speeds of a table.
 BINS, SPEEDS = 64, 10
-#: The legs that feedback can displace.
+#: LEGS: text for messages on the legs that feedback can displace.
 LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
         'hip about z, then two about one level axis')
-#: Its signals: velocities in m/s, rates in rad/s, angles in rad, of the base in its own frame.
+#: SIGNALS: signals of the table: velocities, m/s, rates, rad/s, and angles, rad, of the base in
+#: its own frame.
 SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
 
 
@@ -366,7 +367,7 @@ def _leg(reader: YamlReader, tree: Any, where: str, names: set[str]) -> LegGeome
 
 
 def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
-    """Take the part ``efference`` of a gait, rows of numbers with spaces between them."""
+    """Read the part ``efference`` of a gait, rows of numbers with spaces between them."""
     tree = reader.keys(tree, where, {'speeds', *SIGNALS})
     speeds = reader.numbers(tree['speeds'], f'{where}.speeds')
     if len(speeds) > SPEEDS:
@@ -397,7 +398,7 @@ def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
 
 
 def efference_tree(table: EfferenceTable) -> dict[str, Any]:
-    """Return what ``read_efference`` reads back, to four digits."""
+    """Return an efference table as the tree that ``read_efference`` takes, to four digits."""
     return {'speeds': list(table.speeds)} | {
         key: [' '.join(f'{value:.4g}' for value in row) for row in table.rows[key]]
         for key in SIGNALS}

@@ -32,11 +32,11 @@ from cpg_ros.networks import equations as generated
 from cpg_ros.networks.registry import find_network
 import numpy as np
 
-#: Most gaits fading into one another at once; a further one waits for a place.
+#: MOST_TRACKS: most gaits that fade into one another at once; a further one waits for a place.
 MOST_TRACKS = 4
-#: A joint whose command stood still for this time (s) has come to rest.
+#: HOLD: time of an unchanged command after which a joint counts as at rest, s.
 HOLD = 0.1
-#: Entries of the tables of a waveform over one cycle.
+#: TABLE: number of entries of a waveform's tables over one cycle.
 TABLE = 512
 
 _REAL, _WHOLE, _POINTER = ctypes.c_double, ctypes.c_int32, ctypes.c_void_p
@@ -158,7 +158,7 @@ class CGait:
     """
 
     def __init__(self, **fields: Any) -> None:
-        """Take fields of the struct; arrays of integers or floats, None for none."""
+        """Set fields of the struct; arrays of integers or floats, None for none."""
         self.struct = Gait()
         self._arrays = []
         for name, value in fields.items():

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Description of a robot by a model file of any format: joints, links and where they are.
+"""Description of a robot by a model file: joints, links and their frames; reader of URDF.
 
 ``urdf`` reads it from URDF, ``simulation.mjcf_description`` from MJCF.
 """
@@ -33,9 +33,9 @@ import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
-#: Share of the reach of a leg's last link from which on its points are those of the foot.
+#: END: share of the reach of a leg's last link beyond which its points belong to the foot.
 END = 0.97
-#: Limits of speed below this, rad/s, are those of a file rather than of a motor.
+#: SLOW: speed limit, rad/s, below which a model's limit is doubted; SERVOS: text for that message.
 SLOW, SERVOS = 5.0, 'hobby servos reach about 5 to 10 rad/s'
 
 
@@ -310,7 +310,7 @@ def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]
 
 
 def _controlled(element: Element, joint: JointDescription) -> JointDescription:
-    """Narrow a joint's limits to those that ros2_control has of its commands."""
+    """Narrow a joint's limits to the limits of its commands in the ros2_control part."""
     limits = {'lower': joint.lower, 'upper': joint.upper, 'velocity': joint.velocity}
     for interface in element.iterfind('command_interface'):
         for param in interface.iterfind('param'):
@@ -385,7 +385,7 @@ def _joint(element: Element, source: str) -> JointDescription:
 
 
 def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
-    """Return a link; what is no number counts as not there."""
+    """Return a link; entries that are not numbers are ignored."""
     mass = radius = 0.0
     centre: tuple[float, ...] = ()
     shapes: list[CollisionShape] = []
@@ -404,7 +404,7 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
 
 def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float, ...],
             rpy: tuple[float, ...]) -> Iterator[CollisionShape]:
-    """Return a box, a cylinder or a mesh that is there."""
+    """Return the boxes, cylinders and meshes of a link."""
     for box in collision.iterfind('geometry/box'):
         if size := numbers(box.get('size', ''), 3):
             yield CollisionShape(xyz, rpy, size)
@@ -419,9 +419,9 @@ def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float
 
 # Legs that reach to the side, as those of insects: which they are, and how they stand at first.
 
-#: Part of the femur's axis across the body from which on it swings the leg forward.
+#: ACROSS: component of the femur's axis across the body from which on it swings the leg forward.
 ACROSS = 0.9
-#: How far the femur is raised above level in a first stand, and the tibia lowered below it, rad.
+#: Angles of a first stand, rad. RAISED: femur above level; LOWERED: tibia below level.
 RAISED, LOWERED = 0.4, 1.3
 
 
@@ -452,7 +452,7 @@ def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a stand with the foot out to the side and below, and what the joints do there.
+    """Return a stand with the foot out to the side and below, and the roles of the joints.
 
     Args:
         places: of coxa, femur, tibia and foot with all joints at 0, m, shape (4, 3).

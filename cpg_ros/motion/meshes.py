@@ -26,8 +26,8 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, parse, read_bytes
 import numpy as np
 
-#: Most points and triangles of a Collada file, which can place a mesh any number of times, and
-#: most numbers in one of its lists.
+#: MOST: most points, and most triangles, of a Collada file, which can place a mesh any number of
+#: times; MOST_NUMBERS: most numbers in one of its lists.
 MOST, MOST_NUMBERS = 2_000_000, 6_000_000
 
 
@@ -214,13 +214,13 @@ def _transform(kind: str, numbers: np.ndarray) -> np.ndarray:
     return made
 
 
-# Where the meshes are that a URDF names, by path or by package.
+# Paths of the meshes that a URDF names, by path or by package.
 
 _PACKAGE = re.compile(r'(?:package|model):/+([^/]+)/+(.*)', re.DOTALL)
 
 
 def find_mesh(reference: str, urdf: Path | None, folder: str = '') -> Path:
-    """Return the file that a URDF means.
+    """Return the path of a mesh that a URDF names.
 
     ``package://NAME/...`` is looked for where ament and ROS_PACKAGE_PATH have packages, then in
     the folders above the URDF: one called NAME, one with a package.xml of that name, at last

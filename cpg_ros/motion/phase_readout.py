@@ -37,9 +37,9 @@ from cpg_ros.motion.core import CGait, look
 from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TURN, WaveReadout
 import numpy as np
 
-#: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
+#: POINTS: points of a cycle in the tables of an orbit; a cell may jump within 0.01 cycles.
 POINTS = 4096
-#: Least share of the first harmonic in a waveform's variance, for the phase to be followed.
+#: LEAST_SHARE: least share of the first harmonic in a waveform's variance for a phase to be read.
 LEAST_SHARE = 0.1
 
 
@@ -181,7 +181,7 @@ class PhaseReadout:
         return clocks
 
     def fields(self) -> dict[str, Any]:
-        """Return what the core reads joints and legs by, see core.CGait."""
+        """Return the fields by which the core reads joints and legs, see core.CGait."""
         waves, phases, maps, known = self.gait
         mean, half = known.shape[:, None, :2], known.shape[:, None, 2:]
         values = mean + half * known.tables[:, :, :2], half * known.tables[:, :, 2:]
@@ -210,13 +210,13 @@ def _crest(terms: np.ndarray) -> float:
 
 # The readout of a network's joints: of the waveform or of the phase, as the network states.
 
-#: Phases at which troughs are looked for, cycles.
+#: GRID: phases at which troughs are searched for, cycles.
 GRID = np.arange(1024) / 1024
 
 
 def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,
                   harmonics: int, maps: np.ndarray | None = None) -> WaveReadout | PhaseReadout:
-    """Return what reads joints and legs off the states of a gait.
+    """Return the readout of joints and legs from the states of a gait.
 
     Args:
         orbit: the gait.

@@ -33,9 +33,9 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
-# Whether the generator can run a gait at all, whatever the robot.
+# Obstacles: reasons why the generator cannot run a gait on any robot.
 
-#: A period needs this many steps for the integrator to stay on the orbit.
+#: STEPS_A_PERIOD: fewest steps of a period with which the integrator stays on the orbit.
 STEPS_A_PERIOD = 40
 
 
@@ -78,11 +78,11 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
     return None
 
 
-#: At rest: no state changes by more than this fraction of a cell's range in a stride.
+#: AT_REST: share of a cell's range below which its change in a stride counts as rest.
 AT_REST = 0.05
-#: Strides per second below which a robot would seem to stand (Hz).
+#: SLOWEST: least stride frequency, Hz; slower strides would look like a stand.
 SLOWEST = 0.01
-#: Periods of one orbit, solved for twice, agree to this share.
+#: SAME: relative difference up to which the periods of two solutions are those of one orbit.
 SAME = 1e-6
 
 

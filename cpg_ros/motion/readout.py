@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From cells to joints: what a network in its gait means for the legs.
+"""Readout from cells to joints: duty factors, polynomials, retiming and waveform readouts.
 
-Here for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
+It is for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
 the gait's peak, y its derivative by phase. See phase_readout for those whose phase does.
 """
 
@@ -29,7 +29,7 @@ import numpy as np
 
 # The duty factor: how much of a stride a leg stands, whatever its network does.
 
-#: Smallest and largest duty factor that can be set.
+#: LEAST, MOST: smallest and largest duty factor that can be set.
 LEAST, MOST = 0.3, 0.9
 
 
@@ -46,7 +46,7 @@ def retimed_phase(phase, k, centre, own):
 
 
 def at_even_phases(one: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a map (k, centre, own) makes of even phases of a cycle, and its slope there."""
+    """Return the image of even phases of a cycle under a map (k, centre, own), and its slope."""
     rows = [retimed_phase(n / points, *one)[:2] for n in range(points)]
     phase, steep = np.array(rows).T
     return phase, steep
@@ -315,11 +315,11 @@ class WaveReadout:
             orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3)), maps, TABLE)
 
     def clocks(self, phase: float) -> np.ndarray:
-        """Return what is nothing here: the state alone determines the joints."""
+        """Return no clocks: the state alone determines the joints."""
         return np.zeros((6, self.wave.phases.size))
 
     def fields(self) -> dict[str, Any]:
-        """Return what the core reads joints and legs by, see core.CGait."""
+        """Return the fields by which the core reads joints and legs, see core.CGait."""
         wave, joints, retiming = self.wave, self.joints, self.retiming
         turn, cycle, maps = (None,) * 3 if retiming is None else retiming
         return {'peak': wave.peak, 'period': wave.period, 'phase': wave.phases,

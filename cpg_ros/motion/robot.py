@@ -36,7 +36,7 @@ import numpy as np
 #: Default number of harmonics of a Morris-Lecar cell that joints follow.
 HARMONICS = 3
 
-#: How many weights each readout order takes; the bare scale is an order of its own.
+#: WEIGHTS: numbers of weights of the readouts: of a bare scale, and of the orders 1, 2 and 3.
 WEIGHTS = (1, 2, 4, 6)
 
 
@@ -250,7 +250,7 @@ class Robot(ShortRepr):
 
 # A gait's readout as one list for each joint: its offset, then its weights, rad.
 
-#: What the generator's parameters of readouts begin with; the joint's name follows.
+#: READOUT: prefix of the generator's parameters of readouts; the joint's name follows.
 READOUT = 'readout.'
 
 

@@ -46,11 +46,11 @@ from cpg_ros.motion.robot import (
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
 
-#: How many times its own frequency a gait that is steered may step, at most.
+#: HASTE: largest frequency of a steered gait, as a multiple of the gait's own.
 HASTE = 2.0
 #: Limits of a joint.
 LIMITS = ('lower', 'upper', 'velocity')
-#: No angle (rad) or speed (rad/s) of a joint is larger.
+#: LARGEST: largest number that a robot file may state, such as an angle, rad, or speed, rad/s.
 LARGEST = 1e6
 
 

@@ -27,9 +27,9 @@ from typing import Any, ClassVar, Literal, TypeVar, Union
 
 from cpg_ros.common.errors import InputError
 
-# What equations are written with: terms that remember how they were made.
+# Terms of the equations, which are recorded as text.
 
-#: What may stand in an equation.
+#: Operands of an equation.
 Number = Union['Term', float]
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A network's equations, read once: what they are made of, and functions on arrays from them.
+"""A network's equations as functions on arrays, with exact derivatives, kept on disk.
 
 Every cell obeys the same equations, in which other cells are inputs, now or a delay ago. They are
 written once for a cell (``Network.equations``); here they are read as texts, and sympy derives the
@@ -36,9 +36,9 @@ from cpg_ros.common.files import write_atomically
 from cpg_ros.networks.definition import AnyDefinition, Cell, NetworkDefinition, Parameters, Term
 import numpy as np
 
-# What is compiled and generated from a network's equations, kept on disk between processes.
+# Code that is compiled and generated from a network's equations, kept on disk between processes.
 
-#: Subpackages with compiled code, and with the numbers that it takes from elsewhere.
+#: Subpackages with compiled code and with the constants that are compiled into it.
 _COMPILED = ('networks', 'dynamics', 'motion', 'feedback')
 
 

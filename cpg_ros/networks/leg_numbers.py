@@ -33,9 +33,9 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.networks.definition import AnyDefinition, leg_count
 
 BIPED = ('left', 'right')
-#: Number of legs -> the shipped robot that a network of so many legs starts with.
+#: ROBOTS: number of legs -> default shipped robot of networks with that number.
 ROBOTS = {2: 'biped', 4: 'quadruped', 6: 'hexapod'}
-#: Pairs of legs from the head on.
+#: GIRDLES: names of the pairs of legs, from the head on.
 GIRDLES = ('fore', 'middle', 'hind')
 #: Largest number of legs.
 MOST = 32

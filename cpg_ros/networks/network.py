@@ -14,7 +14,7 @@
 
 """The base class of networks: rates, presets, symmetries of gaits, and their defaults.
 
-What it states of its parameters, cells and equations is in network_definition.
+The statement of its parameters, cells and equations is in definition.
 """
 
 from abc import abstractmethod
@@ -32,7 +32,7 @@ from cpg_ros.networks.leg_numbers import unpickle
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: What a file of one's own network imports from here.
+#: Names that a file with a user's own network imports from here.
 __all__ = ['Network', 'Preset', 'Range', 'known']
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')

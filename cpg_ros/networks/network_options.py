@@ -27,7 +27,7 @@ from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 import numpy as np
 
-#: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
+#: LARGEST: largest parameter; beyond it, arithmetic fails before it shows anything.
 LARGEST = 1e6
 DEFAULT = 'delayed'
 

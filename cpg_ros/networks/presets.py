@@ -25,7 +25,7 @@ from cpg_ros.common.files import resource_folder
 from cpg_ros.common.yaml_reader import positive, within, write_yaml, YamlReader
 from cpg_ros.networks.definition import AnyDefinition
 
-#: No number in a preset is larger.
+#: LARGEST: largest number in a preset.
 LARGEST = 1e3
 
 

@@ -38,15 +38,15 @@ from cpg_ros.networks.leg_numbers import GIRDLES, split_name, with_legs
 from cpg_ros.networks.library import shipped
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 
-# What a network states, checked: for those that do not come with the package.
+# Checks of the attributes of networks that do not come with the package.
 
-#: What every network has to state.
+#: STATED: attributes that every network has to state.
 STATED = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs', 'usual_gait', 'free',
           'line')
 
 
 def flaw(network: type[Network]) -> str:
-    """Say what is wrong with what a network states, one line, or ''.
+    """Return what is wrong with the attributes of a network, one line, or ''.
 
     Raises:
         ValueError: its presets cannot be read, or its line is none.
@@ -152,9 +152,9 @@ def _gaits(network: type[Network]) -> Iterator[str]:
 
 
 GROUP = 'cpg_ros.networks'
-#: Largest file of a network, bytes.
+#: LARGEST: largest file of a network, bytes.
 LARGEST = 4_000_000
-#: Those that come with the package.
+#: SHIPPED: name -> network that comes with the package.
 SHIPPED: dict[str, type[Network]] = {network.name: network for network in shipped()}
 
 Entry = TypeVar('Entry')

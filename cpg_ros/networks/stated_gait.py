@@ -25,8 +25,8 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Largest distance of a gait that is one, RMS over the legs in cycles. A quarter of the way from
-#: one gait to the next has about 0.05.
+#: TOLERANCE: largest RMS difference of the legs' phases from a named gait, cycles. A quarter of
+#: the way from one gait to the next has about 0.05.
 TOLERANCE = 0.06
 
 

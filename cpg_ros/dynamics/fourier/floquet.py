@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Floquet multipliers of the gaits of networks with a delay: the variational equation, spectrally.
+"""Variational equation of gaits with a delay: adjoint, Floquet multipliers, forced solutions.
 
 Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, which
-keep the subspaces apart that symmetry does (dynamics.isotypic_split). A history is held at
+keep the subspaces apart that symmetry does (dynamics.isotypic). A history is held at
 Chebyshev points of equal elements of [-tau, 0]. Elements of the same length march over a period,
 so that a delayed value always lies at a point; the monodromy matrix takes the values of one
 history to those a period later (Breda, Maset & Vermiglio 2012).
@@ -36,7 +36,7 @@ import scipy
 
 # The adjoint of the variational equation along a gait of a network with a delay, spectrally.
 
-#: The adjoint is resolved when its last harmonics are this small.
+#: RESOLVED: relative size of the last harmonics at which the adjoint is resolved.
 RESOLVED = 1e-9
 
 
@@ -74,12 +74,13 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     return waveform
 
 
-#: Polynomial degree on an element, and how much of a period one holds at most.
+#: DEGREE: polynomial degree on an element; SPAN: longest element, as a share of the period.
 DEGREE, SPAN = 20, 0.4
-#: Elements are halved until the trivial multiplier is 1 to this.
+#: TRIVIAL: error of the trivial multiplier, which is 1, up to which the elements are halved, at
+#: most HALVINGS times.
 TRIVIAL = 1e-9
 HALVINGS = 4
-#: Up to this size of a matrix all of its eigenvalues take no longer than the largest.
+#: FEW: size of a matrix up to which computing all eigenvalues takes no longer than the largest.
 FEW = 90
 
 
@@ -267,7 +268,7 @@ def leading(orbit: FourierOrbit, count: int, exact: float, trivial: float, halvi
 
 @lru_cache(maxsize=4)
 def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
-    """Return the variational equation, fine enough, and the multipliers within the class."""
+    """Return a sufficiently fine variational equation and the multipliers within the class."""
     return _resolved(orbit, TRIVIAL, HALVINGS, lambda equation: equation.multipliers(
         equation.inside, 0.0))
 
@@ -323,7 +324,7 @@ def mode(orbit: FourierOrbit, part: int, multiplier: complex
 
 # The variational equation along a gait of a network with a delay, with sources, as a matrix.
 
-#: Unknowns at most: the matrices are dense.
+#: MOST: largest number of unknowns, as the matrices are dense.
 MOST = 4096
 
 
@@ -433,7 +434,7 @@ class Variational:
         return now, past
 
     def delayed(self, values: States) -> np.ndarray:
-        """Return what the part a delay ago adds to the rates."""
+        """Return the contribution of the delayed part of a disturbance to the rates."""
         assert values[1] is not None
         sources: np.ndarray = np.einsum('tij,tj->ti', self._past, values[1])
         return sources

@@ -118,7 +118,7 @@ class FourierOrbit(Orbit):
 
     @property
     def d_values(self) -> np.ndarray:
-        """Those of the nodal values, shape (waves, variables, n, parameters)."""
+        """Derivatives of the nodal values by the parameters, (waves, variables, n, parameters)."""
         return self.derivatives[:-1].reshape(*self.values.shape, -1)
 
     @property
@@ -158,12 +158,13 @@ class FourierOrbit(Orbit):
 
 NODES = 63
 MOST_NODES = 1023
-#: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
+#: TOLERANCE: residual at which Newton's method stops; STEPS: most steps of it.
 TOLERANCE, STEPS = 1e-12, 12
+#: RESOLVED: relative size of the last harmonics at which a waveform is resolved.
 RESOLVED = 1e-12
 #: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
 Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
-#: Below this range Newton has fallen to the rest state.
+#: SMALLEST: range of a waveform below which Newton's method has fallen to the rest state.
 SMALLEST = 1e-7
 
 

@@ -151,7 +151,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
             np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))
 
 
-#: Points of a cycle on which describing functions are worked out.
+#: POINTS: points of a cycle on which describing functions are computed.
 POINTS = 32
 THETA = np.arange(NODES) / NODES
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How the numerical kernels are compiled, and the elementary functions they share.
+"""Compilation of the numerical kernels, and the elementary functions that they share.
 
 By numba, which is loaded when the first of them runs: what the generator needs without feedback is
 C. Where numba is missing they are plain Python, which is too slow for feedback and simulation.

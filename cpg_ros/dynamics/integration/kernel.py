@@ -40,7 +40,7 @@ from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
 import numpy as np
 
-# What the integrator's compiled functions take together: a network, its history, its samples.
+# Arguments of the integrator's compiled functions: a network, its history, its samples.
 
 class System(NamedTuple):
     """The network that is integrated, and its symmetry lock.
@@ -77,7 +77,7 @@ class Ring(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What is kept of the steps taken.
+    """Buffers for the recorded steps.
 
     Attributes:
         every: keep every so many steps only.

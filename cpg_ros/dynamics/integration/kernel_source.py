@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Loops over all cells and lanes that work out expressions, as kernel code.
+"""Kernel code of a network's right-hand side, in Python and C: loops over all cells and lanes.
 
 A function of what another cell has is worked out where it is and then fetched, so that it is
 worked out once. Loops are short: one for every elementary function and one for every result, which
@@ -352,7 +352,7 @@ class _Printer(C99CodePrinter):  # type: ignore[misc]
 
 
 class FieldSource(NamedTuple):
-    """The functions, and what they need.
+    """C of a network's functions, and the sizes of their arrays.
 
     Attributes:
         text: C.

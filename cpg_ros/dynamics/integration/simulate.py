@@ -31,11 +31,11 @@ import numpy as np
 #: slopes.
 History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
 
-#: Trajectories that advance together in vector registers.
+#: LANES: number of trajectories that advance together in vector registers.
 LANES = 8
-#: What makes the kernels of batches in this process: numba's have noise, and step lanes at once.
+#: Backend of the kernels of batches: only numba's have noise and step all lanes at once.
 _maker: Callable[[type[Network]], Kernels] = numba_kernels if COMPILED else c_kernels
-#: Work between two updates of the progress bar, in component steps.
+#: CHUNK: work between two updates of the progress bar, components times steps.
 CHUNK = 20_000_000
 
 

@@ -30,13 +30,13 @@ from numpy.polynomial import legendre, polynomial
 
 # Gauss collocation on a mesh: polynomials of degree S on each interval, exact at its S nodes.
 
-#: Nodes of an interval.
+#: S: number of nodes of an interval.
 S = 8
-#: Least density of a mesh, over the mean.
+#: FLOOR: least density of a mesh, over the mean.
 FLOOR = 0.2
 
 _X, _W = legendre.leggauss(S)
-#: Places of the nodes in an interval [0, 1], weights, and the integration matrix A.
+#: NODES: places of the nodes in an interval [0, 1]; WEIGHTS: their Gauss weights.
 NODES, WEIGHTS = 0.5 * (_X + 1.0), 0.5 * _W
 
 
@@ -53,7 +53,7 @@ _LAGRANGE = _lagrange()
 #: Power coefficients of their integrals from 0, shape (S, S + 1).
 INTEGRALS = np.hstack([np.zeros((S, 1)), _LAGRANGE / np.arange(1, S + 1)])
 A = polynomial.polyval(NODES, INTEGRALS.T).T
-#: From values at the nodes to the coefficients of the Legendre polynomials.
+#: LEGENDRE: matrix from values at the nodes to coefficients of the Legendre polynomials.
 LEGENDRE = np.linalg.inv(legendre.legvander(_X, S - 1))
 
 
@@ -102,11 +102,11 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
 
 # Meshes whose ends lie where the rates have a kink, so that collocation keeps its order.
 
-#: Places of an interval between which a change of sign is looked for.
+#: PLACES: places of an interval between which sign changes are searched for.
 PLACES = np.linspace(0.0, 1.0, 9)
-#: An end this near to a kink, over the whole, is on it.
+#: ON: distance of an interval's end from a kink, over the mesh, up to which it lies on the kink.
 ON = 1e-13
-#: An end is moved that is nearer than this share of the shorter interval beside it.
+#: NEAR: an end is moved to a kink within this share of the shorter interval beside it.
 NEAR = 0.4
 
 

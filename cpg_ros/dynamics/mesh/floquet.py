@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Floquet multipliers of the gaits of networks without delay.
+"""Variational equation of gaits without delay: adjoint, Floquet multipliers, forced solutions.
 
 A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow keeps Fix(K) and its
 orthogonal complement apart, so the multipliers split: those within the class, 1 among them, and
@@ -42,9 +42,9 @@ import scipy
 
 # The adjoint of the variational equation along a gait of a network without delay.
 
-#: An interval is fine enough when its polynomials end with terms of this share of the whole.
+#: RESOLVED: relative size of the last terms of an interval's polynomials at which it is resolved.
 RESOLVED = 1e-9
-#: Below this singular value a disturbance other than along the orbit does not decay, either.
+#: SINGULAR: singular value below which a disturbance other than along the orbit is neutral, too.
 SINGULAR = 1e-9
 
 
@@ -106,11 +106,11 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 # Eigenvalues of a product of many matrices, each to its own size.
 
-#: Two spaces this close are one.
+#: SAME: difference up to which two subspaces are one.
 SAME = 1e-13
-#: Eigenvalues of a block may differ by this factor in size: what is left to rounding then.
+#: ALIKE: largest ratio of the sizes of a block's eigenvalues, which bounds their rounding errors.
 ALIKE = 1e4
-#: Times that the columns go round at most.
+#: ROUNDS: most iterations of all factors on the columns.
 ROUNDS = 40
 
 
@@ -125,7 +125,7 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
 
     """
     factors, d = np.ascontiguousarray(factors), factors.shape[-1]
-    # Any columns do that lie in no space of their own.
+    # Random columns lie in no invariant subspace.
     columns = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0])
     work = np.empty((3, d, d))
     for _ in range(ROUNDS):
@@ -174,7 +174,7 @@ def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], f
     rates = network.rates(points)[:, network.place] @ inside
     sizes = np.linalg.norm(rates, axis=1)
     along = rates / sizes[:, None]
-    # What is left of the way along the flow: 1, but for what collocation makes wrong.
+    # The factors along the flow: their product is 1 but for errors of collocation.
     kept = np.einsum('ni,nij,nj->n', along[1:], steps, along[:-1]) * sizes[:-1] / sizes[1:]
     across = _across(along)
     inner = across[1:].transpose(0, 2, 1) @ steps @ across[:-1]
@@ -428,5 +428,5 @@ class Variational:
         return np.einsum('isjk,isk->isj', self._jacobians, values[0]), None
 
     def delayed(self, values: States) -> np.ndarray:
-        """Return what the part a delay ago adds to the rates: nothing."""
+        """Return the contribution of the delayed part to the rates: nothing."""
         return np.zeros_like(values[0])

@@ -36,13 +36,14 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import polynomial
 
-#: A mesh is fine enough when its polynomials end with terms of this share of the whole.
+#: RESOLVED: relative size of the last terms of the polynomials at which a mesh is resolved.
 RESOLVED = 1e-11
 FEWEST, MOST_INTERVALS = 12, 800
-#: Intervals of a first mesh, and places for each of them at which it is seen how the guess bends.
+#: FEW: number of intervals of a first mesh; LOOKED: places of each at which the curvature of the
+#: guess is evaluated.
 FEW, LOOKED = 30, 17
-#: Newton stops at steps this small, against the size of the states and the period: what is left
-#: is of the order of their square.
+#: TOLERANCE: relative size of Newton's step at which it stops; the remaining error is of order its
+#: square.
 TOLERANCE = 1e-8
 STEPS = 15
 
@@ -57,7 +58,7 @@ class Reduced(Field):
     """
 
     def __init__(self, network: Network, symmetry: Symmetry) -> None:
-        """Look at a network in a gait."""
+        """Prepare for a network in a gait."""
         super().__init__(network, symmetry.classes)
         first = self.kept[:self.size]
         blocks = np.arange(network.variables)[:, None]
@@ -251,7 +252,7 @@ def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray
 
 # Orbits as polynomials on a mesh: the gaits of the networks without delay.
 
-#: Even points of a cycle that resolve a relaxation oscillation.
+#: SAMPLES: number of even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Finding the orbit of a gait of a network without delay, from the nearest one known.
+"""Finding the orbit of a gait of a network without delay, and curves of such orbits.
 
 From the given start Newton's method is tried at once; failing that, the network is left to find
 its gait by itself, held in its symmetry, from there and from many other states; failing that, the
@@ -55,13 +55,14 @@ from numpy.polynomial import polynomial
 
 # Solving for orbits on meshes that are made finer until they resolve them.
 
-#: How many times as many intervals a first mesh has where fewer lead nowhere: as several spikes.
+#: MORE: factor of the intervals of a first mesh if Newton's method fails with fewer, as for
+#: waveforms of several spikes.
 MORE = 4
-#: Times that ends of intervals are put on kinks anew.
+#: ALIGNED: most iterations that put ends of intervals on kinks.
 ALIGNED = 8
-#: Below this range the orbit has fallen to an equilibrium.
+#: SMALLEST: range below which the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
-#: Places of an interval, 0 to 1, at which it is looked how well the equations hold.
+#: BETWEEN: places of an interval, 0 to 1, at which the residual of the equations is evaluated.
 BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
@@ -341,7 +342,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
             curve.pack(sampled(on_quotient(disturbance), mesh, 1.0), 0.0, 0.0))
 
 
-#: A peak this much lower than the highest, over that, is another one.
+#: SAME: relative difference from the highest peak above which a peak is another one.
 SAME = 1e-6
 
 
@@ -373,7 +374,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
 
 def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                 ) -> MeshOrbit | None:
-    """Collocate from what a simulation does in a period from a state near the orbit."""
+    """Collocate from a simulation over one period from a state near the orbit."""
     run = simulate(network, start, 1.05 * period, network.step, progress=False)
     return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
 
@@ -401,7 +402,7 @@ def _sought(network: Network, gait: str) -> MeshOrbit:
 
 
 def _settled(network: Network, gait: str) -> MeshOrbit | None:
-    """Return what the network settles on from many states of the gait's class."""
+    """Return the orbit on which the network settles from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
         orbits = (_accepted(from_path(network, symmetry, *guess)) for guess in find_orbit(network,

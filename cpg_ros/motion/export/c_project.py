@@ -47,7 +47,7 @@ class CProject:
     header = 'cpg.h'
 
     def __init__(self, data: GaitData, title: str, substep: float = SUBSTEP) -> None:
-        """Take gaits, and the longest part of a tick while they fade, s.
+        """Prepare gaits for export; substep is the longest part of a tick while they fade, s.
 
         Raises:
             InputError: two gaits, legs or joints have the same name in C.
@@ -79,7 +79,7 @@ class CProject:
 
     @property
     def ram(self) -> int:
-        """Memory of a struct cpg, bytes, but for what pads its flags."""
+        """Memory of a struct cpg, bytes, without the padding of its flags."""
         joints, legs = len(self.data.robot.joints), len(self.data.robot.legs)
         track = 5 + 2 * joints + legs
         if self.data.format.form == 'network':
@@ -278,7 +278,8 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
 
 # Gaits as skill arrays of Petoi's OpenCat: one cycle in frames of whole degrees.
 
-#: What an array may take in the robot's memory, bytes, and its most frames, by its first number.
+#: Limits of a skill array. MOST_BYTES: size in the robot's memory, bytes; MOST_FRAMES: number of
+#: frames, which the first number, an int8, states.
 MOST_BYTES, MOST_FRAMES = 450, 127
 HEAD = 4
 LEGS = (('lf', 'fl'), ('rf', 'fr'), ('rh', 'hr', 'rb', 'br', 'rr'), ('lh', 'hl', 'lb', 'bl', 'rl'))

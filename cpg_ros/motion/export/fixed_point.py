@@ -33,8 +33,8 @@ import numpy as np
 
 POINTS = 256
 POSITION = 13
-#: As of pattern.c: a shift between stand and gait is covered at this many times it a second, and
-#: substeps keep to this share of the bound on speed.
+#: As in pattern.c. SHIFTING: joint speed allowed in ramps and fades, 1/s, per rad from the stand
+#: to the gait's mean; SHORT_OF: share of the speed bound up to which joints go.
 SHIFTING, SHORT_OF = 2.0, 0.997
 #: Most bits of an angle, so that the difference of two fits, too; and of a rate.
 ANGLE_BITS, RATE_BITS = 14, 13

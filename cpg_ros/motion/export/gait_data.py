@@ -33,7 +33,7 @@ import numpy as np
 
 FLAT = 1e-3
 POINTS = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
-#: Entries of tables by the angle of a waveform.
+#: LEAD: type of numbers -> entries of the tables over a waveform's angle.
 LEAD = {'float32': 256, 'float64': 512}
 LIMITS = ('lower', 'upper', 'velocity')
 
@@ -180,7 +180,7 @@ class GaitData:
         self.retimed = any((self.maps(plan) is not None) for plan in plans)
 
     def maps(self, plan: GaitPlan) -> np.ndarray | None:
-        """Return what a duty factor makes of each joint's phase, (joints, 3), None for nothing."""
+        """Return the duty factor's map of each joint's phase, (joints, 3), None for none."""
         readout = plan.readout
         if isinstance(readout, WaveReadout):
             return None if readout.retiming is None else readout.retiming.maps

@@ -34,7 +34,7 @@ SEED = 20
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Golden(ShortRepr):
-    """What the Python generator does.
+    """Output of the Python generator, with which the C is compared.
 
     Attributes:
         start: state that the first gait's network has had for all times, shape (components,).

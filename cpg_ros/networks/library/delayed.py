@@ -38,7 +38,7 @@ from cpg_ros.networks.network import known, LeastCoupling, Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 
 CELLS = 8
-#: Model time per step in real time: 500 steps a cycle, error of a waveform about 1e-9.
+#: STEP: step in real time, model time: 500 steps a cycle, error of a waveform about 1e-9.
 STEP = 0.0025
 #: Longest delay that may be set at run time, in model time.
 MAX_DELAY = 5.0

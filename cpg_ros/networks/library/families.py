@@ -36,8 +36,8 @@ from cpg_ros.networks.symmetry import GAITS, Group, Permutation, Symmetry, Z4_Z2
 
 # Two rings of cells for any even number of legs (Golubitsky, Stewart, Buono & Collins 1999).
 
-#: By number of legs: the gaits in which neighbouring legs of a side are half a cycle apart, right
-#: and left legs of a pair as well, or together.
+#: Number of legs -> names of the two gaits in which neighbouring legs of a side are half a cycle
+#: apart: with the legs of a pair half a cycle apart, and with these together.
 _ALTERNATING = {4: ('trot', 'bound'), 6: ('tripod', 'lurch'), 8: ('tetrapod', 'lurch')}
 
 
