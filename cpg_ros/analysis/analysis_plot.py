@@ -35,23 +35,23 @@ from matplotlib.lines import Line2D
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-#: Of the gaits of the four-legged and two-legged networks.
+#: COLOURS: gait of the four-legged and two-legged networks -> its colour.
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
            'two_legged_hop': '#805ad5', 'skip': '#2f855a', 'gallop': '#b7791f',
            'hesitation_walk': '#97266d', 'asymmetric_hop': '#718096', 'one_legged_hop': '#975a16'}
-#: Of other gaits, in their network's order; what is no gait is grey.
+#: FURTHER: colours of other gaits, in their network's order; GREY: colour of what is not a gait.
 FURTHER = ('#e53e8f', '#00a37a', '#5a67d8', '#a3a300', '#7b341e', '#38b2ff', '#ff8c42',
            '#b794f4', '#9ae600', '#f56565', '#234e52', '#d6bcfa', '#ffd166', '#1a365d')
 GREY = '#4a5568'
-#: Lines of what attracts by itself, with a symmetry lock, and not at all.
+#: STYLES: lines and labels of orbits that attract by themselves, with a symmetry lock, and not.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
-#: Marks of places where an orbit's stability changes other than in a fold, filled where softly.
+#: CROSSINGS: loss of stability other than a fold -> its mark, which is filled if it is soft.
 CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
-#: Lines between two points of a branch.
+#: BETWEEN: number of lines between two points of a branch.
 BETWEEN = 8
-#: Roots that are drawn of each class, at most.
+#: ROOTS: most roots of each class that are drawn.
 ROOTS = 7
 
 
@@ -229,7 +229,7 @@ def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> 
 
 # The picture of ``analyze --prc FILE``: the phase response curves of each gait.
 
-#: Points of a cycle.
+#: POINTS: number of points of a drawn cycle.
 POINTS = 513
 LINE_COLOURS = ('#2b6cb0', '#c05621', '#2f855a', '#97266d')
 

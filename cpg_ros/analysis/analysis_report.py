@@ -75,9 +75,9 @@ COMMENTARIES = {
     'quadruped': Commentary(title='Buono & Golubitsky at these points:', remark=_theorem)}
 
 
-#: Error of the multiplier along the orbit from which the report mentions it.
+#: UNSURE: error of the trivial multiplier above which the report mentions it.
 UNSURE = 1e-6
-#: A variable so close to 0 at the stand is on the kink there.
+#: ON_KINK: distance from 0 at the stand up to which a variable is on its kink.
 ON_KINK = 1e-12
 
 

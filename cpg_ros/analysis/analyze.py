@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``analyze``: what a parameter set does, before it runs on a robot.
+"""Executable ``analyze``: gaits and stability of a parameter set, before it runs on a robot.
 
 ``analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4`` tells whether the set oscillates,
 in which gaits, from which delay on, how large and how fast, and how stable each gait is: on the
@@ -51,9 +51,9 @@ examples:
   analyze --network biped --preset run --basin 200 --seed 1
 
 exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
-#: Delays beyond which no Hopf points are looked for, model time.
+#: LONGEST: largest delay up to which Hopf points can be searched for, model time.
 LONGEST = 100.0
-#: Random states of a basin, at most.
+#: MOST_STATES: most random states of a basin.
 MOST_STATES = 1_000_000
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Basins: on what share of random states a network returns to a gait, and what else it does.
+"""Basins: the share of random states from which a network returns to a gait, and other ends.
 
 Each state is drawn at random: every variable of every cell evenly over twice its range on the
 orbit, about the middle of that; with a delay the history is constant. The whole network runs from
@@ -36,17 +36,19 @@ from scipy.stats import binomtest
 if TYPE_CHECKING:
     from cpg_ros.analysis.analysis_report import Analysis
 
-#: Cycles of a run, its points that are kept of each, and states that run at a time.
+#: CYCLES: cycles of a run; KEPT: recorded points of a cycle; TOGETHER: runs that advance together.
 CYCLES, KEPT, TOGETHER = 100, 64, 64
-#: Range of the states over that of the orbit.
+#: WIDTH: range of the random states over the orbit's range.
 WIDTH = 2.0
-#: Share of the range by which signals may differ that are one; of periods that are one.
+#: A run has returned to the orbit if its signals differ by less than the share SAME of their
+#: range, and its period by less than the share SAME_PERIOD.
 SAME, SAME_PERIOD = 0.05, 0.01
-#: A symmetry holds where signals differ by less than this share of their range.
+#: HOLDS: difference of the signals, as a share of their range, up to which a symmetry holds.
 HOLDS = 0.01
-#: A network rests that moves by less than this share of the orbit's range in its last cycles.
+#: RESTS: motion, as a share of the orbit's range, below which a network rests; LAST: number of
+#: last cycles in which that is judged.
 RESTS, LAST = 1e-3, 3
-#: Ends of runs that are no gait.
+#: Ends of runs that are not a gait.
 REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'
 
 

@@ -26,10 +26,11 @@ from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form, OrbitNormalForm
 
-#: Points of a branch at most, how far apart in arclength, how many times the first period the
-#: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
+#: POINTS: most points of a branch; LONGEST: largest arclength between them; SLOWEST: largest ratio
+#: of the last period to the first, as branches wind near a homoclinic orbit; BRANCHES: most
+#: branches.
 POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.3, 5.0, 12
-#: By what crosses the circle: what is there beyond.
+#: BEYOND: kind of a loss of stability -> motion that branches off.
 BEYOND = {'torus': 'a torus', 'period doubling': 'a gait of two strides',
           'branch point': 'a gait of less symmetry'}
 

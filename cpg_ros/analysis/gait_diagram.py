@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
+"""Footfall (Hildebrand) diagrams of recorded runs and of gaits, and the executable for these.
 
 ``python -m cpg_ros.analysis.gait_diagram gaits.png --network biped`` draws a network's gaits from
 their orbits. A leg stands while the signal that drives it falls, from peak to trough; where cells
@@ -44,11 +44,11 @@ import numpy as np
 
 # Footfall diagrams after Hildebrand: which foot stands when, and how fast the robot goes.
 
-#: A foot that bears more than this share of the weight stands.
+#: STANDING: share of the weight on a foot above which it stands.
 STANDING = 0.04
-#: Time over which the speed is averaged, s.
+#: SMOOTHING: time over which the speed is averaged, s.
 SMOOTHING = 0.5
-#: Endings of the files that can be written.
+#: FORMATS: endings of the files that can be written.
 FORMATS = ('.png', '.svg', '.pdf')
 
 
@@ -145,7 +145,7 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
 
 
 STRIDES = 2.0
-#: Of the fore, the hind and the middle pairs, or of one leg after the other.
+#: COLOURS: colours of the fore, hind and middle pairs, or of the legs one after the other.
 COLOURS = ('#2b6cb0', '#c05621', '#2f855a')
 
 

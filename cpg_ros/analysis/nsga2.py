@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Islands: populations that evolve separately, and periodically send their best to a neighbour.
+"""NSGA-II on islands, populations that exchange their best, and the search for a gait's weights.
 
 Each island is an NSGA-II of its own with random numbers of its own, derived from the seed, its
 number and the epoch. What is found depends on the number of islands, never on who computes them.
@@ -29,7 +29,7 @@ from cpg_ros.common.errors import CpgError, InputError, MissingLibraryError, Sho
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Generations between two migrations, and the share of a population that goes.
+#: EPOCH: generations between two migrations; MIGRANTS: share of a population that migrates.
 EPOCH, MIGRANTS = 3, 0.1
 
 
@@ -180,9 +180,10 @@ def migrate(results: Sequence[EpochResult]
 
 # Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
 
-#: Sets of the front that are tried before the search is given up.
+#: TRIALS: most sets of the front that are verified before the search fails.
 TRIALS = 20
-#: Phase errors (degrees) that are all the same when one set is chosen, and the largest allowed.
+#: SAME: difference of phase errors that does not matter in the choice of a set, degrees; LARGEST:
+#: largest phase error of a set, degrees.
 SAME, LARGEST = 0.1, 1.0
 
 

@@ -42,12 +42,12 @@ from cpg_ros.networks.registry import find_network, is_path, NETWORKS, SHIPPED
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-# What may vary when weights are looked for: couplings that keep a gait's symmetry, and cells.
+# Unknowns of a search for weights: couplings that keep a gait's symmetry, and cells' parameters.
 
-#: Shipped networks whose weights can be looked for.
+#: SEARCHED: name -> shipped network whose weights can be searched for.
 SEARCHED: dict[str, type[Network]] = {
     name: SHIPPED[name] for name in sorted(SHIPPED) if SHIPPED[name].searched}
-#: Values have this many decimals, so that what is found can be written down as it is.
+#: DECIMALS: decimals of the values that are tried, so that results can be written down exactly.
 DECIMALS = 4
 
 
@@ -174,21 +174,26 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     return space
 
 
-#: Sets that are simulated at once, which limits memory: a usual generation is one batch.
+#: LARGEST_BATCH: most sets that are simulated at once, which limits memory; a usual generation
+#: fits.
 LARGEST_BATCH = 256
-#: How far a start is from the gait, as a share of the signals (see ``_mismatch``).
+#: START_MISMATCH: distance of a start from the gait, as a share of the signals (see
+#: ``_mismatch``).
 START_MISMATCH = 0.2
-#: Smaller phase errors (degrees) are all the same: they tell of rounding, not of weights.
+#: RESOLUTION: phase error, degrees, below which errors are rounding and count as equal.
 RESOLUTION = 0.001
-#: Nearer to the gait than this its exact orbit is solved for: phases (degrees) and mismatch.
+#: The exact orbit is solved for at phase errors up to NEAR, degrees, and mismatch to
+#: NEAR_MISMATCH.
 NEAR, NEAR_MISMATCH = 5.0, 0.15
-#: That takes 20 to 300 ms, so no more of a generation have it done, those that seem most stable;
-#: and the period that is found may differ from the simulated one by this share.
+#: MOST_EXACT: most sets of a generation, the most stable ones, for which this is done, as it takes
+#: 20 to 300 ms; SAME_PERIOD: largest relative difference of its period from the simulated one.
 MOST_EXACT, SAME_PERIOD = 16, 0.02
-#: What is asked of every cell's range, of its turning (fitting.waveforms.steadiness), and of the
-#: difference in shape of two waveforms; the search keeps away from the limits by a factor.
+#: LEAST_RANGE: least range of every cell; LEAST_STEADINESS: least steadiness of its turning (see
+#: fitting.gaits.recognition); LEAST_DIFFERENCE: least difference in shape of two waveforms;
+#: MARGIN: factor by which the search keeps away from these limits.
 LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
-#: Objectives of a set that comes to rest or runs away, and of one that repeats nothing.
+#: WORST: phase error of a set without a gait, degrees; DEAD: stability of a set that rests or runs
+#: away; APERIODIC: stability of a set whose motion does not repeat.
 WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
 
 

@@ -49,9 +49,10 @@ import numpy as np
 
 # The Pareto front of a search for weights, as a table in a file and as a picture.
 
-#: Colours of the waveforms, of sets that were tried or solved, and of the front.
+#: Colours. WAVES: of the waveforms; TRIED, SOLVED: of sets without and with an exact orbit; BEST:
+#: of the Pareto front.
 WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
-#: The smallest multiplier that is drawn.
+#: FLOOR: smallest multiplier that is drawn.
 FLOOR = 1e-6
 
 

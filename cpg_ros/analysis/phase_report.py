@@ -24,7 +24,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.phase_response import locking, phase_diffusion, phase_response, PhaseResponse
 import numpy as np
 
-#: Points of a cycle in JSON, and those among which extremes are looked for.
+#: POINTS: points of a cycle in JSON; FINE: points among which extremes are searched for.
 POINTS, FINE = 64, 1024
 
 

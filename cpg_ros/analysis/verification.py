@@ -29,14 +29,16 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Noise that a gait has to survive (per square root of model time), for how long (model time),
-#: and in how many runs of it at once: as many as fit into the vector registers.
+#: NOISE: intensity of noise that a gait has to survive, per square root of model time; DURATION:
+#: of the runs, model time; RUNS: number of runs, which fit into the vector registers.
 NOISE, DURATION, RUNS = 0.01, 500.0, 8
-#: Noise-free periods after that, and largest phase error then, degrees.
+#: PEACE: periods without noise after that; BACK: largest phase error then, degrees.
 PEACE, BACK = 30, 1.0
-#: Phase errors (degrees) in any few cycles under noise beyond which the gait was left for a while.
+#: LOST: phase error, degrees, averaged over CYCLES cycles under noise, above which the gait was
+#: left.
 LOST, CYCLES = 60.0, 4
-#: Points of a cycle on which an orbit is judged, and digits of the start and period of a preset.
+#: POINTS: points of a cycle on which an orbit is judged; DIGITS: digits of a preset's start and
+#: period.
 POINTS, DIGITS = 1024, 10
 
 

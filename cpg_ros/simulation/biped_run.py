@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped with its feedback in the simulation: commands and pushes in, how it went out."""
+"""Runs of a biped with its feedback in simulation: commands and pushes in, metrics out."""
 
 from dataclasses import dataclass, field
 import math
@@ -31,9 +31,10 @@ from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 import numpy as np
 
-#: A robot has fallen whose centre of mass is lower than this share of its height.
+#: LOW: height of the centre of mass, as a share of the wanted one, below which the robot has
+#: fallen.
 LOW = 0.6
-#: Start of what is measured after the first step, s.
+#: SETTLING: time after the first step from which on a run is measured, s.
 SETTLING = 3.0
 
 

@@ -33,7 +33,7 @@ from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import lay, set_friction, Terrain
 import numpy as np
 
-#: Below this share of its speed without a load a motor has all of its torque.
+#: SLOW: share of a motor's no-load speed up to which it has its full torque.
 SLOW = 1e-3
 
 
@@ -139,7 +139,7 @@ class BatchPhysics:
 
 # Many runs at once, open loop: what a plan publishes, and bodies that follow it on all cores.
 
-#: Runs whose states are kept at the same time.
+#: TOGETHER: number of runs whose states are in memory at the same time.
 TOGETHER = 12
 
 

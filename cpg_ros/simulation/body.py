@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot's body in MuJoCo: angles wanted go in, what the body does comes out."""
+"""A robot's body in MuJoCo: wanted angles in, its motion and measurements out."""
 
 from collections.abc import Callable
 import math
@@ -23,7 +23,7 @@ from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
 import numpy as np
 
-#: A base that leans more than this has fallen, rad.
+#: FALLEN: lean of the base above which the robot has fallen, rad.
 FALLEN = math.radians(60.0)
 
 
@@ -248,7 +248,7 @@ class Body:
         return self._turn.reshape(3, 3)
 
 
-# Where a robot's parts are in its model: indices of base, joints and feet.
+# Indices of a robot's parts in its model: base, joints and feet.
 
 class Anatomy:
     """Indices into the arrays of a body's model.

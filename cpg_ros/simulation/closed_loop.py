@@ -42,7 +42,8 @@ import numpy as np
 
 # The patterns of many runs: ramped in, steered, switched, corrected, held to limits.
 
-#: From the stand into the gait, and from one gait into another, s.
+#: RAMP: duration of the ramp from the stand into the gait, s; TRANSITION: duration of a gait
+#: switch, s.
 RAMP, TRANSITION = 1.0, 1.0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pictures of a robot, drawn offscreen by OpenGL, and films of them."""
+"""Recording of runs, offscreen pictures of a robot, films and footfall diagrams."""
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -36,9 +36,9 @@ from PIL import GifImagePlugin, Image
 
 # Recording of a run for its film, its footfall diagram and its summary.
 
-#: How much of the end of a run is kept, s: longer films and diagrams are of no use.
+#: KEPT: last part of a run that is kept, s; longer films and diagrams are of no use.
 KEPT = 60.0
-#: Pictures of a film and samples of the footfalls a second.
+#: FRAMES: pictures of a film per second; SAMPLE_RATE: samples of the footfalls per second.
 FRAMES, SAMPLE_RATE = 12.5, 200.0
 
 
@@ -143,17 +143,17 @@ def summary(body: Body, since: float) -> str:
             f'{"fallen" if body.fallen else "upright"}')
 
 
-#: Colours of a GIF; few, and no dithering, make it small.
+#: COLOURS: number of colours of a GIF; few, and no dithering, make it small.
 COLOURS = 96
-#: Direction of view, degrees: from the robot's left, a little ahead of it and above.
+#: AZIMUTH, ELEVATION: direction of view, degrees: from the robot's left, ahead of it and above.
 AZIMUTH, ELEVATION = -125.0, -14.0
-#: Distance of the camera in heights of the base when it stands.
+#: DISTANCE: of the camera, as a multiple of the base's height in the stand.
 DISTANCE = 4.7
-#: Share of a turn of the robot by which the camera follows from one picture to the next.
+#: FOLLOW: share of the robot's turn by which the camera follows from picture to picture.
 FOLLOW = 0.1
 NO_OPENGL = ('pictures need OpenGL without a screen; on Debian and Ubuntu: apt install libegl1 '
              'libgl1-mesa-dri, or libosmesa6')
-#: Resolution of shadows, and samples a pixel (0: edges are not smoothed).
+#: SHADOW: resolution of shadows; SAMPLES: samples per pixel (0: edges are not smoothed).
 SHADOW, SAMPLES = 1024, 0
 
 

@@ -37,9 +37,10 @@ import numpy as np
 
 # Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
 
-#: Gains of the Go2's joints, N m / rad and N m s / rad, and the mass on each of its legs, kg.
+#: The Unitree Go2. KP: stiffness of its joints, N m/rad; KD: damping, N m s/rad; BORNE: mass per
+#: leg, kg.
 KP, KD, BORNE = 60.0, 2.0, 15.206 / 4.0
-#: Inertia of a motor whose file gives none: times kp timestep^2, below which control oscillates.
+#: STEADY: least inertia of a motor, as a multiple of kp timestep^2, with which control is stable.
 STEADY = 2.0
 
 
@@ -96,11 +97,11 @@ def set_servos(model: Any, links: Mapping[str, BipedLink], kp: float | None,
             model.dof_armature[model.jnt_dofadr[model.actuator_trnid[k, 0]]] = link.armature
 
 
-#: Where the package mjlab keeps the model of the Unitree G1.
+#: G1: path of the model of the Unitree G1 in the package mjlab.
 G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
-#: Side of a square of the floor, m.
+#: SQUARE: side of a square of the floor, m.
 SQUARE = 0.25
-#: Size of the smallest feature of a mesh that is drawn, m: less than a pixel, and far fewer faces.
+#: GRAIN: smallest feature of a mesh that is drawn, m; less than a pixel, and far fewer faces.
 GRAIN = 0.004
 
 

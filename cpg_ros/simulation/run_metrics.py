@@ -25,11 +25,11 @@ from cpg_ros.simulation.body import Anatomy, Body, FALLEN
 from cpg_ros.simulation.robot_model import engine
 import numpy as np
 
-#: Time from the stand that metrics of the steady gait leave out, s.
+#: BEGINNING: first part of a run that metrics of the steady gait ignore, s.
 BEGINNING = 2.0
-#: Time between samples of the feet's positions, s.
+#: LOOK: time between samples of the feet's positions, s.
 LOOK = 0.01
-#: All feet off the floor for so long is a hop, s.
+#: AIRBORNE: least time with all feet off the floor that counts as a hop, s.
 AIRBORNE = 0.02
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What robots meet in runs, how far their sensors are off, and how closed loops ended."""
+"""Scenarios of simulated runs: commands, pushes and ground, sensor errors, and results."""
 
 from dataclasses import dataclass
 
@@ -21,7 +21,7 @@ from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
-#: A push lasts this long, s.
+#: PUSH: duration of a push, s.
 PUSH = 0.1
 
 

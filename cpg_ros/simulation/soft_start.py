@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The way to angles that joints are not at yet, or that are in motion already."""
+"""Soft start: the path to commanded angles that are far from the joints, or already moving."""
 
 from cpg_ros.motion.strides import smoothstep
 import numpy as np
 
-#: Angles this close are followed at once, rad.
+#: NEAR: distance up to which commanded angles are followed at once, rad.
 NEAR = 0.05
 
 

@@ -25,24 +25,28 @@ from typing import Any
 from cpg_ros.simulation.robot_model import engine, SimulationError
 import numpy as np
 
-#: Extent of the ground in front of the robot, behind it and to either side, and grid, m.
+#: AHEAD, BEHIND, ASIDE: extent of the ground in front of the robot, behind it and to either side,
+#: m;
+#: GRID: spacing of its heights, m.
 AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
-#: The robot starts on a flat place of this half size, m.
+#: PLACE: half size of the flat place on which the robot starts, m.
 PLACE = 0.5
-#: Highest ground of a height field, m; much more makes prisms so slender that feet catch in them.
+#: HIGHEST: largest height of a height field, m; more makes prisms so slender that feet catch.
 HIGHEST = 0.2
-#: Ground that is not flat, see Terrain.
+#: KINDS: kinds of ground that is not flat, see Terrain.
 KINDS = ('height_field', 'boxes', 'stairs', 'waves', 'ramp', 'course')
-#: Of stairs: steps up and then down, length of a tread and of the landing on top, m.
+#: Stairs. STEPS: number of steps up, and again down; TREAD: length of a tread, m; LANDING: length
+#: of the landing on top, m.
 STEPS, TREAD, LANDING = 5, 0.35, 1.05
-#: How thick a step is, m: more than the highest landing.
+#: THICK: thickness of a step, m; more than the highest landing.
 THICK = 1.2
-#: How far prisms of a height field reach below its lowest ground, m. Collisions of convex shapes
-#: are looked for along the line between their middles: with tall prisms it is about upright.
+#: DEEP: depth of a height field's prisms below its lowest ground, m. Collisions of convex shapes
+#: are searched along the line between their centres, which is about vertical with tall prisms.
 DEEP = 1.0
-#: A floor under a height field catches who leaves it; feet do not reach through to it, m.
+#: UNDER: height of a floor under a height field, m, which catches robots that leave the field, and
+#: which feet on the field do not reach.
 UNDER = -0.01
-#: Half sizes of the slabs of a ramp, m, and where that is which is not in use.
+#: SLAB: half sizes of the slabs of a ramp, m; AWAY: height at which unused ground is parked, m.
 SLAB, AWAY = (6.0, 6.0, 0.5), -50.0
 
 

@@ -29,9 +29,9 @@ from cpg_ros.motion.description import mesh_folder, numbers, read_tree
 from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
 import numpy as np
 
-# Meshes that MuJoCo cannot read: why, and the convex hulls that take their place.
+# Meshes that MuJoCo cannot read: the reasons, and the convex hulls that take their place.
 
-#: What each dimension of a mesh must exceed to have a hull, m.
+#: FLAT: least size of a mesh in each dimension with which it has a hull, m.
 FLAT = 1e-6
 
 
@@ -77,17 +77,18 @@ def hull(path: Path) -> bytes:
     return ('\n'.join(lines) + '\n').encode()
 
 
-# Masses and inertias of URDF files that no body has, made such as one could have.
+# Corrections of masses and inertias in URDF files that no body can have.
 
-#: Least second moment in any direction, as a share of their sum.
+#: THINNEST: least second moment in any direction, as a share of their sum.
 THINNEST = 1e-3
-#: Violations of less than this share of the sum are rounding, which passes without a word.
+#: ROUNDING: violation, as a share of the sum, up to which it is corrected without a message.
 ROUNDING = 1e-4
-#: A body whose radius of gyration is smaller has none, m.
+#: POINT: radius of gyration below which a body counts as a point, m.
 POINT = 1e-4
-#: Of a body that has a mass but no extent, and of one without mass, kg/m^3.
+#: DENSITY: assumed for a body with a mass but no extent, and for one without mass, kg/m^3.
 DENSITY = 1000.0
-#: Mass of a link that is moved by a joint and has none: a share of the robot's, and least, kg.
+#: Mass of a link without mass that a joint moves. LEAST: share of the robot's mass; LIGHTEST:
+#: least mass, kg.
 LEAST, LIGHTEST = 1e-3, 1e-2
 
 
@@ -124,15 +125,15 @@ def ball(mass: float) -> float:
     return 0.4 * mass * radius**2
 
 
-#: Where an inertia has its numbers.
+#: Names of an inertia's numbers in a URDF.
 _KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
-#: Mass and moment of inertia of a frame that has none, kg and kg m^2: as good as nothing.
+#: FRAME: negligible mass, kg, and moment of inertia, kg m^2, of a frame that has none.
 FRAME = 1e-6, 1e-9
-#: Masses up to this are none, kg; CAD programs write rounding errors.
+#: NOTHING: mass up to which a link has none, kg; CAD programs write rounding errors.
 NOTHING = 1e-9
-#: Of a robot whose file gives no link a mass, kg/m^3.
+#: HOLLOW: density of the collision shapes of a robot without any mass, kg/m^3.
 HOLLOW = 500.0
-#: Joints that hold a link still or let it move freely.
+#: Types of joints. HELD: the link is fixed to its parent; FREE: it moves freely.
 HELD, FREE = 'fixed', 'floating'
 
 Say = Callable[[str], None]

@@ -25,7 +25,7 @@ import numpy as np
 
 # Points on the boundaries of an atlas at which a second condition holds.
 
-#: Kind -> its usual abbreviation, as MatCont has it.
+#: LABELS: kind of a codimension-two point -> MatCont's abbreviation.
 LABELS = {'Bautin': 'GH', 'Hopf-Hopf': 'HH', 'zero-Hopf': 'ZH', 'Bogdanov-Takens': 'BT',
           '1:1 resonance': 'R1', '1:2 resonance': 'R2', '1:3 resonance': 'R3',
           '1:4 resonance': 'R4', 'cusp': 'CP'}
@@ -80,7 +80,7 @@ def _plain(number: float) -> float | None:
     return None if math.isnan(number) else number
 
 
-#: Points of the coarse grid are this many apart, a power of 2.
+#: COARSE: distance of the coarse grid's points on the fine grid, a power of 2.
 COARSE = 8
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Curves of folds of a gait's orbits in two parameters.
+"""Curves of folds and of unbounded periods of a gait's orbits in two parameters, with cusps.
 
 At a fold the second parameter turns round along the branch: its component of the tangent is zero.
 From a fold the next one is found by holding the unknowns in the plane normal to the last tangent
@@ -50,15 +50,15 @@ from cpg_ros.dynamics.hopf import hopf_at
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-# Cusps of fold curves: where two folds of a branch meet and none is left.
+# Cusps of fold curves: points at which two folds of a branch meet and vanish.
 
-#: How far along a branch the second fold is looked for, and how far beyond the last fold of a
-#: curve its cusp is, in fractions of the first parameter's range.
+#: CUSP_REACHES: distances, as fractions of the first parameter's range, along a branch in which
+#: the second fold is searched for, and beyond the last fold of a curve in which its cusp is.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
 BEYOND = (0.00125, 0.005, 0.02)
-#: To what the extremum is located along a branch, and the cusp, in fractions.
+#: ALONG: tolerance of the extremum along a branch; EXACT: tolerance of the cusp, as a fraction.
 ALONG, EXACT = 1e-7, 1e-13
-#: Smaller orbits end in rest, not in a cusp.
+#: SMALLEST: amplitude below which orbits end in rest, not in a cusp.
 SMALLEST = 0.02
 
 
@@ -135,13 +135,14 @@ def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tupl
 
 # Curves in two parameters on which the period of a gait's orbits grows without bound.
 
-#: Longest and shortest steps of the first parameter in fractions of its range.
+#: STEP, SHORTEST: longest and shortest step of the first parameter, as fractions of its range.
 STEP, SHORTEST = 1.0 / 24.0, 1.0 / 800.0
-#: Shares of the largest period at which the second parameter is solved for, by law.
+#: SHARES: law of growth -> shares of the largest period at which the second parameter is solved
+#: for.
 SHARES = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
-#: Powers of 1/T in the series of a saddle node.
+#: POWERS: powers of 1/T in the series of a saddle-node.
 POWERS = 0, 2, 3, 4
-#: Differences this small, in fractions of the range, are rounding: the limit has been reached.
+#: ROUNDING: difference, as a fraction of the range, up to which the limit has been reached.
 ROUNDING = 1e-11
 
 
@@ -238,11 +239,12 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
     return float(first - (first - second)**2 / bend)
 
 
-#: Arclengths along a branch within which its fold is searched.
+#: REACHES: arclengths along a branch within which its fold is searched for, one after another.
 REACHES = (0.01, 0.03, 0.1, 0.3)
-#: Smaller orbits are rest.
+#: REST: amplitude below which an orbit counts as rest.
 REST = 5e-3
-#: Edges tried for a gait, points of a branch, and distance, in fractions, of equal curves.
+#: TRIED: edges of the grid that are tried for a gait; MOST: most points of a branch; SAME:
+#: distance, as a fraction of the ranges, up to which curves are equal.
 TRIED, MOST, SAME = 8, 80, 0.02
 
 
@@ -381,13 +383,13 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: Distances from the Bautin point, in fractions of the ranges, at which a branch is started, the
-#: amplitude of its first orbit, its longest step, and points at most.
+#: BESIDE: distances from the Bautin point, as fractions of the ranges, at which a branch starts;
+#: AMPLITUDE: of its first orbit; LONGEST: its longest step; MOST_POINTS: its most points.
 BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: A fold this far, in fractions, from its Hopf point is another one; the curve's end that is this
-#: close to the Bautin point ends there.
+#: NEAR: largest distance of a fold from its Hopf point, as a fraction; END: largest distance of a
+#: curve's end from the Bautin point at which it ends there.
 NEAR, END = 0.2, 0.02
-#: A curve that stays this close to another one, in fractions, is that.
+#: SAME_CURVE: distance, as a fraction, up to which two curves are one.
 SAME_CURVE = 3e-3
 
 

@@ -29,8 +29,8 @@ from cpg_ros.analysis.atlas.row_job import AtlasRow, NONE
 from cpg_ros.common.errors import ShortRepr
 import numpy as np
 
-#: Known orbits that a point is reached from, and numbers that are filled in between points that
-#: agree.
+#: CLOSE: number of known orbits from which a point is reached; then the numbers that are filled in
+#: between points that agree.
 CLOSE = 2
 NUMBERS = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
 

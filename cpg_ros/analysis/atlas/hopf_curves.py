@@ -45,7 +45,8 @@ from scipy.optimize import brentq
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
-#: Newton's method: steps, and where it ends; differences for its matrix, in fractions.
+#: Newton's method. NEWTON: most steps; EXACT: tolerance; DIFFERENCE: step of finite differences,
+#: all as fractions of the ranges.
 NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
 
 
@@ -95,7 +96,7 @@ def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> Hopf
 
 # Hopf points on lines across the plane of an atlas, from which curves are followed.
 
-#: Lines along each axis.
+#: LINES: number of lines along each axis on which Hopf points are searched for.
 LINES = 41
 
 
@@ -170,10 +171,10 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     return starts
 
 
-#: Steps in fractions of the ranges, and points of a curve at most.
+#: FIRST, LONGEST, SHORTEST: steps along a curve, as fractions of the ranges; MOST: most points.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: A beginning this close to a curve, in fractions of the ranges, lies on it. Two classes share a
-#: curve if a few points on it, so many, are solutions of both.
+#: SAME: distance, as a fraction, up to which a start lies on a known curve. Two classes share a
+#: curve if CHECKED points on it are solutions of both to SHARED.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 
 
@@ -288,13 +289,13 @@ def _on(curve: np.ndarray, start: np.ndarray) -> bool:
     return bool((gap.max(axis=1) < SAME).any())
 
 
-# Where a curve of Hopf points ends inside the plane: Bogdanov-Takens and zero-Hopf points.
+# Ends of curves of Hopf points inside the plane: Bogdanov-Takens and zero-Hopf points.
 
-#: How far from a curve's last point, in fractions of the ranges, its end is looked for.
+#: REACH: largest distance of an end from the curve's last point, as a fraction of the ranges.
 REACH = 0.03
-#: Steps of Newton's method at the end of a curve, and the largest residual there.
+#: END_NEWTON: most steps of Newton's method at the end of a curve; LEFT: largest residual there.
 END_NEWTON, LEFT = 30, 1e-9
-#: Imaginary part of the root at which the derivative of a real determinant is taken.
+#: SLIGHT: imaginary part of the root at which the derivative of a real determinant is evaluated.
 SLIGHT = 1e-6
 
 Equations = Callable[[np.ndarray], np.ndarray]
@@ -392,15 +393,17 @@ def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
                 and np.abs(fraction - last[:2]).max() < REACH)
 
 
-#: Fraction of the way between two points of a curve to which a zero is bracketed.
+#: BRACKET: tolerance of a zero, as a fraction of the way between two points of a curve.
 BRACKET = 1e-14
-#: At a pole a test function changes its sign, too; at a zero it is this small against both sides.
+#: VANISHED: value of a test function, relative to both sides, below which a sign change is a zero
+#: and not a pole.
 VANISHED = 1e-5
-#: A Lyapunov coefficient this small against the curve's largest one is 0 but for rounding.
+#: ROUNDING: Lyapunov coefficient, relative to the curve's largest, up to which it is 0.
 ROUNDING = 1e-9
-#: Two points this close in fractions of the ranges, with frequencies this close, are one.
+#: SAME_POINT: distance, as a fraction of the ranges, and relative difference of the frequencies,
+#: up to which two points are one.
 SAME_POINT = 1e-7
-#: A root's imaginary part this small against omega is that of a real one.
+#: REAL: imaginary part, relative to omega, up to which a root is real.
 REAL = 1e-6
 
 Test = Callable[[np.ndarray], float]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An atlas as one page that needs no other file: a click shows what runs there."""
+"""An atlas as a picture, as files on disk, and as one page on which a click shows the orbit."""
 
 import base64
 from collections.abc import Iterator
@@ -37,13 +37,13 @@ import numpy as np
 
 # An atlas as a picture: a panel for each gait, and the exact boundaries on top.
 
-#: Colours of the labels, and of the kinds of curves.
+#: STATES: label of a point -> its colour; LINES: kind of curve -> its colour and style.
 STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
           'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
          'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
-#: Points this close, in fractions of the ranges, have one marker.
+#: TOGETHER: distance, as a fraction of the ranges, up to which points have one marker.
 TOGETHER = 2e-3
 
 
@@ -130,7 +130,7 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
 
 # An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json.
 
-#: The file that a folder with an atlas has, the folder of its parts, and names of the labels.
+#: MARK: file that marks a folder with an atlas; PARTS: folder of its finished parts.
 MARK, PARTS = 'atlas.json', 'parts'
 LABEL_NAMES = ('none', 'unstable', 'with lock', 'stable')
 
@@ -219,9 +219,9 @@ def _columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict
                **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
 
 
-#: Points of a waveform on the page, and distance on the grid between two that are there.
+#: POINTS: points of a waveform on the page; APART: distance on the grid between two waveforms.
 POINTS, APART = 32, 4
-#: Numbers of a point that the page has.
+#: SHOWN: numbers of a point that the page shows.
 SHOWN = ('period', 'amplitude', 'leading', 'lock', 'basin')
 
 

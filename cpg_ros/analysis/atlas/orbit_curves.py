@@ -37,14 +37,15 @@ from scipy.optimize import brentq
 
 # Strong resonances on a curve of torus points: 1:1 to 1:4.
 
-#: n of 1:n -> 2 cos(2 pi / n).
+#: SUMS: n of the resonance 1:n -> sum of the two multipliers, 2 cos(2 pi / n).
 SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
-#: Newton's method: steps, where it ends, differences for its matrix, all in fractions.
+#: Newton's method: most steps, tolerance, and step of finite differences, as fractions.
 RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
-#: Largest distance of a resonance from a point of the curve, in fractions, and difference from its
-#: sum within which an end is tried.
+#: REACH: largest distance of a resonance from a point of the curve, as a fraction; CLOSE:
+#: difference of the multipliers' sum from SUMS within which the end of a curve is tried.
 REACH, CLOSE = 0.08, 0.5
-#: What product and sum may miss by, and resonances this close are one.
+#: LEFT: largest residual of the multipliers' product and sum; SAME: distance, as a fraction, up to
+#: which two resonances are one.
 LEFT, SAME = 1e-8, 1e-5
 
 
@@ -127,9 +128,11 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
     return None if solution is None or not left < LEFT else (solution, left)
 
 
-#: Curves of a gait at most, points of each, steps in fractions of the ranges.
+#: CURVES: most curves of a gait; MOST: most points of each; STEP, SHORTEST: longest and shortest
+#: step, as fractions of the ranges.
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
-#: How well g is zero, differences for its slope, and Newton's steps.
+#: EXACT: tolerance of g = 0; DIFFERENCE: step of its finite differences, as a fraction; NEWTON:
+#: most steps of Newton's method.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
 
 Distance = Callable[[np.ndarray], float]

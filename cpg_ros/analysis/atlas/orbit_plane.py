@@ -28,7 +28,8 @@ import numpy as np
 
 # A gait's orbits over the plane of an atlas, and their multipliers by subspace.
 
-#: Tolerances of multipliers, and halvings of the elements.
+#: ARNOLDI: relative tolerance of multipliers; TRIVIAL: largest error of the trivial multiplier;
+#: HALVINGS: most halvings of the elements.
 ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
 
@@ -59,7 +60,7 @@ class OrbitPlane:
         return solved
 
 
-#: Places on a curve at which the normal form is computed.
+#: PLACES: number of places on a curve at which the normal form is computed.
 PLACES = 5
 
 

@@ -37,17 +37,18 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 
-#: What is known of a gait at a point: no orbit, one that its own class leaves, one that attracts
-#: with a symmetry lock, one that attracts by itself.
+#: Labels of a gait at a point. NONE: no orbit; UNSTABLE: an orbit that does not attract in its
+#: class;
+#: LOCKED: one that attracts with a symmetry lock; STABLE: one that attracts by itself.
 NONE, UNSTABLE, LOCKED, STABLE = range(4)
-#: Nodes of a waveform that are kept.
+#: KEPT: number of points of a waveform that are kept.
 KEPT = 65
-#: Multipliers of a subspace that Arnoldi's method computes.
+#: LEADING: number of multipliers of a subspace that Arnoldi's method computes.
 LEADING = 4
-#: Random states from which the basin of an orbit is estimated.
+#: STARTS: number of random states from which the basin of an orbit is estimated.
 STARTS = 8
-#: Steps that a branch from a Hopf point may have; known orbits that are led to a point, and in
-#: how many steps.
+#: MOST: most points of a branch from a Hopf point; TRIED: most known orbits that are continued to
+#: a point; STEPS: numbers of steps in which this is tried.
 MOST, TRIED, STEPS = 60, 3, (1, 4)
 
 

@@ -43,10 +43,10 @@ from cpg_ros.networks.symmetry import admissible_pairs, GAITS, label, Permutatio
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
-#: Periods in which a disturbed gait settles, and those usually enough.
+#: SETTLING: gait -> periods in which it settles after a disturbance; USUALLY: the same for others.
 SETTLING = {'jump': 150.0}
 USUALLY = 60.0
-#: Periods in which a wave turns round.
+#: REVERSAL: periods in which a wave reverses its direction.
 REVERSAL = 150.0
 
 #: Table 13: alpha, beta, gamma, delta.
@@ -67,9 +67,9 @@ SECTION_7 = {'zig-zag': {'walk': '1/2', 'jump': '1/2', 'pronk': '0', 'pace': '0'
                              'bound': '1/2', 'trot': '1/2'}}
 #: Cells (from 1) that share the left hind leg in Table 4.
 LEFT_HIND = {'zig-zag': (1, 5), 'criss-cross': (1, 6)}
-#: Erratum 9: gaits that are not as that section says of the criss-cross network, but thus.
+#: Erratum 9: gait -> phase in the criss-cross network, where that section is wrong.
 NOT_REVERSED = {'pronk': '0', 'bound': '0', 'jump': '1/2'}
-#: Constants of section 6, the current apart, which only shows together with gL vL.
+#: Constants of section 6 without the current, which is only visible in its sum with gL vL.
 SECTION_6 = {'phi': '0.2', 'v1': '0.2', 'v2': '0.4', 'v3': '0.3', 'v4': '0.2', 'gCa': '3',
              'gL': '0.6', 'gK': '1.8', 'vL': '-1.8', 'vK': '-0.8'}
 CURRENT = '1'
@@ -406,11 +406,11 @@ def legs() -> Iterator[ReproducedRow | Picture]:
 
 # Buono & Golubitsky (2001), appendix A: Theorem A.1 with its conditions, by computation.
 
-#: Points of Fix(K) at random, and what is 0.
+#: POINTS: number of random points of Fix(K); ZERO: size up to which a value is 0.
 POINTS, ZERO = 400, 1e-9
 #: Names of the conditions, in the order of the paper.
 CONDITIONS = ('A.2', 'A.3', 'A.5', 'A.6')
-#: A multiplier this far from the unit circle belongs to a hyperbolic orbit.
+#: HYPERBOLIC: distance of the multipliers from the unit circle above which an orbit is hyperbolic.
 HYPERBOLIC = 1e-3
 
 Representation = Callable[[Permutation], np.ndarray]

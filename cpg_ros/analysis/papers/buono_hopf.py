@@ -30,14 +30,14 @@ from cpg_ros.networks.symmetry import GAITS
 import numpy as np
 from scipy.optimize import brentq
 
-#: Section 6.
+#: Section 6. STAND: v_0 and w_0 at the stand; NU_0: trace of a cell there.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'
 #: Table 12: alpha = beta, gamma = delta, xi = eta.
 TABLE_12 = {'pace': ('0.3', '-0.32', '0'), 'bound': ('-0.32', '0.3', '0'),
             'trot': ('0.15', '-0.16', '-0.31')}
-#: 'Approximate values': this much of them.
+#: APPROXIMATE: relative tolerance of the paper's 'approximate values'.
 APPROXIMATE = 0.1
-#: Erratum 6: the signs with which the trot's Hopf point is there.
+#: Erratum 6: alpha, gamma and xi of the trot's Hopf point, with the signs that are right.
 TROT = (-0.15, -0.16, 0.31)
 
 #: Theorem 4.2: clause, gait, alpha, sign of beta, between which values of gamma the point lies,
@@ -49,7 +49,7 @@ THEOREM = (
     ('d', 'trot', -0.6, 1.0, (-0.6, -0.5), True),
     ('e', 'jump', 0.05, -1.0, (0.1, 0.2), True), ('f', 'walk', 0.01, -1.0, (-1.2, -1.05), True),
     ('f', 'walk', 0.05, -1.0, (-1.1, -0.9), True))
-#: Of these the one where the clause does not hold, by its gait and alpha.
+#: Gait and alpha of the case of THEOREM in which the clause does not hold.
 FAILING = ('walk', 0.05)
 
 
@@ -212,7 +212,7 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
 #: Gait -> sign of beta against alpha, and the signs that alpha and gamma must have; 0 is any.
 SIGNS = {'pronk': (1, 1, 1), 'pace': (1, 1, -1), 'bound': (1, -1, 1), 'trot': (1, -1, -1),
          'jump': (-1, 0, 1), 'walk': (-1, 0, -1)}
-#: Couplings are equal, and eigenvalues on the imaginary axis, within this.
+#: EQUAL: difference up to which couplings are equal, and eigenvalues on the imaginary axis.
 EQUAL = 1e-7
 
 
@@ -295,7 +295,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
     return TheoremVerdict(gait, tuple(unmet), condition, met, tuple(overlooked))
 
 
-# Buono & Golubitsky (2001), sections 4 and 5: what the proofs claim beside their numbers.
+# Buono & Golubitsky (2001), sections 4 and 5: claims of the proofs.
 
 #: Gait -> the line of the proof, the parameter that eq. 5.6 differentiates by, what it multiplies
 #: in E = nu + ..., and the Hopf point on the line in units of nu_0.
@@ -304,14 +304,15 @@ PROOFS = {'walk': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.5),
           'pace': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.25),
           'bound': ('gamma=delta=-alpha=-beta', 'gamma=delta', 2.0, -0.25),
           'trot': ('xi=eta=-alpha=-beta', 'xi=eta', 2.0, -0.25)}
-#: Differences for the gradient of nu; how far off its line a Hopf point is followed; determinants
-#: and speeds above this are not 0.
+#: DIFFERENCE: step of finite differences for the gradient of nu; OFF: distance from its line to
+#: which a Hopf point is followed; NONZERO: size above which determinants and speeds are not 0.
 DIFFERENCE, OFF, NONZERO = 1e-5, 0.02, 1e-6
-#: A critical pair's real part is 0 within this.
+#: ON_AXIS: real part up to which a critical pair is on the imaginary axis.
 ON_AXIS = 1e-7
-#: Theorem 4.2 'remains valid if |alpha - beta| and |gamma - delta| are nonzero and small'.
+#: Deviations of beta and delta with which it is checked that theorem 4.2 'remains valid if
+#: |alpha - beta| and |gamma - delta| are nonzero and small'.
 SMALL = (0.004, -0.003)
-#: Values of alpha at which Hopf points are searched, and how far in gamma.
+#: ALPHAS: values of alpha at which Hopf points are searched for; GAMMAS: range of gamma.
 ALPHAS, GAMMAS = (-0.3, 0.1), (-1.2, 0.5)
 
 

@@ -150,7 +150,7 @@ TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0
            (3, 1): ('walk-', '0 1/2 -1/4 -3/4 1/2 0 -3/4 -1/4'),
            (2, 0): ('bound', '0 0 1/2 1/2 0 0 1/2 1/2'),
            (2, 1): ('trot', '0 1/2 1/2 0 0 1/2 1/2 0')}
-#: Tables 6 to 8, 11: how the entries read; the formulas themselves are in ``buono_tables``.
+#: TABLE_6: printed text of the entries; the texts of Tables 7, 8 and 11 follow.
 TABLE_6 = {'L_00': 'A + (B + C + D)', 'L_01': 'A + (B - C + D)', 'L_20': 'A - (B - C - D)',
            'L_21': 'A - (B + C - D)', 'L_10': 'A - Bi + C - D', 'L_11': 'A - Bi - C - D',
            'L_30': 'A + Bi + C - D', 'L_31': 'A + Bi - C - D'}
@@ -158,7 +158,7 @@ TABLE_11 = {'L_00': 'nu + 2(alpha + gamma + xi)', 'L_01': 'nu + 2(alpha - gamma 
             'L_20': 'nu + 2(-alpha + gamma + xi)', 'L_21': 'nu - 2(alpha + gamma - xi)',
             'L_10': 'nu + 2 gamma - 2 xi', 'L_11': 'nu - 2 gamma - 2 xi'}
 UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
-#: About the stand of section 6.
+#: STAND: v and w at the stand of section 6, approximately.
 STAND = np.array([0.31, 0.52])
 
 

@@ -41,7 +41,7 @@ import numpy as np
 # Liu & Zhang (2024), section 2: the Taylor terms F_2 and F_3 of the delayed network.
 
 AUTHORS = 'Liu & Zhang 2024'
-#: Of the cubes in row i of F_3, cells from 1: own, behind on the same side, across a delay ago.
+#: BEHIND: cell, from 1, behind each cell on the same side, whose cube is in its row of F_3.
 BEHIND = (7, 8, 3, 2, 3, 4, 5, 6)
 #: Erratum 25: in the third row it should be this cell.
 THIRD = 1
@@ -98,7 +98,7 @@ def published_normal_form(point: HopfPoint) -> NormalForm:
     return NormalForm(eight * (-a - b - d + past), -tau * eight * (-b + past - d))
 
 
-#: Model time that a gait gets to develop, and that is drawn.
+#: DEVELOPED: model time in which a gait develops; DRAWN: model time that is drawn.
 DEVELOPED, DRAWN = 120.0, 20.0
 #: Start values printed under the figures.
 QUARTERS = (0.1, -0.1, 0.1, -0.1, 0.2, -0.2, 0.2, -0.2)
@@ -161,13 +161,13 @@ EXAMPLES = {
         ('omega_2', 'tau_4^0'),
         {'k1': (1, '3.4819'), 'k2': (1, '-0.8683'), 'k1 k2': (1, '-3.023')})}
 
-#: Table 1: start of c, iterations; Table 2: start of tau, iterations; and what all of them reach.
+#: TABLE_1: start of c -> printed iterations; then the same of Table 2 for tau, and the results.
 TABLE_1 = {'6.1': '11', '6.3': '9', '6.5': '5', '7.2': '9'}
 TABLE_2 = {'0.25': '5', '0.28': '8', '0.39': '16', '0.4': '13'}
 SOLUTIONS = {'c': '6.4300', 'tau': '0.2450'}
-#: Samples of a cycle, and the misfit (RMS) that is added to the orbit to make a recording.
+#: SAMPLES: samples of a cycle; MISFIT: RMS of the noise that makes a recording of the orbit.
 SAMPLES, MISFIT = 20, 0.35
-#: Every start has to reach the minimum this closely.
+#: ONE_MINIMUM: largest difference between the minima that different starts reach.
 ONE_MINIMUM = 1e-4
 
 

@@ -84,9 +84,10 @@ PREDICTED = (('two_legged_jump', 'gallop'), ('run', 'hesitation_walk'))
 #: Section 5: gaits that the paper could not reach.
 NOT_REACHED = ('asymmetric_hop', 'one_legged_hop')
 
-#: Model time in which a gait settles; degrees from 0 that an objective may be.
+#: SETTLING: model time in which a gait settles; CLOSE: largest objective that counts as 0,
+#: degrees.
 SETTLING, CLOSE = 1500.0, 1.0
-#: Two waveforms whose shapes differ by less than this, over their RMS, are one.
+#: SAME: difference in shape, over the RMS, up to which two waveforms are one.
 SAME = 0.02
 POINTS = 512
 

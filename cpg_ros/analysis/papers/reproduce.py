@@ -74,7 +74,7 @@ ERRATA: dict[int, tuple[str, str]] = {
     yaml.safe_load(Path(__file__).with_name('errata.yaml').read_text('utf-8')).items()}
 
 
-#: Dots per inch of a figure.
+#: RESOLUTION: of a figure, dots per inch.
 RESOLUTION = 100
 
 
@@ -191,7 +191,7 @@ def parts(names: Sequence[str]) -> int:
 
 # The reproduction report as a table, as JSON and as a page that needs no other file.
 
-#: Widest columns of the table on a terminal: quantity, published, computed.
+#: WIDEST: largest widths of the columns quantity, published and computed on a terminal.
 WIDEST = (58, 30, 30)
 HEAD = ('place', 'quantity', 'published', 'computed', 'verdict')
 

@@ -32,7 +32,7 @@ import numpy as np
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Figures of the papers: what the cells do over time.
+# Figures of the papers: the cells over time.
 
 #: Colours of the waveforms, as in the other pictures.
 WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')
@@ -73,9 +73,9 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
     return figure
 
 
-#: Phases agree to this part of a cycle; values of a formula to this part of their size.
+#: PHASE: tolerance of phases, cycles; FORMULA: relative tolerance of the values of a formula.
 PHASE, FORMULA = 0.002, 1e-9
-#: Of a number printed with n decimals, this many more are shown.
+#: MORE: number of decimals that a computed value has beyond the printed one.
 MORE = 2
 
 
@@ -138,7 +138,7 @@ class Picture:
     figure: 'Figure'
 
 
-#: What a formula gives.
+#: Value of a formula.
 Value = float | complex | np.ndarray
 #: A part of a paper: computes some of its rows and pictures.
 Section = Callable[[], Iterable[ReproducedRow | Picture]]
@@ -268,7 +268,7 @@ def _shown(value: Value) -> str:
 
 # Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
 
-#: Where m is 0 or 1 to rounding, and where m and n bend.
+#: FAR: potentials at which m is 0 or 1 to rounding; NEAR: potentials at which m and n vary.
 FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
 
 
@@ -320,11 +320,11 @@ def _bend(fraction: np.ndarray) -> tuple[float, float]:
     return float(-offset / slope), float(1.0 / slope)
 
 
-#: Share of a simulation, from its end, on which the rhythm is measured.
+#: SETTLED: last share of a simulation, on which the rhythm is measured.
 SETTLED = 0.15
-#: Samples a cycle needs to tell its waveforms; more only take time.
+#: SAMPLES: number of samples on which the rhythm is measured; more only take time.
 SAMPLES = 4000
-#: Standard deviation of a disturbed start, in the units of the cells.
+#: DISTURBANCE: standard deviation of a disturbed start, in the units of the cells.
 DISTURBANCE = 0.01
 
 

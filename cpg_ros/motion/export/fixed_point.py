@@ -36,10 +36,11 @@ POSITION = 13
 #: As in pattern.c. SHIFTING: joint speed allowed in ramps and fades, 1/s, per rad from the stand
 #: to the gait's mean; SHORT_OF: share of the speed bound up to which joints go.
 SHIFTING, SHORT_OF = 2.0, 0.997
-#: Most bits of an angle, so that the difference of two fits, too; and of a rate.
+#: ANGLE_BITS: most bits of an angle, so that the difference of two fits, too; RATE_BITS: of a
+#: rate.
 ANGLE_BITS, RATE_BITS = 14, 13
 LEAST_TICKS = 4
-#: A joint that turns by less than this is not moving, rad per cycle.
+#: STILL: slope below which a joint does not move, rad per cycle.
 STILL = 1e-6
 
 

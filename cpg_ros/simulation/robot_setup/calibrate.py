@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An efference copy from a recording: a robot that walks steadily, nothing fed back."""
+"""Executable ``calibrate``: efference copies from recordings of walks without feedback."""
 
 import argparse
 from collections.abc import Sequence
@@ -36,10 +36,10 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.robot_setup.walk_recording import read_walk, TYPES, WalkRecording
 import numpy as np
 
-#: Joints are where the pattern has them this much later, s, if a bag has no phase: what a servo
-#: with a damping of a thirtieth of its stiffness, and some load, gives.
+#: LAG: delay of the joints behind the pattern, s, for bags without a phase: that of a loaded servo
+#: whose damping is a thirtieth of its stiffness.
 LAG = 0.045
-#: Rows of a table whose speeds are nearer than this, m/s, are the same.
+#: SAME: difference of the speeds up to which two rows of a table are the same, m/s.
 SAME = 0.02
 
 

@@ -63,17 +63,18 @@ from cpg_ros.simulation.robot_setup.model_reading import (
 from cpg_ros.simulation.tuning.foot_path import feet_at_zero, read_geometry
 import numpy as np
 
-# A first robot file from a description: legs by joints' names, what a joint does by its axis.
+# A first robot file from a description: legs by joints' names, roles of joints by their axes.
 
-#: How far the knees are bent at the stand, rad, on two legs and on more.
+#: Bend of the knees at the stand, rad. UPRIGHT: on two legs; CROUCHED: on more.
 UPRIGHT, CROUCHED = 0.5, 1.4
-#: Shares of that bend which a stand may have, the other way with a minus.
+#: BENDS: factors of that bend that are tried for a stand, one after another; negative: other way.
 BENDS = (1.0, 0.85, 0.7, 0.5, 0.3, 1.2, -1.0, -0.85, -0.7, -0.5, -0.3, -1.2)
-#: How far legs swing and knees bend at first, rad.
+#: Initial amplitudes, rad. SWING: of the legs; LIFT: of the knees.
 SWING, LIFT = 0.15, 0.15
-#: Angles and speeds where the description has no limits, rad and rad/s.
+#: Limits of joints that have none. UNBOUNDED: of the angle, rad; SPEED: of the speed, rad/s.
 UNBOUNDED, SPEED = pi, 20.0
-#: Share of a joint's range that the stand keeps from either end, and of the room that gaits take.
+#: MARGIN: least distance of the stand from a joint's limits, as a share of its range; USED:
+#: largest share of the room to the limits that gaits use.
 MARGIN, USED = 0.1, 0.8
 
 

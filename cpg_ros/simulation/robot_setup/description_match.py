@@ -70,9 +70,9 @@ def usable(robot: Robot, found: BodyGeometry, what: str) -> tuple[BodyGeometry |
         f'feedback moves no foot of {", ".join(others)}: a leg must be {LEGS}')
 
 
-#: Files have limits rounded: differences up to this many rad (rad/s) are none.
+#: ROUNDING: difference of limits, rad or rad/s, that is ignored, as files have rounded limits.
 ROUNDING = 1e-4
-#: Strides per second where neither the command line nor the robot file gives them (Hz).
+#: USUAL_FREQUENCY: default stride frequency, Hz.
 USUAL_FREQUENCY = 1.0
 
 

@@ -28,13 +28,14 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: Differences of lengths that are none: a share, and m.
+#: Tolerance of lengths: LENGTH, m, plus the share LENGTH_SHARE.
 LENGTH_SHARE, LENGTH = 0.05, 0.003
-#: Ratio of masses up to which they agree.
+#: MASS_RATIO: largest ratio of masses that agree.
 MASS_RATIO = 1.25
-#: Longest leg, m, and mass over the cube of the longest leg, kg/m^3; of robots 50 to 600.
+#: LONGEST_LEG: longest plausible leg, m; DENSITIES: plausible range of the mass over the cube of
+#: the longest leg, kg/m^3, which is 50 to 600 for real robots.
 LONGEST_LEG, DENSITIES = 5.0, (5.0, 6000.0)
-#: Share of a stride by which a foot has to go the wrong way.
+#: FORWARD: share of a stride above which a low foot that goes forward goes the wrong way.
 FORWARD = 0.25
 #: Gaits in which a robot walks forward, with alternating legs.
 FORWARD_GAITS = ('walk', 'trot', 'pace', 'tripod', 'run')

@@ -34,15 +34,18 @@ from cpg_ros.motion.description import (
 from cpg_ros.networks.leg_numbers import leg_names
 import numpy as np
 
-#: Directions in which a robot may face, in quarter turns to the left of x.
+#: FACING: directions in which a robot may face, by quarter turns to the left of x.
 FACING = ('x', 'y', '-x', '-y')
-#: Share of the largest distance to the side up to which a joint is on the middle of the body.
+#: MIDDLE: distance from the middle of the body, as a share of the largest, up to which a joint is
+#: on it.
 MIDDLE = 0.05
-#: Share of a leg's length by which its opposite may be elsewhere or of another length.
+#: UNLIKE: largest difference in place or length between opposite legs, as a share of their length.
 UNLIKE = 0.2
-#: Shares of the lowest leg's length by which others may end, and begin, higher.
+#: Largest differences from the lowest leg, as shares of its length. SHORTER: height of a leg's
+#: end;
+#: HIGHER: height of its first joint.
 SHORTER, HIGHER = 0.35, 0.4
-#: Ratio of axes along x to those along y from which on legs move along y.
+#: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
 CROSSWISE = 1.3
 
 

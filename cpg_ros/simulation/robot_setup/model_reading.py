@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped's links, soles and servos, read off its model, MJCF or URDF."""
+"""Reading of models: MJCF joints as a description, and a biped's links, soles and servos."""
 
 from dataclasses import replace
 import math
@@ -128,17 +128,18 @@ def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
     return float(lower), float(upper), float(velocity)
 
 
-#: Servos: stiffness and damping by the torque that they can, 1/rad and s/rad, both by STIFFEST
-#: N m/rad at most for a robot of the G1's size; the damping of joints next to a sole is less, as
-#: their links are light.
+#: Servos. STIFF: stiffness over their largest torque, 1/rad, at most STIFFEST, N m/rad, for a
+#: robot of the G1's size; DAMPED: damping over stiffness, s; LIGHT: factor of the damping of
+#: joints next to a sole, whose links are light.
 STIFF, STIFFEST, DAMPED, LIGHT = 1.0, 100.0, 0.05, 0.4
-#: Height of the G1's centre of mass in a walk, m, and its mass, kg.
+#: HEIGHT: of the G1's centre of mass in a walk, m; MASS: of the G1, kg.
 HEIGHT, MASS = 0.6657, 33.34
-#: Torque by the robot's weight where the model has no limit, m.
+#: LEVER: largest torque over the robot's weight, m, where the model has no limit.
 LEVER = 0.3
-#: How much higher than a sole's lowest point it may be to belong to it, m.
+#: FLAT: height above a sole's lowest point up to which points belong to the sole, m.
 FLAT = 0.01
-#: How much lower than in the stand the centre of mass is to be in a walk, m: legs must reach.
+#: CROUCH: by how much the centre of mass is lower in a walk than in the stand, m, so that legs
+#: reach.
 CROUCH = 0.01
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Recording of a walking robot in a bag: joints, IMU and foot forces on one clock."""
+"""Walks for efference copies: simulated ones, and recordings of joints, IMU and foot forces."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ import numpy as np
 
 # Measurement of a gait's efference copy: the body's motion on flat ground without feedback.
 
-#: Length of a run, and of its beginning, which is left out, s.
+#: DURATION: of a run, s; BEGINNING: first part of it that is ignored, s.
 DURATION, BEGINNING = 10.0, 3.0
 
 
@@ -97,11 +97,11 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
     return replace(robot, motions=motions)
 
 
-#: What is read: key -> type of its topic.
+#: TYPES: key of a topic that is read -> its type.
 TYPES = {'joint_states': 'sensor_msgs/msg/JointState', 'imu': 'sensor_msgs/msg/Imu',
          'foot_contacts': 'std_msgs/msg/Float64MultiArray',
          'phase': 'std_msgs/msg/Float64MultiArray'}
-#: What a bag may be without.
+#: OPTIONAL: keys of topics that a bag may lack.
 OPTIONAL = ('phase',)
 
 

@@ -36,26 +36,28 @@ from cpg_ros.simulation.terrain import Terrain
 from cpg_ros.simulation.tuning.gaits import cma_search, more_than_chance, scaled_gains
 import numpy as np
 
-#: What is searched for.
+#: SEARCHED: names of the gains that are searched for.
 SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
             'speed_up_from', 'pressure_x', 'pressure_y', 'height_kp', 'height_kd', 'roll_kp',
             'roll_kd', 'pitch_kp', 'pitch_kd', 'yaw_kp', 'yaw_kd', 'stance_damping', 'lean',
             'lift', 'swing_kp', 'swing_kd', 'sole_kp', 'sole_kd', 'reaction_yaw')
-#: A gain changes by this factor at most, either way; the search begins with this spread of logs,
-#: and gains in a file have so many digits.
+#: FACTOR: largest factor by which a gain changes, either way; SPREAD: initial standard deviation
+#: of the gains' logarithms; DIGITS: digits of gains in a file.
 FACTOR, SPREAD, DIGITS = 3.0, 0.15, 4
-#: Designs of a job; walks of a job that judges.
+#: TOGETHER: designs of a job; BATCH: walks of a job that judges.
 TOGETHER, BATCH = 3, 8
-#: Pushes of each impulse, as shares of m sqrt(g h); speeds, m/s, and height of tiles, m, for a
-#: robot of the G1's size.
+#: PUSHES: number of pushes of each impulse; IMPULSES: as shares of m sqrt(g h); SPEEDS, m/s, and
+#: TILES, height of tiles, m: for a robot of the G1's size.
 PUSHES, IMPULSES, SPEEDS, TILES = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
 #: Sensors as those of a real robot: late, in s, and noisy.
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
-#: When it walks off, is pushed (within a stride from then on), and a run ends, s.
+#: Times of a run, s. WALKS_OFF: start of the walk; PUSHED: earliest push, which comes within
+#: STRIDE after it; END: end of the run.
 WALKS_OFF, PUSHED, STRIDE, END = 1.0, 5.0, 0.6, 9.0
-#: What an error of speed and a tilt in rad cost, beside a fall.
+#: Prices beside that of a fall. SPEED: of a relative error of the speed; TILT: of a tilt, 1/rad.
 SPEED, TILT = 0.5, 0.5
-#: Pushes of each impulse and walks of each speed that judge what was found; their seed.
+#: Judgement of the result. JUDGED: pushes of each impulse; WALKED: walks of each speed; FRESH:
+#: seed.
 JUDGED, WALKED, FRESH = 24, 5, 10_000_019
 
 

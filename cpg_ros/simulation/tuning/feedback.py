@@ -56,7 +56,8 @@ DELAYS = (0.01, 0.02)
 SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
                       gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,
                       accelerometer_bias=0.1)
-#: Laws that robots with slow joints or feet that drag are tried without, one set after the other.
+#: WITHOUT: sets of laws that are switched off, one after another, until feedback helps: reflexes
+#: and posture may harm robots with slow joints or feet that drag.
 WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
 
 
@@ -223,25 +224,28 @@ def _text(found: Sequence[Benefit]) -> str:
     return 'in simulation, ' + '; '.join(map(str, found))
 
 
-#: What is searched for, by the law that it belongs to.
+#: SEARCHED: law -> its gains that are searched for.
 SEARCHED = {
     'posture': ('roll', 'roll_rate', 'pitch', 'pitch_rate'),
     'placement': ('step', 'step_left', 'step_pitch_rate', 'step_most', 'give_left'),
     'pace': ('pace_from', 'pace_gain', 'pace_most', 'pace_fatigue'),
     'reflexes': ('lift', 'reach_rate', 'reach_most'),
     'slope': ('slope_share',), 'speed': ('speed_share', 'speed_rate')}
-#: A gain changes by this factor at most, either way; the search begins with this spread of logs.
+#: FACTOR: largest factor by which a gain changes, either way; SPREAD: initial standard deviation
+#: of the gains' logarithms.
 FACTOR, SPREAD = 8.0, 0.35
-#: Designs of a job; pushes of each impulse, and fields of rough ground.
+#: TOGETHER: designs of a job; PUSHES: number of pushes of each impulse; FIELDS: number of fields
+#: of rough ground.
 TOGETHER, PUSHES, FIELDS = 3, 8, 3
-#: Impulses of pushes, as shares of m sqrt(g l): harder than most survive.
+#: IMPULSES: of pushes, as shares of m sqrt(g l); harder than most robots survive.
 IMPULSES = (0.6, 1.0, 1.4)
-#: Height of the fields, as a share of the legs' length.
+#: ROUGH: height of the fields, as a share of the legs' length.
 ROUGH = 0.12
-#: What a price consists of: shares of falls of all kinds, error of speed, and cost of transport
-#: beyond that without feedback, as shares of them.
+#: Weights of a price. PUSH, CALM, GROUND: of the share of falls after pushes, undisturbed and on
+#: rough ground; SPEED: of the relative error of the speed; COST: of the relative rise of the cost
+#: of transport by feedback.
 PUSH, CALM, GROUND, SPEED, COST = 1.0, 1.0, 0.5, 0.5, 0.1
-#: Pushes of each impulse that judge what was found, and the seed that draws them.
+#: JUDGED: pushes of each impulse that judge the result; FRESH: seed that draws them.
 JUDGED, FRESH = 64, 10_000_019
 
 

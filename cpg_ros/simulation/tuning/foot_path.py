@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From the way of a foot to a gait's readout: path, inverse kinematics, fit.
+"""From a foot's path to a gait's readout: legs of a model, inverse kinematics, fit.
 
 A gait is described by a few lengths and times, the same for the left and right leg of a pair.
 Legs move in the plane of their last two joints, and the first ones hold still; or they reach to
@@ -38,7 +38,8 @@ import numpy as np
 
 # The geometry of a robot's legs, read off its model.
 
-#: Fraction up to which the centre of mass counts as above the middle of the feet.
+#: CENTRED: distance of the centre of mass from the middle of the feet, as a share of half the
+#: distance from hind to fore feet, that is ignored.
 CENTRED = 0.1
 
 
@@ -120,11 +121,11 @@ def _ends(model: Any, geom: int) -> np.ndarray:
     return np.array([middle - longest, middle + longest])
 
 
-#: Points of a cycle at which curves are fitted.
+#: POINTS: points of a cycle at which curves are fitted.
 POINTS = 128
-#: Fraction of the cycle that weights make a leg stand by themselves.
+#: OWN: share of the cycle that a leg stands by the weights alone, without a duty factor.
 OWN = 0.5
-#: Digits of weights and offsets, rad, in the file.
+#: DIGITS: decimals of weights and offsets, rad, in the file.
 DIGITS = 4
 
 
@@ -168,7 +169,7 @@ class FootTrajectory:
         return x, z - self.height
 
 
-#: How far a joint or the foot may be beside a sprawled leg's plane, as a fraction of its length.
+#: BESIDE: largest distance of a joint or the foot from a sprawled leg's plane, over its length.
 BESIDE = 0.1
 
 

@@ -30,23 +30,24 @@ from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.tuning.foot_path import FootTrajectory
 import numpy as np
 
-# How fast a tuned gait goes and turns with strides of other lengths: measured, not assumed.
+# Steering tables: measured speed and yaw rate of a tuned gait by the length of its strides.
 
-#: Strides that are tried, how much slower the legs move at a stride of 0, and how much faster at
-#: one of 1, as far as the joints' limits are away by this share.
+#: STRIDES: strides that are tried; then by how much the legs move slower at a stride of 0, how
+#: much faster at a stride of 1, and the share of the joints' speed limits that this may use.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 SLOWER = 0.2
 FASTER, ROOM = (1.1, 1.2, 1.3, 1.4), 0.05
-#: How many rows are tried at most.
+#: ROWS: most rows of a table.
 ROWS = len(STRIDES) + len(FASTER)
-#: Difference of stride between the legs of both sides, when turning is measured.
+#: DIFFERENCE: of the strides of both sides when turning is measured.
 DIFFERENCE = 0.5
-#: Length of a run, s.
+#: DURATION: of a run, s.
 DURATION = 8.0
-#: Floors that speeds and turns are means of.
+#: FLOORS: floors over which speeds and yaw rates are averaged.
 FLOORS = (Scenario(), Scenario(0.7))
-#: A gait counts as steered if its speeds rise by at least this much a row, m/s, and if it turns at
-#: least so fast for a difference of 1, rad/s; of a slow one, these for each m/s of its speed.
+#: A gait counts as steered if its speed rises by RISE per row, m/s, and its yaw rate is at least
+#: TURN for a difference of strides of 1, rad/s; for slow gaits, the shares of the top speed below
+#: apply.
 RISE, TURN = 0.01, 0.1
 RISE_SHARE, TURN_SHARE = 0.05, 0.5
 
@@ -105,11 +106,11 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
                            for column in (speed, stride, frequency, turn)))
 
 
-#: Of a leg in the stand, m.
+#: LENGTH: of a leg in the stand, m.
 LENGTH = 0.2664
-#: Share by which strides of the gentlest start are shorter.
+#: SHORTER: share by which strides of the gentlest start are shorter.
 SHORTER = 0.5
-#: Height that feet should exceed for a tenth of the time, m.
+#: CLEAR: height that feet should exceed for a tenth of the time, m.
 CLEAR = 0.02
 
 
@@ -198,7 +199,7 @@ def _aim(speed: float, hops: float, low: tuple, start: tuple, high: tuple) -> Ga
     return GaitTarget(speed, hops, Design(*low), Design(*start), Design(*high))
 
 
-#: Columns as of Design.
+#: AIMS: gait -> its target; columns are those of Design.
 AIMS = {
     'walk': _aim(0.45, 0.0,
                  (1.0, 0.10, 0.55, 0.05, 0.25, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),

@@ -50,10 +50,10 @@ from cpg_ros.simulation.tuning.gait_design import (
 import numpy as np
 from scipy.stats import binomtest
 
-#: Points of a generation of CMA-ES.
+#: GENERATION: number of points of a generation of CMA-ES.
 GENERATION = 12
 
-#: Fraction of the target speed from which a gait is good.
+#: GOOD: share of the target speed from which on a gait is good.
 GOOD = 0.3
 
 
@@ -143,23 +143,24 @@ class ClosestDesign:
                 f'({SERVOS}), make the robot file anew with --velocity and what it reaches')
 
 
-#: Length of the runs that designs are compared by, and of the one that figures are of, s.
+#: SHORT: duration of the runs that compare designs, s; LONG: duration of the run that is reported,
+#: s.
 SHORT, LONG = 6.0, 10.0
-#: Conditions of the runs: good floors, and slippery ones with other loads and with pushes.
+#: SCENARIOS: conditions of the runs: good floors, and slippery ones with other loads and pushes.
 SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
-#: Mass that these pushes are for, kg; others have pushes that make them as fast.
+#: MASS: of the robot to which these pushes apply, kg; for others they scale to the same speed.
 MASS = 15.2
-#: Price of a design that the joints cannot follow, what each unit beyond a limit adds, which leads
-#: the search back to what they can, and the price of one that has no gait.
+#: REFUSED: price of a design that the joints cannot follow; BEYOND: price of each unit beyond a
+#: limit, which leads the search back within it; NO_GAIT: price of a design without a gait.
 REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
-#: Least fraction of a gait's usual frequencies that is tried where the joints are slow, and how
-#: far below their limit of speed its gentlest start then begins.
+#: For slow joints. SLOWEST: least factor of a gait's usual frequencies that is tried; ROOM: share
+#: of their speed limit with which the gentlest start begins.
 SLOWEST, ROOM = 0.3, 0.9
-#: How far about the start the first designs are (1: the whole range).
+#: SPREAD: initial standard deviation of the designs about the start (1: the whole range).
 SPREAD = 0.15
-#: Starts that are tried first: how much gentler they are than the usual one.
+#: GENTLE: starts that are tried first, by how much gentler than the usual one, 0 to 1.
 GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 

@@ -56,7 +56,7 @@ exit codes: 0 written, 1 no gait is good (written if any is possible), 2 invalid
 stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
 of the target speed. With --feedback, 1 means that no better gains were found, and that the file
 has those of before."""
-#: What is tried by default: designs of a gait, and sets of gains.
+#: Default numbers of evaluations. DESIGNS: designs of a gait; GAINS: sets of gains.
 DESIGNS, GAINS = 240, 120
 
 
