@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which joint is of which leg, guessed from the usual names.
+"""Assignment of joints to legs, guessed from the usual names.
 
 Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
 BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
@@ -29,27 +29,28 @@ import re
 from cpg_ros.common.errors import CpgError
 from cpg_ros.networks.leg_numbers import leg_names
 
-#: Letters and words of left and right, fore and hind.
+#: SIDES, ENDS: letters and words of left and right, and of fore and hind.
 SIDES = {'left': 'l', 'l': 'l', 'lt': 'l', 'right': 'r', 'r': 'r', 'rt': 'r'}
 ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h', 'middle': 'm',
         'mid': 'm'}
-#: Codes of legs; in RL and RR the first letter is that of the rear.
+#: CODES: code in a name -> leg; in RL and RR the first letter is that of the rear.
 CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
          'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
          'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh',
          'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
-#: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
+#: OTHER: words of joints of no leg; UPPER: words of a biped's arms, which a quadruped's fore legs
+#: have as well.
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
          'thumb', 'hand', 'wheel', 'caster', 'rotor', 'eye', 'ear', 'camera', 'antenna'}
 UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
-#: Names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
+#: JOINTS: names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
           'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
-#: In the networks' order.
+#: Names of the legs by number of legs, in the networks' order.
 HEXAPOD, QUADRUPED, BIPED = leg_names(6), leg_names(4), leg_names(2)
 
 _WORD = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
-#: A leg counted from the head on.
+#: Code of a leg that is counted from the head on, such as l1.
 _COUNTED = re.compile(r'(?<![a-z])([lr])([1-9])(?!\d)', re.IGNORECASE)
 _STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))',
                     re.IGNORECASE)
@@ -84,7 +85,7 @@ class Legs:
         return iter(self.joints)
 
     def __len__(self) -> int:
-        """How many legs."""
+        """Return the number of legs."""
         return len(self.joints)
 
 

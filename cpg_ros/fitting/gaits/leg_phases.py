@@ -35,11 +35,12 @@ from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
 import numpy as np
 from scipy.special import stdtrit
 
-# How steadily legs keep their phases: by how much each is early or late in every stride.
+# Scatter of the legs' phases: by how much each leg is early or late in every stride.
 
-#: Share of a whole stride's slope that a stride must have for its phase to be estimated.
+#: ENOUGH: least slope of a stride, as a share of the median stride's, for its phase to be
+#: estimated.
 ENOUGH = 0.5
-#: Fewest strides from which a scatter is estimated.
+#: STRIDES: fewest strides from which a scatter is estimated.
 STRIDES = 3
 
 
@@ -108,18 +109,19 @@ def _scatter(early: np.ndarray) -> PhaseScatter:
                         reliable.size)
 
 
-# The feet of insects from the angles of their joints: which leg steps when.
+# Positions of insects' feet from the angles of their joints, which show when each leg steps.
 
-#: What joints are called there, or as in DeepFly3D, in the order in which they turn a leg.
+#: JOINTS: usual names of a leg's joints, and those of DeepFly3D, in the order in which they turn
+#: it.
 JOINTS = (('coxayaw', 'thcyaw'), ('coxa', 'coxapitch', 'thcpitch'), ('coxaroll', 'thcroll'),
           ('femur', 'femurpitch', 'ctrpitch'), ('femurroll', 'ctrroll'),
           ('tibia', 'tibiapitch', 'ftipitch'))
 AXES = 'xyzyzy'
-#: Coxa, femur, and tibia with tarsus of a fruit fly's fore, middle and hind legs, mm; joint after
-#: which each begins.
+#: LENGTHS: pair of legs of a fruit fly -> lengths of coxa, femur, and tibia with tarsus, mm;
+#: BEGINS: index of the joint after which each begins.
 LENGTHS = {'f': (0.40, 0.69, 1.17), 'm': (0.18, 0.78, 1.24), 'h': (0.20, 0.83, 1.39)}
 BEGINS = (2, 4, 5)
-#: Points of a cycle.
+#: POINTS: number of points of a cycle.
 POINTS = 128
 
 
@@ -181,21 +183,22 @@ def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             for leg, one in forward.items()}
 
 
-#: Joints whose mean angles are this much larger than what they move by RMS have a sign.
+#: SIGNED: ratio of a joint's mean angle to its RMS motion above which the mean has a sign.
 SIGNED = 1.0
-#: Correlations that differ by more decide the sense of a joint.
+#: CLEARER: least difference of the correlations in either sense that decides a joint's sense.
 CLEARER = 0.2
-#: A joint that moves by less than this share of the variance of another decides no leg's phase.
+#: TELLING: variance of a joint, as a share of the largest, below which it decides no leg's phase.
 TELLING = 0.05
-#: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
+#: SCATTER: RMS distance of real legs from the phases of their gait, cycles, for the odds of gaits.
 SCATTER = 0.06
-#: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
+#: BY_CELLS: largest violation of a symmetry, over the cells' RMS; SAMPLES: samples of a cycle for
+#: it.
 BY_CELLS, SAMPLES = 0.2, 128
 
 
 @dataclass(frozen=True)
 class GaitMatch:
-    """Which gait it is.
+    """The gait that matches the legs' phases.
 
     Attributes:
         gait: None if no gait is near enough.

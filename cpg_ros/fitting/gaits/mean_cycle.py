@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The period of a recording, to the precision its samples allow.
+"""Mean cycles of recordings, by period or by known phase, and the exact period of a recording.
 
 The first guess is the lag at which the recording repeats (the normalised square difference of
 McLeod & Wyvill, 2005, "A smarter way to find pitch"). The period is then fitted together with
@@ -30,11 +30,12 @@ from scipy.linalg import solve_toeplitz, toeplitz
 
 # The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
 
-#: Most harmonics of a mean cycle.
+#: HARMONICS: most harmonics of a mean cycle.
 HARMONICS = 32
-#: Least eigenvalue of the normal matrix of harmonics, of at most 1.
+#: DETERMINED: least eigenvalue of the harmonics' normal matrix, at most 1, with which they are
+#: fitted.
 DETERMINED = 0.1
-#: Places in the cycle that are distinguished for that; many more than harmonics.
+#: BINS: phases of the cycle that are distinguished for that; many more than harmonics.
 BINS = 4096
 
 
@@ -170,15 +171,15 @@ def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> HarmonicCyc
 
 # The mean cycle of a motion whose phase is known, and how far each cycle is from it.
 
-#: Most harmonics of a mean cycle.
+#: AVERAGE_HARMONICS: most harmonics of a mean cycle.
 AVERAGE_HARMONICS = 24
-#: Samples further off than this many times the median distance, and than this many standard
-#: deviations of the joint, are none of the motion (spikes).
+#: A sample is a spike if it is off the mean cycle by more than FAR times the median distance and
+#: by more than WILD standard deviations of the joint.
 FAR, WILD = 30.0, 3.0
-#: Samples of a long recording that are fitted at once, and fewest cycles in them.
+#: BLOCK: samples of a long recording that are fitted at once; CYCLES: fewest cycles in them.
 BLOCK, CYCLES = 1 << 15, 20.0
-#: Fewest cycles for the scatter to be estimated at every phase by itself, and as how many cycles
-#: that of all phases together counts there: that of a few may be small by chance.
+#: ENOUGH: fewest cycles with which the scatter is estimated at every phase; POOLED: number of
+#: cycles as which the scatter of all phases counts there, as that of a few may be small by chance.
 ENOUGH, POOLED = 4, 4
 
 
@@ -317,18 +318,19 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
             np.interp(theta % 1.0, centres, error, period=1.0))
 
 
-#: Deviations below this share of the signals' RMS do not distinguish a period from its half.
+#: NEGLIGIBLE: deviation, over the signals' RMS, up to which a period is not told from its half.
 NEGLIGIBLE = 0.005
-#: A recording that repeats is at some lag this near to itself; unrelated signals have 1.
+#: REPEATS: normalised square difference at a lag, 1 for unrelated signals, below which they
+#: repeat.
 REPEATS = 0.5
-#: Most points of the even grid on which it is compared with itself.
+#: GRID: most points of the even grid on which a recording is compared with itself.
 GRID = 1 << 17
-#: Most samples that are used for the period, one of each stretch of a longer recording.
+#: LONGEST: most samples that are used for the period, one of each stretch of a longer recording.
 LONGEST = 1 << 15
-#: Most lags that are tried as the period.
+#: CANDIDATES: most lags that are tried as the period.
 CANDIDATES = 12
 
-#: What a period leaves, as a share of the signals' power; the period; its series' weights.
+#: Residual of a period, as a share of the signals' power; the period; its series' weights.
 Trial = tuple[float, float, np.ndarray]
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Time to stride phase: where in its cycle a motion is that is never quite as fast as before.
+"""Estimation of the stride phase over time for a steady motion of varying speed.
 
 Roughly from the first harmonic of all signals together: their complex amplitudes in a sliding
 window of one period have, in a steady gait, one direction, and how far they have turned along it
@@ -34,31 +34,33 @@ from cpg_ros.fitting.gaits.steady_stretch import longest_run, resample_evenly, S
 import numpy as np
 from scipy.linalg import solveh_banded
 
-#: Blocks in a period, a window begins at each of them, and points in a block.
+#: BLOCKS: blocks in a period, at each of which a window begins; POINTS: points in a block.
 BLOCKS, POINTS = 8, 4
-#: Steady is what has at least this share of the typical amplitude,
+# A motion is steady if it meets the following four limits.
+#: WEAKEST: least amplitude, as a share of the typical one.
 WEAKEST = 0.4
-#: at most this many times it,
+#: STRONGEST: largest amplitude, as a multiple of the typical one.
 STRONGEST = 2.5
-#: a stride duration within this share of the median,
+#: TOLERANCE: largest relative difference of a stride's rate from the median.
 TOLERANCE = 0.15
-#: and this share of the motion in the typical direction, 1/4 for a walk against a trot.
+#: ALIKE: least share of the motion in the typical direction; a walk has 1/4 of a trot's.
 ALIKE = 0.5
-#: At its ends a stretch has no stride that leaves more than this many times the median RMS that
-#: strides leave of the mean one, if it is this share of the motion at all.
+#: A stride at the end of a stretch is left out if its RMS residual exceeds ODD times the median
+#: one and MARKED of the motion,
 ODD, MARKED = 3.0, 0.05
-#: or whose rate is this many times the median deviation off the median, if it is this share of it.
+#: or if its rate differs from the median by more than ODD_RATE times the median deviation and by
+#: more than the share MARKED_RATE.
 ODD_RATE, MARKED_RATE = 4.5, 0.03
-#: Harmonics that fix the phase, and most of its cycles without own knots.
+#: HARMONICS: harmonics that determine the phase; FEW: cycles below which there are no inner knots.
 HARMONICS, FEW = 8, 4.0
-#: Variance of the phase at an end, over that of strides' lengths (found by simulation: strides of
-#: 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
+#: HASTE: variance of the phase at an end, over that of strides' lengths (found by simulation:
+#: strides with 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
 HASTE = 0.08
-#: Fewest rates in which a drift is separated from wander.
+#: DRIFTS: fewest rates in which a drift is separated from wander.
 DRIFTS = 12
-#: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
+#: STEPS: steps of Gauss-Newton; FARTHEST: largest change of the phase in one, cycles.
 STEPS, FARTHEST = 6, 0.1
-#: Weight of a knot's neighbours where there are no data around it.
+#: STIFFNESS: weight of a knot's neighbours where there are no data around it.
 STIFFNESS = 1e-3
 
 
@@ -85,7 +87,7 @@ class PhaseEstimate(ShortRepr):
 
     @property
     def cycles(self) -> float:
-        """How many cycles it holds."""
+        """Number of cycles of the stretch."""
         return float(self.phases[-1] - self.phases[0])
 
 
@@ -139,7 +141,7 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
     if len(z) > BLOCKS:
         steady &= np.abs(rates / rate - 1.0) <= TOLERANCE
     first, last = longest_run(steady & _joined(steady, inside)) or (0, len(z) - 1)
-    # What is left of a block at the end of the recording is no reason to stop there.
+    # An incomplete block at the end of the recording is no reason to stop before it.
     end = times[-1] if last == len(z) - 1 else middles[last] + 0.5 * period
     return RoughPhase(max(middles[first] - 0.5 * period, times[0]), min(end, times[-1]),
                       middles[first:last + 1], phases[first:last + 1])
@@ -289,7 +291,7 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
     def sums(values: np.ndarray) -> np.ndarray:
         return np.add.reduceat(values, starts, axis=1)
 
-    # About the means of each stride: how a body leans is no gait.
+    # Subtract the means of each stride: the lean of a body is not part of the gait.
     def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return (sums(a * b) - sums(a) * sums(b) / counts).sum(axis=0)
 

@@ -28,12 +28,12 @@ from cpg_ros.fitting.gaits.mean_cycle import find_period, HarmonicCycle, holds_t
 from cpg_ros.networks.symmetry import Group, Permutation, symmetries, Symmetry
 import numpy as np
 
-# Comparing waveforms: how far one lags another, how much they differ, how steadily they turn.
+# Comparison of waveforms: their lag, their difference in shape, the steadiness of their turning.
 
 TURN = 2.0 * np.pi
-#: Places of a cycle at which shifts are tried; a mean cycle has far fewer harmonics.
+#: GRID: number of shifts of a cycle that are tried; a mean cycle has far fewer harmonics.
 GRID = 1024
-#: Centres that are tried in each direction, over the middle part of a closed curve's extent.
+#: CENTRES: centres of a closed curve that are tried in each direction, over half its extent.
 CENTRES = np.linspace(-0.6, 0.6, 13)
 
 
@@ -94,7 +94,7 @@ def shifted(a: np.ndarray, theta: float) -> np.ndarray:
 
 
 def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float:
-    """How much two waveforms differ, whatever their shift: the smallest RMS over all shifts.
+    """Return the difference of two waveforms: the smallest RMS over all shifts.
 
     Args:
         a: a waveform on even points of a cycle, shape (m,).

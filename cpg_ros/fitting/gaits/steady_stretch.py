@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where a recording repeats, and how fast: stretches of steady motion among starts and stops.
+"""Search for stretches of steady motion in a recording, and for their periods.
 
 Signals repeat with a lag L around a place if they differ there from themselves L later by much
 less than unrelated signals would: the square difference over the local variance (that of
@@ -26,10 +26,10 @@ from typing import Protocol
 
 import numpy as np
 
-# What the analysis of gaits needs of a recording, wherever it comes from.
+# Interfaces of recordings for the analysis of gaits.
 
 class RecordingLike(Protocol):
-    """What is needed of a recording; see Recording."""
+    """Interface of a recording; see Recording."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -49,7 +49,7 @@ class RecordingLike(Protocol):
 
 
 class FootLoadsLike(Protocol):
-    """What is needed of loads on the feet; see FootLoads."""
+    """Interface of loads on the feet; see FootLoads."""
 
     @property
     def legs(self) -> tuple[str, ...]:
@@ -64,26 +64,27 @@ class FootLoadsLike(Protocol):
         """In any unit, shape (n, legs)."""
 
 
-#: Fastest stride that is looked for (Hz).
+#: FASTEST: largest stride frequency that is searched for, Hz.
 FASTEST = 12.5
-#: Points of a lag on its grid: from this many to twice as many.
+#: FEWEST: least points of a lag on its grid, which has up to twice as many.
 FEWEST = 12
-#: Points of the even grid per sample where those are few.
+#: FINER: points of the even grid per sample if samples are few.
 FINER = 4.0
-#: Most points of the finest grid.
+#: GRID: most points of the finest grid.
 GRID = 1 << 18
-#: Mean square difference over twice the variance: 0 if it repeats exactly, 1 if unrelated.
+#: REPEATS: mean square difference, over twice the variance, below which signals repeat: 0 if
+#: exactly, 1 if they are unrelated.
 REPEATS = 0.25
-#: Fewest cycles in which a repetition shows.
+#: CYCLES: fewest cycles in which a repetition is found.
 CYCLES = 1.4
-#: A multiple of the lag is the period if it repeats so much better: less than this share of the
-#: difference, and so much less.
+#: A multiple of the lag is the period if its difference is less than the share BETTER of that of
+#: the lag reduced by LESS,
 BETTER, LESS = 0.5, 0.02
-#: and for at least this share of the time.
+#: and if it repeats for at least the share LASTING of the lag's stretch.
 LASTING = 0.7
-#: Lags this near to one another, as a share, are of one gait.
+#: NEAR: relative difference up to which two lags belong to one gait.
 NEAR = 0.1
-#: Lags tried on a grid, and windows of the local variance, in points.
+#: LAGS: lags that are tried on a grid, and windows of the local variance, points.
 LAGS = range(FEWEST - 1, 27)
 WIDTHS = (11, 14, 18, 22)
 
@@ -108,7 +109,7 @@ class Stretch:
 
     @property
     def cycles(self) -> float:
-        """How many periods it holds."""
+        """Number of periods of the stretch."""
         return (self.end - self.begin) / self.period
 
     def outside(self, begin: float, end: float) -> bool:
@@ -250,7 +251,7 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
 def best_stretch(found: list[Stretch]) -> Stretch:
     """Choose the stretch with most cycles of most motion, at its true period.
 
-    Of half a period cycles are more, but they differ; the multiple is then taken.
+    Half a period gives more cycles, which differ from one another: its multiple is then taken.
     """
     best = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
     for times in (2, 3):

@@ -66,12 +66,12 @@ from cpg_ros.fitting.gaits.steady_stretch import (
 from cpg_ros.networks.network import Network
 import numpy as np
 
-# The joints of a recording that have angles enough, without samples that are no motion.
+# Joints of a recording with enough samples, without spikes.
 
-#: Fewest samples of a joint.
+#: SAMPLES: fewest samples of a joint.
 SAMPLES = 8
-#: A sample is no motion if it is off both neighbours by this many standard deviations and times
-#: as much as they differ.
+#: SPIKE: a sample is a spike if it is off the mean of its neighbours by this many standard
+#: deviations of the joint, and by this multiple of their difference.
 SPIKE = 3.0
 
 
@@ -159,18 +159,19 @@ def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
     return kept
 
 
-#: Points of a mean cycle.
+#: POINTS: number of points of a mean cycle.
 POINTS = 64
-#: Joints that all move by less stand (rad).
+#: STILL: range of all joints below which the robot stands, rad.
 STILL = 0.01
-#: In stretches of fewer cycles than SURE strides must be more alike: the mean square difference
-#: over twice the variance.
+#: ALIKE: largest mean square difference, over twice the variance, of stretches with fewer cycles
+#: than SURE.
 ALIKE = 0.1
-#: Most of the variance that the mean cycle may leave of the joints together.
+#: LEFT: largest share of the joints' variance that the mean cycle may leave unexplained.
 LEFT = 0.5
-#: Stretches that are followed, and how much other motion, in cycles, is worth a note.
+#: SEEDS: most stretches that are followed; OTHERS: cycles of another one from which on it is
+#: noted.
 SEEDS, OTHERS = 4, 3.0
-#: What fewer cycles leave of the confidence.
+#: FEW_CYCLES: factor of the confidence for fewer cycles than SURE.
 FEW_CYCLES = 0.9
 
 
@@ -235,7 +236,7 @@ class Stride(ShortRepr):
 
     @property
     def verdict(self) -> str:
-        """Which gait it is: its name, 'walk or run: cannot tell', or which one is nearest."""
+        """The gait's name, 'walk or run: cannot tell', or a text on the nearest one."""
         if self.gait is None:
             return f'none of the gaits; nearest {self.nearest}'
         return self.gait if len(self.alike) < 2 else f'{" or ".join(self.alike)}: cannot tell'

@@ -46,11 +46,11 @@ from cpg_ros.fitting.inversion.leg_duty import (
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Phases among which the first guess of the one between recording and orbit is chosen.
+#: SHIFTS: number of phases among which the initial one between recording and orbit is chosen.
 SHIFTS = 32
-#: Orbits kept of those solved last.
+#: KEPT: number of orbits that are kept, the last ones.
 KEPT = 64
-#: Harmonics of a waveform that may be other than the model's.
+#: ERRORS: number of harmonics of a waveform that may differ from the model's.
 ERRORS = 4
 
 
@@ -151,7 +151,7 @@ class CycleProblem:
         return self._solved[numbers.tobytes()]
 
     def hold(self, values: np.ndarray) -> None:
-        """Keep the orbit at values, whatever is solved for next: not every way leads back."""
+        """Keep the orbit at these values as a start: it may be out of reach from later ones."""
         self._held[values[:self._own].tobytes()] = self._solve(values)
 
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How well a fit determines its free numbers: standard errors, intervals, and undetermined ones.
+"""Fits and their uncertainty: standard errors, intervals, undetermined numbers; the class Fit.
 
 The residual of a model that is not the truth is no noise: it is larger than the standard errors
 of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
@@ -37,25 +37,26 @@ from cpg_ros.networks.network import Network
 import numpy as np
 from scipy.special import stdtrit
 
-#: Half the width of a 95 % interval, in standard errors.
+#: QUANTILE: half the width of a 95 % interval, standard errors.
 QUANTILE = 1.959964
-#: Singular values of the scaled derivative below this share of the largest are exact zeros, and
-#: numbers with this share in such a direction are not determined.
+#: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; SHARE:
+#: component of a number in such a direction above which the number is not determined.
 ZERO, SHARE = 1e-7, 1e-3
-#: The root of the rise of the cost is that of the quadratic, within these factors, or its
-#: profile is followed; steps that may mend the rest.
+#: An interval is computed without a profile if the root of the cost's rise, over the quadratic's,
+#: is within REGULAR and its end is found in STEPS_NEARBY steps.
 REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
-#: Steps of a profile on either side, and its tolerance in standard errors.
+#: STEPS: most steps of a profile on either side; CLOSE: its relative tolerance.
 STEPS, CLOSE = 10, 0.03
-#: Closer to a bound than this share of a step is at the bound.
+#: NEGLIGIBLE: distance from a bound, as a share of a step, up to which a number is at the bound.
 NEGLIGIBLE = 1e-6
-#: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
+#: Descents of a profile. TOLERANCE: at which they stop; MOST: most evaluations; DRAWN: width, over
+#: its size, of the residual that draws the profile's number to its place.
 TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 
-#: A residual of this many times its standard errors (RMS) is explained by noise.
+#: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
 EXPLAINED = 1.2
 
-#: Goes down: problem, start, tolerance, evaluations at most.
+#: Minimises: problem, start, tolerance, most evaluations.
 Descend = Callable[[Evaluate, np.ndarray, float, int], Minimisation]
 
 
@@ -150,7 +151,7 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ModelError(ShortRepr):
-    """What errors of the model's waveforms make of the numbers of a fit.
+    """Effect of errors in the model's waveforms on the numbers of a fit.
 
     Attributes:
         size: RMS of the waveforms' errors, each harmonic over half the waveform's range; 0 where
@@ -362,7 +363,7 @@ class Optimum(ShortRepr):
 
 # A gait fitted to a recording: parameters, readouts, errors and uncertainties.
 
-#: A joint whose mean cycle has a smaller range stands (rad).
+#: STANDS: range of the mean cycle below which a joint stands, rad.
 STANDS = 0.01
 
 
@@ -478,7 +479,7 @@ class Fit(ShortRepr):
 
     @property
     def rms_share(self) -> dict[str, float]:
-        """That over the joint's range; 0 for a joint that stands."""
+        """RMS error over the joint's range; 0 for a joint that stands."""
         spans = np.ptp(self.recorded, axis=1)
         return {name: rms / span if span > STANDS else 0.0
                 for (name, rms), span in zip(self.rms.items(), spans.tolist(), strict=True)}
@@ -501,10 +502,10 @@ class Fit(ShortRepr):
 
     @cached_property
     def hopf(self) -> HopfPoint | None:
-        """Where the gait is born as the delay grows; None for networks without delay."""
+        """Hopf point from which the gait emerges as the delay grows; None without delay."""
         return first_hopf(self.network, self.gait)
 
     @cached_property
     def verdict(self) -> GaitAssessment:
-        """How stable the gait is."""
+        """Verdict on the gait's stability."""
         return GaitAssessment(self.gait, self.orbit)

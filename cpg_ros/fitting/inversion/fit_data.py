@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is fitted: joints over one cycle, and the cells that drive them."""
+"""Data of a fit: linear readouts, a gait's signals as harmonics, joints' mean cycles, cells."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ import numpy as np
 
 # The linear readout of joints and its elimination from a fit: variable projection.
 
-#: Weights of each readout order.
+#: WEIGHTS: order of a readout -> its number of weights.
 WEIGHTS = {1: 2, 2: 4, 3: 6}
 
 
@@ -102,7 +102,7 @@ def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray
 # The signals of a gait that drive joints, as harmonics, and their derivatives by parameters.
 
 TURN = 2.0 * np.pi
-#: Points of a cycle from which the harmonics' derivatives are made.
+#: SAMPLES: points of a cycle from which the harmonics' derivatives are computed.
 SAMPLES = 2048
 
 
@@ -210,7 +210,7 @@ def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.nda
     return terms, (slopes - np.multiply.outer(terms, 0.5 * (high - low))) / half
 
 
-#: A mean cycle is never known better than to this share of the joint's range.
+#: KNOWN: least standard error of a mean cycle, as a share of the joint's range.
 KNOWN = 1e-4
 
 

@@ -30,14 +30,15 @@ import numpy as np
 
 # The pictures of an inverted recording.
 
-#: Of what is fitted, and of bands and zero lines, on light and on dark grounds; what is recorded
-#: has the colour of text.
+#: Colours on light and dark grounds. FITTED: of fitted curves; BAND: of bands and zero lines;
+#: recorded curves have the colour of text.
 FITTED, BAND = '#e04040', '#90a0b080'
 LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
 COLUMNS = 3
-#: Columns of the picture of a recording, and how far phases are shown beyond the seam (cycles).
+#: COLUMN: most columns of the picture of a recording; SEAM: by how much phases are shown beyond
+#: the ends of the cycle, cycles.
 COLUMN, SEAM = 1200, 0.12
-#: Points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
+#: POINTS: points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
 POINTS = 20
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where a fit starts if nothing else is asked for: a few of many values that cover the ranges.
+"""Default starts of a fit: the best of many values that cover the ranges.
 
 A cost may have several minima: other parameters make much the same waveform of a free readout.
 Every candidate is judged by what its best readouts leave of the recording, which takes an orbit
@@ -28,17 +28,17 @@ from cpg_ros.fitting.inversion.free_parameters import Free
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
 
-#: Free numbers that are the stance's share of a stride.
+#: SHARES: names of free numbers that are the stance's share of a stride.
 SHARES = (GAIT_DUTY, 'duty')
-#: Duties of a gait that are tried.
+#: DUTIES: values of the gait's duty that are tried.
 DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)
-#: Delays that are, over the critical one; factors of a number that has no narrow range; and even
-#: places within one that has: whose ends are of one sign and differ by no more than NARROW.
+#: LATE: delays that are tried, over the critical one; PLACES: places in a narrow range, whose ends
+#: have one sign and a ratio up to NARROW; FACTORS: factors of numbers without such a range.
 LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.5) / 9, 10.0
-#: A number of 0 is this far from others (in its unit).
+#: TINY: scale of a number near 0, in its unit, for relative distances.
 TINY = 1e-3
-#: Fewest and most starts beside the network's own values; and how far apart two minima are, each
-#: number over its size.
+#: LEAST, MOST: numbers of starts beside the network's own values; APART: relative distance above
+#: which two minima are distinct.
 LEAST, MOST, APART = 2, 3, 0.03
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Coordinates in which a trust region moves: the delay is measured by the gait's critical one.
+"""Free numbers of a fit, the trust region, and its coordinates: delays over the critical one.
 
 Close to where a gait is born its shape is the same all along the Hopf set, which is curved. With
 the delay over its critical value for a coordinate that valley is straight, and the set's edge a
@@ -31,11 +31,11 @@ from cpg_ros.networks.network import Network
 import numpy as np
 from scipy.optimize import least_squares
 
-# Which numbers of a network a fit may move, and within what bounds.
+# Numbers of a network that a fit may move, and their bounds.
 
 N = TypeVar('N', bound=Network)
-#: Places at which the edge of the Hopf set is looked for between a value and a bound, and
-#: halvings that then find it.
+#: PLACES: places between a value and a bound at which the edge of the Hopf set is searched for;
+#: HALVINGS: halvings that then locate it.
 PLACES, HALVINGS = 64, 40
 
 
@@ -152,7 +152,7 @@ Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Minimisation(ShortRepr):
-    """What came of one start.
+    """Result of the minimisation from one start.
 
     Attributes:
         start: values it started from.
@@ -176,7 +176,7 @@ class Minimisation(ShortRepr):
 
     @classmethod
     def without_orbit(cls, start: np.ndarray, error: NoOrbit) -> 'Minimisation':
-        """Return what comes of a start that has no orbit."""
+        """Return the result of a start that has no orbit."""
         return cls(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False, str(error))
 
     @property
@@ -226,9 +226,11 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
                         found.status > 0)
 
 
-#: Least share of the critical delay by which the delay is above it.
+#: ABOVE: least relative distance of the delay above the critical one.
 ABOVE = 1e-7
-#: Where else to look: critical delays that are near it, or anywhere; factors of other numbers.
+#: Further starts. NEAR: delay over the critical one if other numbers vary; LATE: delays if none
+#: do;
+#: FACTORS: factors of the other numbers.
 NEAR, LATE, FACTORS = 1.03, (1.03, 1.3, 2.0, 4.0), (0.45, 0.7, 1.4, 2.0, 3.0)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a generator is to be set to, and when, so that it changes gaits as a recording does."""
+"""Gait schedules: settings of a generator over time, from a recording that changes its gait."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -49,9 +49,9 @@ from cpg_ros.networks.registry import find_network, NetworkError, reference, wit
 import numpy as np
 import yaml
 
-# Where within a stretch of one frequency legs change their phases: a walk that becomes a trot.
+# Changes of the legs' phases within a stretch of one frequency, as of a walk that becomes a trot.
 
-#: Fewest strides on either side of a change.
+#: FEWEST: fewest strides on either side of a change.
 FEWEST = int(SURE)
 
 
@@ -109,7 +109,7 @@ def _points(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride:
 
 # A recording that changes its gait, cut into its steady stretches, each of them fitted.
 
-#: Shorter remains are not searched: three strides of the fastest that is looked for, s.
+#: SHORTEST: shortest remainder that is searched, s: three strides of the largest frequency.
 SHORTEST = 0.24
 
 
@@ -248,9 +248,9 @@ def stretch_rows(found: Sequence[StretchFit]) -> list[tuple[str, ...]]:
                     f'{100.0 * one.fit.fit.mean_rms_share:.1f} %') for one in found]
 
 
-#: Frequencies this near to one another, as a share, are one entry's.
+#: SAME: relative difference of frequencies up to which two stretches share an entry.
 SAME = 0.02
-#: Latest time of an entry, s.
+#: LATEST: latest time of an entry, s.
 LATEST = 1e6
 
 

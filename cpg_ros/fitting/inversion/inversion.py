@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``inversion``: a recording in, a gait out; or the node that does it on call.
+"""Executable ``inversion``: fits gaits to recordings, or runs the node that does it on call.
 
 ``inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html`` finds the
 steady gait of a recording, fits a network's gait and the joints' readouts to it, and writes what

@@ -61,9 +61,10 @@ import numpy as np
 
 # The caveats of a fit, in words.
 
-#: A 95 % interval wider than this share of the value on either side is named.
+#: WIDE: half width of a 95 % interval, over the value, above which a warning names it.
 WIDE = 0.1
-#: So are correlations beyond this, and ends this near a bound, over the bounds' distance.
+#: TOGETHER: correlation above which a warning names it; AT_BOUND: distance from a bound, over the
+#: bounds' distance, up to which a warning names it.
 TOGETHER, AT_BOUND = 0.95, 1e-5
 
 
@@ -131,17 +132,18 @@ def _listed(names: Sequence[str]) -> str:
     return ' and '.join(filter(None, [', '.join(names[:-1]), names[-1]]))
 
 
-#: Share of a stride that legs stand which stand as long as they swing.
+#: EVEN: duty of legs that stand as long as they swing.
 EVEN = 0.5
-#: A frequency is never known better than to this share.
+#: KNOWN_FREQUENCY: least relative error of a frequency.
 KNOWN_FREQUENCY = 1e-4
-#: Relative change at which a trust region stops, and at which the last one does.
+#: TOLERANCE: relative change at which a trust region stops; LAST: the same for the last one.
 TOLERANCE, LAST = 1e-5, 1e-8
-#: A minimum may be as good as the best if its cost is less than this many times the least.
+#: NEARLY: cost of a minimum, as a multiple of the least, up to which it is compared with the best.
 NEARLY = 2.0
-#: Times that joints are weighted anew, and the relative change of a weight that is none.
+#: WEIGHINGS: most iterations of the joints' weights; SAME: relative change of a weight at which
+#: these stop.
 WEIGHINGS, SAME = 4, 0.02
-#: Halvings that find where the generator begins to reject the gait.
+#: HALVINGS: halvings that locate the value at which the generator begins to reject the gait.
 HALVINGS = 6
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How long legs stand, in a fit: the generator's retiming of the legs, and its derivatives.
+"""Duty factors in a fit: the generator's retiming of the legs, and its derivatives.
 
 The generator reads joints at the phase that the gait's duty makes of the cell's (motion.duty).
 That phase depends on the duty, and on when the cell's own signal peaks and is lowest, which the
@@ -29,9 +29,10 @@ from cpg_ros.motion.robot import HARMONICS, Robot
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: What the duty of the gait is called among the free numbers: networks may have a duty, too.
+#: GAIT_DUTY: name of the gait's duty among the free numbers; networks may have a duty, too.
 GAIT_DUTY = 'gait_duty'
-#: Even phases among which a trough is looked for, and Newton's steps from there.
+#: GRID: even phases among which a trough is searched for; STEPS: steps of Newton's method from
+#: there.
 GRID, STEPS = 1024, 4
 
 

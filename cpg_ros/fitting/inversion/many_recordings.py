@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Folders of recordings inverted: a row for each, whatever is wrong with it."""
+"""Inversion of folders of recordings: a row of the table for each, with a result or a reason."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -44,7 +44,8 @@ from cpg_ros.motion.robot import Robot
 
 # The inversion of one recording, as a job: the result in plain types, or the reason for none.
 
-#: Joints that are drawn, points of their mean cycles, and the size of the picture in pixels.
+#: DRAWN: most joints that are drawn; POINTS: points of their mean cycles; WIDTH, HEIGHT: size of
+#: the picture, pixels.
 DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
 
 
@@ -162,8 +163,8 @@ def picture(found: RecordingFit) -> str:
             f'{"".join(lines)}</svg>')
 
 
-#: While new recordings are waited for: seconds between two looks at the folders, and between two
-#: tables.
+#: While waiting for new recordings. LOOK: period of looking at the folders, s; TABLES: period of
+#: writing the tables, s.
 LOOK, TABLES = 2.0, 30.0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which network explains a recording? All that have its legs, fitted and judged on other strides.
+"""Choice of the network that explains a recording, by cross-validation on its strides.
 
 Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
 network that follows noise gains nothing by it. Networks whose errors a recording cannot
@@ -40,7 +40,7 @@ from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: Networks are distinct where their errors differ by so many standard errors of the difference.
+#: DISTINCT: difference of errors, in its standard errors, above which two networks are distinct.
 DISTINCT = 2.0
 
 

@@ -40,7 +40,7 @@ from cpg_ros.networks.network import Network
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-#: Relative change of parameters and objective at which the method stops.
+#: TOLERANCE: relative change of parameters and objective at which the method stops.
 TOLERANCE = 1e-12
 
 
@@ -67,7 +67,7 @@ class CycleFit(ShortRepr):
 
     @property
     def evaluations(self) -> int:
-        """How many orbits were solved for."""
+        """Number of orbits that were solved for."""
         return self.trial.evaluations
 
     @property
@@ -148,7 +148,7 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
 
 # A recorded gait inverted as Liu & Zhang (2024) do it: eight joints taken for the eight cells.
 
-#: Instants of a cycle, and phases between recording and orbit that are tried.
+#: POINTS: instants of a cycle; SHIFTS: phases between recording and orbit that are tried.
 POINTS, SHIFTS = 20, 60
 
 

@@ -31,11 +31,11 @@ from cpg_ros.networks.registry import find_network, NETWORKS, reference
 import numpy as np
 import yaml
 
-#: Limits of joints that no robot file gives: the share of the recorded range that is left on
-#: either side, and the multiple of the fastest fitted speed.
+#: Limits of joints without a robot file. ROOM: margin on either side of the recorded range, as a
+#: share of it; FASTER: speed limit as a multiple of the fastest fitted speed.
 ROOM, FASTER = 0.25, 3.0
-#: Factors on a robot file's weights at a stride of 0, of which the largest is taken that keeps
-#: them within the joints' limits beside the fitted offsets.
+#: IN_PLACE: factors of a robot file's weights at a stride of 0; the largest one that keeps the
+#: joints within their limits, with the fitted offsets, is used.
 IN_PLACE = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
 
 
@@ -165,7 +165,7 @@ def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:
 
 
 def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[str, Any]:
-    """Return what a running generator is set to, by parameter.
+    """Return the values of a running generator's parameters, by name.
 
     Args:
         found: the fit.

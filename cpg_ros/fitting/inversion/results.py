@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Rows of inverted recordings as table.parquet and table.csv, made a batch at a time."""
+"""Results of many recordings: finding recordings, the folder of results, its page and tables."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 import csv
@@ -31,9 +31,9 @@ from cpg_ros.fitting.recordings.formats import FORMATS
 
 # Recordings in folders: bags, split ones as one, and other files of known formats.
 
-#: A folder that has this is one that results are written to: what is in it is no recording.
+#: RESULTS: file that marks a folder of results, in which no recordings are searched for.
 RESULTS = 'cpg_ros_results.json'
-#: Bytes that are read at once.
+#: BLOCK: bytes that are read at once.
 BLOCK = 1 << 20
 
 
@@ -117,7 +117,7 @@ def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
 
 # A folder of results: a file for every recording that is done, from which the table is made.
 
-#: Folders of the rows and of the fitted files.
+#: ROWS: folder of the rows; FITTED: folder of the fitted files.
 ROWS, FITTED = 'rows', 'fitted'
 
 
@@ -271,14 +271,14 @@ def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: in
         out.write(f'</tbody></table><script>{SCRIPT}</script></body></html>\n')
 
 
-#: Rows that are held at once.
+#: BATCH: rows that are in memory at once.
 BATCH = 256
-#: Columns with their units, in the order of the table; before those of the parameters.
+#: FIRST: column -> unit, in the order of the table, before the columns of the parameters.
 FIRST = {'file': '', 'digest': '', 'reason': '', 'gait': '', 'recognised': '',
          'frequency': 'Hz', 'frequency_error': 'Hz', 'confidence': '', 'cycles': '',
          'begin': 's', 'end': 's', 'network': '', 'rms_share': ''}
 TEXT = ('file', 'digest', 'reason', 'gait', 'recognised', 'network', 'fitted')
-#: What each parameter has: its value, standard error and 95 % interval.
+#: PARTS: columns of each parameter: value, standard error, and ends of the 95 % interval.
 PARTS = ('value', 'stderr', 'low', 'high')
 
 Rows = Callable[[], Iterable[dict[str, Any]]]

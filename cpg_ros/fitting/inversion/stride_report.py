@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stride by stride: how long each leg is retracted and protracted, from its joint angles alone.
+"""Strides of a recording one by one: retraction and protraction of each leg, and their tables.
 
 A leg's hip (or what corresponds to it) is foremost about when the foot is set down. From there to
 its hindmost angle the leg is retracted, mostly in stance, and from there on protracted, mostly in
@@ -37,18 +37,17 @@ from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.recording_fit import RecordingFit
 import numpy as np
 
-#: Words for joints that move a leg to and fro, and for those below, which bend it.
+#: PROXIMAL: words of joints that swing a leg; then the words of joints below, which bend it.
 PROXIMAL = frozenset(('hip', 'thigh', 'hfe', 'hy', 'coxa', 'shoulder', 'upper', 'hippitch'))
 DISTAL = frozenset(('knee', 'calf', 'kfe', 'lower', 'tibia', 'elbow', 'shank', 'kn', 'kneepitch'))
-#: Harmonics of the mean cycle whose extremes are taken, and points at which they are looked for.
+#: HARMONICS: harmonics of the mean cycle in its extremes; POINTS: phases at which these are
+#: searched for.
 HARMONICS, POINTS = 12, 4096
-#: Parts of a cycle: on either side of an extreme, to which it is fitted, and on either side of
-#: where the mean cycle has it, in which it is looked for; at how many places; fewest samples on a
-#: side.
+#: AROUND: half width of the fit to an extreme, cycles; SEARCHED: largest distance from that of the
+#: mean cycle, cycles; TRIED: number of phases that are tried; SAMPLES: fewest samples on a side.
 AROUND, SEARCHED, TRIED, SAMPLES = 0.08, 0.08, 33, 3
-#: A joint bends in the sense of its skewness if that is so large, otherwise of its mean if that is
-#: so many times its RMS motion; and by how much of this it has to be bent more in one stroke than
-#: in the other.
+#: SKEWED: least skewness that tells in which sense a joint bends; BENT: least mean, over the RMS
+#: motion, that tells it otherwise; CLEARER: least difference in bend of the two strokes, likewise.
 SKEWED, BENT, CLEARER = 0.4, 1.0, 0.3
 
 
@@ -226,9 +225,9 @@ def _strides(fore: np.ndarray, hind: np.ndarray | None) -> np.ndarray:
 
 # The strides of a recording as tables: each stride, each leg, and left against right.
 
-#: Fewest strides of a leg that have a scatter.
+#: FEWEST: fewest strides of a leg for which a scatter is reported.
 FEWEST = 3
-#: What is reported of strides: name by joints and by contacts, attribute of LegStrides, format.
+#: QUANTITIES: name from joints, name from contacts, attribute of LegStrides, and format of each.
 QUANTITIES = (('stride [s]', 'stride [s]', 'periods', '.4f'),
               ('retraction [s]', 'stance [s]', 'retractions', '.4f'),
               ('protraction [s]', 'swing [s]', 'protractions', '.4f'),

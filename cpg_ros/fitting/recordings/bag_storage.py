@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The storage of rosbag2 bags: which topics are there, and their messages as bytes.
+"""The storage of rosbag2 bags: unfinished mcap files, topics, and messages as bytes.
 
 Whatever the library raises on a damaged bag ends here, as one line that names the file.
 """
@@ -106,12 +106,12 @@ class _Ended(io.RawIOBase):
         super().close()
 
 
-#: Endings of a bag's storage files, and the name of the file that describes them.
+#: STORAGES: endings of a bag's storage files; METADATA: name of the file that describes them.
 STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
-#: Of those that were packed as a whole, and of all names of bags that are files.
+#: PACKED: additional ending of packed storage files; ENDINGS: endings of all bags that are files.
 PACKED = '.zstd'
 ENDINGS = (*STORAGES, *(ending + PACKED for ending in STORAGES), '.bag')
-#: Largest such file, bytes: a thousand topics have one of 2 MB.
+#: LARGEST_METADATA: largest metadata file, bytes; a thousand topics take 2 MB.
 LARGEST_METADATA = 16_000_000
 
 

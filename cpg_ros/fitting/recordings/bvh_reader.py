@@ -40,7 +40,7 @@ import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
 STATEMENT = re.compile(r'\b(ROOT|JOINT|CHANNELS)\b[ \t]*([^\n\r]*)')
-#: Lines of a tree, and channels of all joints: a body with hands has 300.
+#: LONGEST: most lines of a tree; MOST: most channels of all joints; a body with hands has 300.
 LONGEST, MOST = 200_000, 10_000
 
 

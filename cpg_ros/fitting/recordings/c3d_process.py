@@ -30,11 +30,11 @@ from typing import Any
 from cpg_ros.common.errors import CpgError
 import numpy as np
 
-#: What the process may take: address space, bytes, and time of the processor, s; besides, for
-#: each byte of the file.
+#: Limits of the process. MEMORY: address space, bytes; TIME: processor time, s; MEMORY_PER_BYTE,
+#: TIME_PER_BYTE: additional ones for each byte of the file.
 MEMORY, MEMORY_PER_BYTE = 2_000_000_000, 60
 TIME, TIME_PER_BYTE = 5.0, 1e-6
-#: Exit code of a file that the library refuses.
+#: REFUSED: exit code for a file that the library rejects.
 REFUSED = 3
 
 

@@ -44,7 +44,7 @@ from cpg_ros.fitting.recordings.tables import stamps_of_frames
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
-#: Largest file, and what its first block has, bytes.
+#: LARGEST: largest file, bytes; BLOCK: size of its first block, bytes.
 LARGEST, BLOCK = 1_000_000_000, 512
 
 

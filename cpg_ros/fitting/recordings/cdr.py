@@ -30,11 +30,12 @@ from cpg_ros.fitting.recordings.bag_library import deserialize, SerdeError
 import numpy as np
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-#: Layouts of a batch that are decoded in bulk; what is left goes one by one.
+#: LAYOUTS: most layouts of a batch that are decoded in bulk; other messages are decoded singly.
 LAYOUTS = 8
-#: Numbers of a message, in its order.
+#: FIELDS: arrays of a message, in its order.
 FIELDS = ('position', 'velocity', 'effort')
-#: Bytes before the body: representation, of which the library reads two bytes, and options.
+#: HEADER: bytes before the body: representation, of which the library reads two bytes, and
+#: options.
 HEADER = 4
 
 
@@ -134,7 +135,7 @@ def _decoded(messages: Sequence[bytes], index: int) -> Any:
 
 
 class _Layout:
-    """Where a message has what, and all its bytes but stamp, numbers and padding."""
+    """Places of a message's fields, and its bytes other than stamp, numbers and padding."""
 
     def __init__(self, messages: Sequence[bytes], index: int) -> None:
         message, first = _decoded(messages, index), messages[index]

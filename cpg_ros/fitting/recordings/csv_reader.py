@@ -52,39 +52,40 @@ from cpg_ros.fitting.recordings.tables import (
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
-# What the columns of a table are: its time, angles of joints, and loads on feet.
+# Columns of a table: time, angles of joints, loads on feet.
 
-#: What a header may call its unit -> that in s.
+#: TIMES: name of a unit of time in a header -> that unit in s.
 TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
          'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
-#: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
+#: Headers with a unit: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
 BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
 TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|temps|tiempo|tempo'
                   r'|elapsed[_ ]time)(?:[_ ]([a-z]+))?$', re.I)
-#: Times by another clock, taken where there is no other; and halves of a stamp in integers.
+#: RECEIPT: times of reception, used if there is no other time; SECONDS, NANOSECONDS: parts of a
+#: stamp in integers.
 RECEIPT = re.compile(r'^(receive|recv|log|publish)[_ ]?time$', re.I)
 SECONDS = re.compile(r'^(.*[./_])?(secs?)$', re.I)
 NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
-#: In a table with a line for each value: columns of names, and of values.
+#: NAMED, VALUE: columns of names and of values in a table with a line for each value.
 NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
 VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
-#: Where a stride is 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
+#: SHARE: column of a stride's phase from 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
 SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
-#: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
+#: POSITION: columns of joints among others: 'JointPosFR_hip', or in PlotJuggler's way
 #: '/joint_states/lf_knee/position'.
 POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
                       r'|^/.*/([^/]+)/position$', re.I)
-#: Words of a load on a foot, and those of one of several axes of it.
+#: LOAD: words of a load on a foot; AXIS: words of one of its axes.
 LOAD = {'force', 'forces', 'contact', 'contacts', 'load', 'loads', 'grf', 'fz'}
 AXIS = {'x', 'y', 'z', 'fx', 'fy', 'vx', 'vy', 'vz', 'px', 'py', 'pz'}
-#: What a row of units has in its cells, beside numbers that would make it one of samples.
+#: UNITS: cell of a row of units.
 UNITS = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
-#: A number with a decimal comma.
+#: COMMA: a number with a decimal comma.
 COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
 DELIMITERS = ',;\t'
-#: A time that is so far ahead of both neighbours (s) is a stamp gone wrong.
+#: ASTRAY: distance of a time ahead of both neighbours, s, from which on it is wrong.
 ASTRAY = 3600.0
-#: Lines that are parsed together.
+#: LINES: lines that are parsed together.
 LINES = 8192
 
 

@@ -43,7 +43,7 @@ from cpg_ros.fitting.recordings.recording import (
     UNNAMED,
 )
 
-#: Name -> format. One more is a file like those of these, and its name here.
+#: FORMATS: name -> format. To add one, write a file like those of the others and name it here.
 FORMATS: dict[str, RecordingFormat] = {
     one.name: one for one in (BAG, CSV, MOT, TRC, C3D, POSE, BVH, NPZ)}
 

@@ -43,7 +43,7 @@ import numpy as np
 
 # The commands of joints, from their positions, velocities and efforts.
 
-#: Gains beyond these are mistakes, and would make numbers overflow.
+#: SMALLEST, LARGEST: limits of gains, N m/rad and N m s/rad; others are mistakes and overflow.
 SMALLEST, LARGEST = 1e-3, 1e5
 
 
@@ -89,14 +89,14 @@ class Servo:
         return position + effort / self.kp
 
 
-#: Messages of a topic that are decoded together, and from how many bytes on; a few MB.
+#: BATCH: most messages of a topic that are decoded together; BATCH_BYTES: most bytes of these.
 BATCH, BATCH_BYTES = 4096, 16_000_000
-#: Stamps later than this (ns) are of a clock that shows the date, where 0 means not stamped.
+#: DATED: stamp, ns, above which a clock counts from 1970, so that a stamp of 0 means none.
 DATED = 10**17
 
 
 class Stream:
-    """What a topic delivered.
+    """The messages of a topic, decoded in batches.
 
     Args:
         topic: its name.
@@ -322,7 +322,7 @@ def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
 
 def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
              notes: Sequence[str] = (), some: bool = False) -> Recording:
-    """Make one recording of what topics delivered.
+    """Merge the streams of several topics into one recording.
 
     A joint on several topics is taken from one: from the topic with the most joints, and among
     these the one called joint_states, the one with the most messages, the first. Samples are at

@@ -24,10 +24,10 @@ from cpg_ros.fitting.recordings.cdr import SerializedBlock, UndecodableError
 import numpy as np
 
 LOW_STATE = 'unitree_go/msg/LowState'
-#: Names of the motors where no robot file has others: those of Unitree's URDF.
+#: MOTORS: default names of the motors, those of Unitree's URDF.
 MOTORS = tuple(f'{leg}_{part}_joint' for leg in ('FR', 'FL', 'RR', 'RL')
                for part in ('hip', 'thigh', 'calf'))
-#: Bytes of a message, the first four of which are the header of CDR.
+#: SIZE: bytes of a message, including the header of CDR, _HEADER bytes.
 SIZE, _HEADER, _LITTLE_ENDIAN = 1180, 4, 1
 _MOTOR = np.dtype({'names': ['q', 'dq', 'torque'], 'formats': ['<f4'] * 3, 'offsets': [0, 4, 12],
                    'itemsize': 48})

@@ -39,12 +39,13 @@ from cpg_ros.fitting.recordings.recording import (
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
-# Files of segments: which markers span which part of a body, and which parts a joint connects.
+# Files of segments: the markers that span each part of a body, and the parts that a joint
+# connects.
 
-#: What every reader of markers takes.
+#: SEGMENTS: option of every reader of markers.
 SEGMENTS = Option('segments', 'for markers: a file that says which of them span which segment '
                   'and which joints are between, or the name of a shipped one', 'FILE')
-#: Likelihood below which a marker counts as not seen, if the file does not say: as DeepLabCut's.
+#: LIKELY: default likelihood below which a marker counts as not seen, that of DeepLabCut.
 LIKELY = 0.6
 
 
@@ -195,9 +196,9 @@ def load_segments(name: str | Path) -> Segments:
     return found
 
 
-#: A segment that, as seen along the axis, has less than this share of its length has no direction.
+#: SHORTEST: share of a segment's length across the axis below which it has no direction.
 SHORTEST = 1e-3
-#: A coordinate beyond this is no place of a marker, whatever the unit.
+#: FARTHEST: largest coordinate of a marker, in any unit.
 FARTHEST = 1e9
 
 

@@ -36,13 +36,13 @@ from cpg_ros.fitting.recordings.tables import FPS, stamps_of_frames, UnpackedSiz
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
-#: What arrays may be called.
+#: Names of arrays: of times, rates, units and names.
 TIMES = ('time', 'times', 't', 'timestamps')
 RATES = ('fps', 'rate', 'frequency', 'sampling_rate')
 NAMES = ('joints', 'joint_names', 'names')
 POSITIONS = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
 UNITS = ('unit', 'units')
-#: Largest archive, bytes.
+#: LARGEST: largest archive, bytes.
 LARGEST = 1_000_000_000
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles out of OpenSim's motion and storage files (.mot, .sto).
+"""Joint angles from OpenSim's motion and storage files (.mot, .sto), and markers from TRC files.
 
 Coordinates of a motion are read as joints. What is no angle is left out: translations, which no
 header tells apart but their names do, and of states the speeds and the muscles'.
@@ -116,9 +116,9 @@ TRC = RecordingFormat(
     lacks={'unit': 'markers have no angles', 'time': 'TRC files have seconds'})
 
 
-#: The path of a state: '/jointset/hip_r/hip_flexion_r/value'.
+#: STATE: path of a state: '/jointset/hip_r/hip_flexion_r/value'.
 STATE = re.compile(r'^(?:.*/)?([^/]+)/(value|speed|activation|fiber_length)$')
-#: Names of translations and of forces, which have the columns of angles elsewhere.
+#: NO_ANGLE: names of translations and forces, whose columns look like those of angles.
 NO_ANGLE = re.compile(r'_t[xyz]$|^ground_(force|torque|moment)|_(force|moment|torque)$'
                       r'|_[fmp][xyz]$|force_v?[xyz]|force_p[xyz]', re.I)
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Markers out of what pose estimation writes: DeepLabCut, SLEAP, Anipose.
+"""Markers from files of pose estimation: DeepLabCut, SLEAP, Anipose.
 
 DeepLabCut (and Lightning Pose): tables with three or four rows of headers, scorer, individuals,
 bodyparts, coords (Nath et al. 2019), and the same by pandas in HDF5. SLEAP's analysis: tables with
@@ -51,11 +51,11 @@ from cpg_ros.fitting.recordings.tables import (
 import numpy as np
 
 INDIVIDUAL = Option('individual', 'of a table of several animals, the one to read', 'NAME')
-#: A column of one row of headers: marker, coordinate.
+#: COLUMN: header of a table with one row of headers: marker, coordinate.
 COLUMN = re.compile(r'(.+)[._](x|y|z|score|likelihood)')
-#: Columns of frames and of animals there.
+#: FRAMES: columns of frame numbers in these tables; TRACK: column of animals.
 FRAMES, TRACK = ('frame_idx', 'fnum'), 'track'
-#: First cells of DeepLabCut's rows of headers.
+#: ROWS: first cells of DeepLabCut's rows of headers.
 ROWS = ('scorer', 'individuals', 'bodyparts', 'coords')
 
 

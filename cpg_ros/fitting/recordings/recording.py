@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles over time, from whatever source, and what had to be repaired in them.
+"""Recordings: joint angles and foot loads over time, their repair, single strides, and formats.
 
 Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
 """
@@ -56,17 +56,18 @@ class FootLoads(ShortRepr):
         return f'{len(self.times)} loads on {", ".join(self.legs)}'
 
 
-#: What a file may call the unit of an angle -> that in rad.
+#: ANGLES: name of a unit of angles in a file -> that unit in rad.
 ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
           'deg': math.pi / 180.0, 'degree': math.pi / 180.0, 'degrees': math.pi / 180.0,
           '°': math.pi / 180.0}
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
 
-#: An interval longer than so many usual ones is a dropout, and one that is off by such a share
-#: of the usual one is jitter.
+#: DROPOUT: interval between samples, as a multiple of the usual one, above which samples are
+#: missing;
+#: JITTER: relative difference from the usual interval above which it is jitter.
 DROPOUT, JITTER = 1.5, 0.1
-#: Stamps lie within +- this (s): what ROS can stamp, and what keeps differences in int64.
+#: LATEST: largest size of a stamp, s: the range of ROS, which keeps differences within int64.
 LATEST = 2**32
 
 
@@ -149,7 +150,7 @@ class Recording(ShortRepr):
 
 
 def refuse_stand_in(path: Path, head: bytes) -> None:
-    """Reject what only stands for a recording, or is one of another system.
+    """Reject files that only point to a recording, or are recordings of another system.
 
     Args:
         path: of the file.
@@ -416,7 +417,7 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
     return notes
 
 
-#: Positions without names, by their place in the message: 'position[3]'.
+#: UNNAMED: name of a position by its index in the message: 'position[3]'.
 UNNAMED = re.compile(r'^(?:.*[./])?positions?\[(\d+)\]$')
 
 
@@ -437,13 +438,14 @@ def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recordi
 
 # Recordings of exactly one stride, as gait laboratories cut them.
 
-#: Copies that a stride is repeated to.
+#: COPIES: number of copies of a single stride that are analysed.
 COPIES = 6
-#: Largest gap between the end of a stride and its begin, over the range of the joint: as declared,
-#: and as recognised.
+#: Largest gap between end and begin of a stride, over the joint's range. GAP_DECLARED: of a
+#: declared stride; GAP_RECOGNISED: of a recognised one.
 GAP_DECLARED, GAP_RECOGNISED = 0.3, 0.1
-#: Durations of strides that are recognised, s; least speed at their seam, over the mean one, as a
-#: motion from rest to rest closes, too; least share of odd harmonics, as two strides have none.
+#: Recognised strides. DURATIONS: shortest and longest, s; SEAM_SPEED: least speed at the seam,
+#: over the mean one, as a motion from rest to rest closes, too; ODD_SHARE: least share of odd
+#: harmonics in the power, as two strides have none.
 DURATIONS, SEAM_SPEED, ODD_SHARE = (0.1, 3.0), 0.3, 0.2
 
 
@@ -537,7 +539,7 @@ class Option:
     several: bool = False
 
 
-#: Every format has joints, so that every reader takes this.
+#: JOINTS: option of every reader.
 JOINTS = Option('joints', "joints to use (default: the robot's, or all); for files other than "
                 "bags also patterns such as 'JointPos*'", 'NAME', several=True)
 UNIT = Option('unit', 'unit of the angles (default: as the file says, or rad)',

@@ -14,7 +14,7 @@
 
 """Bags through ROS's own ``rosbag2_py``, where the library `rosbags` is not installed.
 
-What is offered is what `rosbags_library` offers, so that nothing else knows which one reads.
+It has the same interface as `rosbags_library`, so that callers need not know which one reads.
 """
 
 from collections.abc import Iterator, Sequence

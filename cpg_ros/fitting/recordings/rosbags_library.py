@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is used of the library `rosbags`, which unpacks no more than recordings have."""
+"""Interface to the library `rosbags`, with limits on the size of unpacked data."""
 
 import os
 from pathlib import Path
@@ -27,9 +27,9 @@ from rosbags.typesys import get_typestore, Stores
 
 __all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize', 'unpack_file']
 
-#: The layout of a JointState is the same in all ROS 2 distributions.
+#: STORE: message types; the layout of a JointState is the same in all ROS 2 distributions.
 STORE = get_typestore(Stores.ROS2_JAZZY)
-#: What the library unpacks with, which sets no limit.
+#: ZSTD: the module with which the library unpacks, which sets no limit.
 ZSTD: Any = vars(reader)['zstd']
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The text of tables as programs write it: packed, cut, with a preamble; and rows of numbers."""
+"""Text tables: rows of numbers, limits of unpacked size, stamps of frames, preambles."""
 
 import codecs
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ import numpy as np
 
 # Rows of numbers out of lines of text, with every mistake named by its line.
 
-#: A contact may be written as a word.
+#: TRUTH: word for a contact -> its number.
 TRUTH = {'true': 1.0, 'false': 0.0}
 
 
@@ -122,9 +122,9 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
     return np.array(rows).reshape(-1, width), list(notes)
 
 
-# How large what is unpacked may become: a small file may hold zeros without end.
+# Limits of unpacked data: a small file may hold endless zeros.
 
-#: What a file may always unpack to, bytes; a larger one to so many times its own size.
+#: A file may unpack to ALWAYS bytes, or to RATIO times its packed size if that is more.
 ALWAYS, RATIO = 20_000_000, 100
 
 
@@ -151,7 +151,7 @@ class UnpackedSize:
 # Stamps of frames that have numbers but no times.
 
 FPS = Option('fps', 'frames a second, for files that do not say', 'HZ')
-#: Slowest and fastest that is believed, Hz.
+#: SLOWEST, FASTEST: plausible range of a frame rate, Hz.
 SLOWEST, FASTEST = 1e-2, 1e6
 
 
@@ -185,17 +185,17 @@ def stamps_of_frames(frames: np.ndarray, fps: str | float | None, path: Path) ->
     return np.rint(seconds * 1e9).astype(np.int64)
 
 
-#: Largest file, bytes, packed or not, and longest line, letters.
+#: LARGEST: largest file, bytes, packed or not; LONGEST: longest line, letters.
 LARGEST, LONGEST = 4_000_000_000, 1 << 17
-#: Most lines of a file that is kept as text while it is read: six hours at 100 Hz.
+#: MOST_LINES: most lines of a file that is in memory as text: six hours at 100 Hz.
 MOST_LINES = 2_000_000
-#: What a file packed by gzip begins with.
+#: GZIP: first bytes of a file packed by gzip.
 GZIP = b'\x1f\x8b'
-#: What a file in UTF-16 begins with, as some spreadsheets write it.
+#: UTF_16: first bytes of a file in UTF-16, as some spreadsheets write it.
 UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
-#: What may end a line, such as the delimiters that spreadsheets fill it up with.
+#: EMPTY: characters that are stripped at the end of a line, such as delimiters of empty cells.
 EMPTY = ',;\t \r\n'
-#: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
+#: END: last line of the preamble of OpenSim's .mot and .sto files; PREAMBLE: most lines of it.
 END, PREAMBLE = 'endheader', 100
 class _Lines(io.TextIOWrapper):
     """Text whose lines have a largest length: what has none is no table, and fills the memory.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Long recordings on a coarser even grid, smoothed as they are read, so that they fit in memory.
+"""Thinning of long recordings to an even grid so that they fit in memory, without wild samples.
 
 A point of the grid has the mean of the samples nearest to it, corrected for their slope, as they
 are not centred on it. Grids are multiples of a step since the epoch, so that topics recorded side
@@ -26,13 +26,14 @@ import numpy as np
 
 # Implausible samples: stamps far from all others, angles that no joint can have.
 
-#: A position beyond this is of no joint (rad).
+#: FARTHEST: largest position of a joint, rad.
 FARTHEST = 1e6
-#: A position so many times as far from the median as most of them spread, the spread taken as 1
-#: rad at least, is of no joint, either, where no more than one or this share of them is.
+#: SPIKE_RATIO: distance from the median, over the spread of the positions, at least 1 rad, above
+#: which a position is implausible; RARE: largest share of such positions with which they are
+#: dropped.
 SPIKE_RATIO, RARE = 100.0, 0.01
-#: A gap of so many times what all samples take, and of this much (ns), has recordings on either
-#: side that do not belong together, or stamps that went wrong.
+#: A gap of more than ASTRAY times the duration of all samples, and of more than GAP, ns, separates
+#: recordings that do not belong together, or stamps that are wrong.
 ASTRAY, GAP = 10.0, 60_000_000_000
 #: Stamps, the columns that they are of, and positions, shape (n, columns).
 Part = tuple[np.ndarray, list[int], np.ndarray]
@@ -91,18 +92,21 @@ def _far(column: np.ndarray) -> np.ndarray:
     return far
 
 
-#: Samples from which on a recording is long, of all joints in one message or row.
+#: LONG: number of samples (messages or rows) from which on a recording is long.
 LONG = 1 << 17
-#: Steps of the grid (ns), the coarsest first, and how many of them a usual interval is at most.
+#: STEPS: steps of the grid that are tried, ns, the coarsest first; SHARE: longest usual interval
+#: of the samples, in steps.
 STEPS, SHARE = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
-#: Grid points that the strongest motion has a period, and the slowest that counts as one (Hz).
+#: A_PERIOD: fewest grid points of a period of the strongest motion; SLOWEST: least frequency that
+#: counts as motion, Hz.
 A_PERIOD, SLOWEST = 40.0, 0.2
-#: Samples of a part of which a spectrum is made.
+#: PART: samples of a part whose spectrum is computed.
 PART = 1 << 14
-#: Samples whose mean time is farther off their point have the mean at that time (steps).
+#: ABOUT: distance of the samples' mean time from their grid point, steps, up to which it is
+#: ignored; beyond it the mean counts at that time.
 ABOUT = 0.3
-#: A sample is no motion that is off both neighbours by this many standard deviations, and times
-#: as much as they differ.
+#: SPIKE: a sample is a spike if it is off both neighbours by this many standard deviations, and by
+#: this multiple of their difference.
 SPIKE = 3.0
 
 
@@ -203,7 +207,7 @@ def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
 
 
 def _without_odd(values: np.ndarray) -> np.ndarray:
-    """Return values without what no joint does: what is no angle, and single spikes."""
+    """Return values without single spikes and without values that are not angles."""
     values = np.where(np.abs(values) <= FARTHEST, values, np.nan)
     before, here, after = values[:-2], values[1:-1], values[2:]
     off = np.abs(here - 0.5 * (before + after))

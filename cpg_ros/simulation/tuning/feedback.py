@@ -42,16 +42,18 @@ from cpg_ros.simulation.tuning.gaits import (
 import numpy as np
 from scipy.stats import binomtest
 
-# Whether feedback helps a robot in simulation: pushes survived with it and without it.
+# Benefit of feedback for a robot in simulation: pushes survived with it and without it.
 
-#: Impulses of pushes, as shares of m sqrt(g l) with the legs' length l.
+#: BENEFIT_IMPULSES: impulses of pushes, as shares of m sqrt(g l) with the legs' length l.
 BENEFIT_IMPULSES = (0.2, 0.4, 0.6)
-#: Pushes of each impulse, undisturbed runs, and how long these are and a push is watched, s.
+#: BENEFIT_PUSHES: number of pushes of each impulse; UNDISTURBED: number of undisturbed runs;
+#: WALKED: duration of these, s; PUSHED: earliest time of a push, s; WATCHED: time observed after,
+#: s.
 BENEFIT_PUSHES, UNDISTURBED, WALKED = 8, 4, 5.0
 PUSHED, WATCHED = 1.6, 3.4
-#: Froude number, v / sqrt(g l), of the speed that is asked for, and share of the fastest speed.
+#: FROUDE: v / sqrt(g l) of the commanded speed; SHARE: its largest share of the fastest speed.
 FROUDE, SHARE = 0.2, 0.8
-#: Delays of the sensors, s, by turns from run to run, and what else is wrong with them.
+#: DELAYS: of the sensors, s, by turns from run to run; SENSORS: their other errors.
 DELAYS = (0.01, 0.02)
 SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
                       gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,

@@ -32,8 +32,9 @@ import numpy as np
 
 # Steering tables: measured speed and yaw rate of a tuned gait by the length of its strides.
 
-#: STRIDES: strides that are tried; then by how much the legs move slower at a stride of 0, how
-#: much faster at a stride of 1, and the share of the joints' speed limits that this may use.
+#: STRIDES: strides that are tried; SLOWER: by how much the legs move slower at a stride of 0;
+#: FASTER: factors of the frequency that are tried at a stride of 1; ROOM: least distance from the
+#: joints' speed limits, as a share, with which they are.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 SLOWER = 0.2
 FASTER, ROOM = (1.1, 1.2, 1.3, 1.4), 0.05
