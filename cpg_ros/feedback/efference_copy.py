@@ -65,7 +65,7 @@ def between_speeds(speeds, speed):
     return low, high, min(max((speed - speeds[low]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
 
 
-#: Bins of a stride, number of signals, and most speeds of a table; see ``body_keys``.
+#: BINS: bins of a stride; SIGNALS: number of signals; SPEEDS: most speeds of a table.
 BINS, SIGNALS, SPEEDS = body_file.BINS, len(body_file.SIGNALS), body_file.SPEEDS
 
 
@@ -84,14 +84,14 @@ class EfferenceCopy:
 
     @classmethod
     def blank(cls) -> 'EfferenceCopy':
-        """Nothing expected but the wanted speed."""
+        """Return a copy that expects nothing but the wanted speed."""
         table = np.zeros((2, BINS, SIGNALS))
         table[:, :, 0] = [[-10.0], [10.0]]
         return cls(np.array([-10.0, 10.0]), table)
 
     @classmethod
     def of(cls, table: EfferenceTable) -> 'EfferenceCopy':
-        """Take a robot file's table."""
+        """Return the copy that a robot file's table states."""
         return cls(np.array(table.speeds),
                    np.stack([table.rows[key] for key in body_file.SIGNALS], axis=-1))
 
@@ -104,7 +104,7 @@ class EfferenceCopy:
 
 @jit
 def expect(speeds, table, phase, speed, fraction, out):
-    """Add a share of what is expected to out, shape (SIGNALS,); see EfferenceCopy."""
+    """Add a share of the expected signals to out, shape (SIGNALS,); see EfferenceCopy."""
     low, high, up = between_speeds(speeds, speed)
     # A bin's mean stands for its middle.
     one, two, on = between_phases((phase * BINS - 0.5) % BINS, BINS)

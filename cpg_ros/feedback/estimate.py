@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensor data, and the state estimated from it: contacts and velocity over ground."""
+"""Estimates from sensor data: loads on the feet, contacts, velocity over ground and odometry."""
 
 from collections.abc import Callable
 import math
@@ -33,7 +33,7 @@ import numpy as np
 
 # Foot forces from joint torques, for feet without sensors.
 
-#: Least determinant, m^3: in a leg below it, torques do not determine the force.
+#: SINGULAR: determinant of a leg's Jacobian, m^3, below which torques do not determine the force.
 SINGULAR = 1e-6
 
 
@@ -80,14 +80,15 @@ def loads_of(rows, columns, angles, efforts, roll, pitch, out):
         out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
 
 
-#: A foot counts as on the ground above this share of the weight, until below the other.
+#: TOUCH: share of the weight above which a foot is on the ground; LEAVE: share below which it is
+#: in the air again.
 TOUCH, LEAVE = 0.10, 0.04
-#: Stance legs pull the velocity to theirs with this time constant, s, when they bear the weight.
+#: PULL: time constant, s, with which a leg that bears the whole weight corrects the velocity.
 PULL = 0.02
-#: Legs whose velocity is this far from the one expected, m/s, count half: they slip.
+#: SLIP: difference of a leg's velocity from the estimate, m/s, at which it counts half: it slips.
 SLIP = 0.25
-#: Where the legs on the ground have disagreed for longer than this, s, the estimate is wrong, not
-#: the legs: from then on SLIP grows by its own size in each time of the second, s.
+#: DISAGREE: time, s, after which legs that contradict the estimate are believed, not the estimate.
+#: WIDENS: time, s, in which the tolerance SLIP then grows by its own size.
 DISAGREE, WIDENS = 0.2, 0.05
 
 
@@ -153,8 +154,8 @@ def velocity_by_leg(leg, joints, rates, slopes, turning, up, radius, out):
 def update(legs, sensors, run, dt, velocity, contact, doubt, leg_velocities, scratch):
     """Update the estimate of one run: velocity (3,) and contact (legs,), in place.
 
-    Of doubt, shape (runs,), that of the run is how long the legs have disagreed, s. Scratch are
-    leg_velocities, shape (legs, 4), each leg's estimate and its weight, and scratch, shape (4, 3).
+    doubt[run] is how long the legs have disagreed with the estimate, s. leg_velocities, shape
+    (legs, 4), are filled with each leg's estimate and its weight; scratch has the shape (4, 3).
     """
     rows, columns = legs.rows, legs.columns
     angles, rates = sensors.joint_positions[run], sensors.joint_velocities[run]
@@ -227,28 +228,28 @@ class BodyState:
                     self._doubt, *self.scratch)
 
 
-# Leg odometry: where the base is, from the estimated velocity, and how uncertain that is.
+# Leg odometry: the base's pose, from the estimated velocity, and its covariance.
 
-#: Standard deviation of the slow velocity error: at rest, m/s, and as a share of the speed; its
-#: correlation time, s. Of a simulated Go2 that trots, walks, turns and is pushed.
+# All but STATES are standard deviations or intensities of noise.
+#: Slow velocity error, measured on a simulated Go2 that trots, walks, turns and is pushed.
+#: STILL: its size at rest, m/s; SHARE: as a share of the speed; SLOWLY: correlation time, s.
 STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
-#: Standard deviation of the constant share by which the velocity is wrong of a robot whose way was
-#: never measured.
+#: SCALE: constant relative error of the velocity of a robot whose odometry was not calibrated.
 SCALE = 0.05
-#: White noise of the position, m/sqrt(s), and of the heading, rad/sqrt(s): an IMU drifts by half a
-#: degree in a minute.
+#: White noise. PLACE: of the position, m/sqrt(s); HEADING: of the heading, rad/sqrt(s), at which
+#: an IMU drifts by half a degree in a minute.
 PLACE, HEADING = 0.001, 0.001
-#: Feet stand on ground that is level within this share of the way, one standard deviation.
+#: LEVEL: slope of the ground, as a share of the distance covered.
 LEVEL = 0.05
-#: Standard deviation of the height above level ground, m.
+#: HEIGHT: height above level ground, m.
 HEIGHT = 0.01
-#: Standard deviation of the velocity forward, to the left and up at an instant, m/s.
+#: INSTANT: velocity at an instant forward, to the left and up, m/s.
 INSTANT = 0.02, 0.02, 0.03
-#: Standard deviation of roll and pitch as IMUs measure them, rad, and of their rates, rad/s.
+#: TILT: roll and pitch as an IMU measures them, rad; RATE: their rates, rad/s.
 TILT, RATE = 0.01, 0.02
-#: Standard deviation of a velocity that is not measured, m/s, beside the last measured speed.
+#: UNSEEN: velocity that is not measured, m/s, in addition to the last measured speed.
 UNSEEN = 0.5
-#: Components of the state: x, y, heading, slow error forward and to the left, constant share.
+#: STATES: number of states: x, y, heading, slow error forward and to the left, relative error.
 STATES = 6
 
 
@@ -294,7 +295,7 @@ def _advance(legs, joints, contact, motion, pose, covariance, scratch):
 
 
 class Odometry:
-    """Where the base of one robot is, from where it was first.
+    """Pose of one robot's base relative to its first pose, and the covariance of that.
 
     The x axis of its frame is the base's heading at the start. Height is that above the feet which
     stand: going up a slope is not seen.
@@ -376,7 +377,7 @@ class Odometry:
         fill_quaternion(self._tilt[0], self._tilt[1], self.pose[3], out)
 
     def pose_covariance(self, out: np.ndarray) -> np.ndarray:
-        """Fill that of x, y, z, roll, pitch and yaw in m and rad, shape (6, 6), as ROS has it."""
+        """Fill the covariance of x, y, z, roll, pitch and yaw, m and rad, (6, 6), as in ROS."""
         out[:] = 0.0
         for row, k in enumerate((0, 1, 5)):
             for column, other in enumerate((0, 1, 5)):

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gains of a robot of another size than the Go2 for which the usual ones were found.
+"""The feedback laws of quadrupeds: their list, gains and memory; gains for robots of any size.
 
 Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983):
 as gravity is the same, lengths go with the length l of the legs, and times with sqrt(l/g). Forces
 are shares of the weight in all laws of a quadruped, so mass does not matter there; a biped's gains
-go with it. What a gain is a multiple of follows from its unit.
+are proportional to it. The unit of a gain determines how it scales. The usual gains were found on
+a Unitree Go2.
 """
 
 from collections.abc import Sequence
@@ -49,11 +50,11 @@ import numpy as np
 
 # The list of the feedback laws, and the switches and gains of all of them.
 
-#: In the order in which parameters and the reference list them.
+#: All laws, in the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [module.LAW for module in (
     posture, placement, pace, stiffen, virtual_stiffness, reflexes, clearance, slope, heading,
     speed, sidestep, touchdown, tegotae)]
-#: Gains of no single law.
+#: Gains that all laws share.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}
 #: All gains, by name.
@@ -81,9 +82,9 @@ class Gains(_Fields):  # type: ignore[misc]
                                  f'{gain.high:g}' + (f' {gain.unit}' if gain.unit else ''))
 
 
-# What the feedback keeps from tick to tick: the estimate, the laws' state, its output.
+# Memory of the feedback from tick to tick: the estimate, the laws' state, its output.
 
-#: State that is no single law's.
+#: State that all laws share.
 COMMON_MEMORY = {
     'velocity': StateVariable('of the base in its own frame [m/s]', (3,)),
     'contact': StateVariable('whether each foot is on the ground', ('legs',), False),
@@ -97,7 +98,7 @@ COMMON_MEMORY = {
                                      'second row its rate [m/s^2]', (2, 2))}
 VARIABLES = {name: variable for part in (COMMON_MEMORY, *(law.memory for law in LAWS))
              for name, variable in part.items()}
-#: Arrays without an axis of the runs, which pass values on within a tick.
+#: Arrays that pass values on within a tick; they have no axis for the runs.
 SCRATCH = {
     'previous_contact': StateVariable('contact before this tick', ('legs',), False),
     'leg_velocities': StateVariable("see estimate.update; then the planned feet's places [m]",
@@ -123,12 +124,14 @@ class Memory(_MemoryFields):  # type: ignore[misc]
                    *(array(one) for one in SCRATCH.values()))
 
 
-#: Of the Go2's outstretched legs, from the thigh joints to the feet, m.
+# Gains of a robot of another size than the Go2.
+
+#: LENGTH: length of the Go2's outstretched legs, from the thigh joints to the feet, m.
 LENGTH = 0.426
-#: Powers of the legs' length, of sqrt(l/g) and of the mass that each unit is.
+#: POWERS: unit -> exponents of the legs' length l, of the time sqrt(l/g) and of the mass.
 POWERS = {'m': (1, 0, 0), 's': (0, 1, 0), 's^2': (0, 2, 0), 'Hz': (0, -1, 0), 'kg': (0, 0, 1),
           'N': (1, -2, 1), 'rad': (0, 0, 0), '1': (0, 0, 0), '': (0, 0, 0)}
-#: Scaled gains have so many digits.
+#: DIGITS: significant digits of scaled gains.
 DIGITS = 3
 
 
@@ -154,7 +157,7 @@ def _powers(unit: str) -> tuple[int, ...]:
 
 
 def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
-    """Return how much 1 of a dimensionless gain is in its unit, as sqrt(g l) for 'm/s'.
+    """Return the value of a dimensionless gain of 1 in its unit, such as sqrt(g l) for 'm/s'.
 
     Args:
         unit: of the gain.

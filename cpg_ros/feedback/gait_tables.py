@@ -26,9 +26,10 @@ import numpy as np
 
 # When each leg of a gait swings, and how far it has got, by the stride phase of the first leg.
 
-#: Points of a stride.
+#: POINTS: number of phases of a stride in the tables.
 POINTS = 512
-#: Legs of a pair swing together if they differ for less than this share of the stride.
+#: TOGETHER: legs of a pair swing together if one alone swings for less than this share of a
+#: stride.
 TOGETHER = 0.2
 
 
@@ -45,7 +46,7 @@ class Timetable:
     """
 
     def __init__(self, plan: GaitPlan, geometry: Geometry) -> None:
-        """Look at a gait: a leg swings while its foot goes forward, seen from the body."""
+        """Tabulate a gait: a leg swings while its foot goes forward relative to the body."""
         robot, theta = plan.robot, np.arange(POINTS) / POINTS
         phases = theta[:, None] - plan.readout.start + plan.orbit.phases[robot.cells]
         self.angles, self.in_place = (
@@ -82,7 +83,7 @@ def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))
 
 
-#: Gaits known at the same time, and most rows of a steering table.
+#: SLOTS: most gaits known at the same time; ROWS: most rows of a steering table.
 SLOTS, ROWS = 8, 32
 
 
@@ -119,7 +120,7 @@ class GaitTables(NamedTuple):
 
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
-        """Nothing known of any gait."""
+        """Return tables in which all slots are empty."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
                    np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
@@ -128,7 +129,7 @@ class GaitTables(NamedTuple):
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
-        """Take in a gait.
+        """Fill the slot of a gait.
 
         Raises:
             InputError: its tables have more rows than there is room for.

@@ -26,16 +26,18 @@ from cpg_ros.motion.strides import smoothstep
 
 # Monitoring of the feedback's inputs: whether each is valid, or since when it is not.
 
-#: An input is out after this time without a valid message, s.
+#: STALE: time without a valid message, s, after which an input is out.
 STALE = 0.05
-#: A stamp that is older, or further ahead, than this, s.
+#: DELAYED: largest difference of a message's stamp from the clock, s, in either direction.
 DELAYED = 0.1
-#: Largest age of measurements, low-passed, when they are used, s: that of a quadruped's gaits, and
-#: of a balanced walk, each below the delay at which it falls in simulation.
+#: Largest low-passed age of measurements when they are used, s, below the delay at which the robot
+#: falls in simulation. LATE: in the gaits of a quadruped; LATE_BALANCE: in a balanced walk.
 LATE, LATE_BALANCE = 0.03, 0.012
-#: Time constant of that low-pass, s; an input that is late counts as good again below this share.
+#: AGE_MEMORY: time constant of the low-pass of the age, s; IN_TIME: share of the largest age below
+#: which a late input counts as good again.
 AGE_MEMORY, IN_TIME = 0.1, 0.9
-#: From full feedback to none, and from none to full once all inputs have been good for a while, s.
+#: FADE: duration of the transition from full feedback to none and back, s; GOOD: time for which
+#: all inputs have to be good before feedback returns, s.
 FADE, GOOD = 0.15, 0.3
 
 
@@ -104,7 +106,7 @@ class InputMonitor:
             self._measured = -math.inf if stamp is None else stamp
 
     def _is_late(self, now: float) -> bool:
-        """Update the age of what is used now, s; tell whether it is too large."""
+        """Update the low-passed age of the measurements, s; tell whether it is too large."""
         if self._measured == -math.inf:
             return False
         age = max(now - self._measured, 0.0)
@@ -151,7 +153,7 @@ class Fade:
         return smoothstep(self._way)
 
 
-#: What is wrong with a message, by the number that the checks return.
+#: VERDICTS: faults of a message, by the number that the checks return; 0 is none.
 VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
             'no orientation (its covariance begins with -1)', 'an impossible angular velocity',
             'an impossible acceleration',
@@ -160,30 +162,34 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
             'impossible loads on the feet',
             'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
             'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed')
-#: Length of an orientation, from 1; rad/s; m/s^2 within TELLING, in s.
+#: UNIT: largest difference of a quaternion's length from 1; FASTEST: largest angular velocity,
+#: rad/s; HARDEST: largest acceleration, m/s^2, and TELLING: time constant of its low-pass, s.
 UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
-#: How far orientation and the sum of angular velocities may part, rad, within a time in s, and
-#: the longest gap between messages over which they are compared, s; and how far they part from one
-#: message to the next where the base has been put elsewhere, rad.
+#: APART: largest difference between the vertical and the integrated angular velocity, rad;
+#: FORGET: time constant of the integral, s; GAP: longest time between messages, s, over which they
+#: are compared; LEAP: difference in one message, rad, from which on the base was put elsewhere.
 APART, FORGET, GAP, LEAP = 0.15, 0.2, 0.05, 0.3
-#: Orientation and angular velocity contradict each other where this share of their motion differs,
-#: until it is below the second one, averaged over a time in s, and where they move, rad.
+#: DIFFERS: mean square of that difference, as a share of the motion's, above which orientation and
+#: angular velocity contradict each other; AGREE: share below which they agree again; COMPARED:
+#: time constant of the mean, s; MOVES: RMS motion, rad, above which they are compared.
 DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
-#: Mean acceleration may be off gravity by so much while the robot stands and while it walks, and
-#: counts as right again below the last, m/s^2.
+#: Distance of the mean acceleration from gravity, m/s^2. STANDING_OFF, WALKING_OFF: largest one
+#: while the robot stands and walks; RIGHT: below it, the acceleration is right again.
 STANDING_OFF, WALKING_OFF, RIGHT = 2.5, 6.0, 2.0
-#: Times over which it is averaged while the robot stands and walks, and from which on it is
-#: judged, s.
+#: STANDING_MEAN, WALKING_MEAN: time constant of that mean, s, while the robot stands and walks;
+#: JUDGED: time after the first message, s, from which on it is judged.
 STANDING_MEAN, WALKING_MEAN, JUDGED = 0.3, 1.0, 0.25
-#: Joints beyond their limits, rad, and by how much they outrun their largest speeds.
+#: BEYOND: how far a joint may be beyond its limits, rad; OUTRUN: largest speed of a joint, as a
+#: multiple of its speed limit.
 BEYOND, OUTRUN = 0.3, 3.0
-#: Loads of all feet within TELLING, and drawn by one, in weights.
+#: HEAVIEST: largest load of all feet, low-passed with TELLING, as a multiple of the weight; DRAWN:
+#: least load of one foot, likewise.
 HEAVIEST, DRAWN = 4.0, -0.5
-#: Numbers of a sensor_msgs/Imu, and of the memory of its check: acceleration (3), vertical (3),
-#: its recent change as the orientation (3) and as the angular velocity (3) have it, mean squares
-#: of their difference and of both, what the mean acceleration is off gravity (3), time so far,
-#: whether that is too far, whether orientation and angular velocity contradict each other, and the
-#: time since the vertical last changed.
+#: IMU: number of values of a sensor_msgs/Imu. IMU_MEMORY: values of the memory of its check, with
+#: their indices: 0-2 acceleration, 3-5 vertical, 6-8 its recent change by the orientation and 9-11
+#: by the angular velocity, 12 mean square of their difference and 13 of both, 14-16 mean
+#: acceleration less gravity, 17 time so far, 18 whether that mean is too large, 19 whether
+#: orientation and angular velocity contradict each other, 20 time since the vertical last changed.
 IMU, IMU_MEMORY = 37, 21
 
 
@@ -197,7 +203,7 @@ def turned_by(mount, x, y, z):
 
 @jit
 def _contradicts(up, turning, memory):
-    """Tell whether the vertical, in the base's frame, moves otherwise than it turns, rad/s."""
+    """Tell whether the change of the vertical contradicts the angular velocity, base's frame."""
     if up[0] == memory[3] and up[1] == memory[4] and up[2] == memory[5]:
         # A driver may repeat an orientation, or its last message.
         return memory[19] > 0.0
@@ -250,7 +256,7 @@ def _is_off_gravity(up, acceleration, moving, dt, memory):
 
 @jit_entry
 def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
-    """Fill the last three if the message is plausible; return an index into VERDICTS, 0 for good.
+    """Fill the last three arguments if the message is plausible; return an index into VERDICTS.
 
     Args:
         values: the numbers of a sensor_msgs/Imu in its order, shape (IMU,).
@@ -302,7 +308,7 @@ def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
 
 @jit_entry
 def judge_joints(positions, velocities, places, lower, upper, fastest, angles, rates):
-    """Fill angles and rates if plausible; return an index into VERDICTS, 0 for good.
+    """Fill angles and rates if they are plausible; return an index into VERDICTS.
 
     Args:
         positions: of a message, in its own order, rad.
@@ -330,7 +336,7 @@ def judge_joints(positions, velocities, places, lower, upper, fastest, angles, r
 
 @jit_entry
 def judge_loads(loads, places, weight, dt, memory, forces):
-    """Fill forces if plausible; return an index into VERDICTS, 0 for good.
+    """Fill forces if they are plausible; return an index into VERDICTS.
 
     Args:
         loads: of the feet, N, in any order.
@@ -358,13 +364,13 @@ def judge_loads(loads, places, weight, dt, memory, forces):
 
 @jit_entry
 def agreement(loads, least, swinging, fraction, before):
-    """Return how well contacts go with a gait, 0 to 1, low-passed.
+    """Return the low-passed share of legs, 0 to 1, whose contacts agree with the gait.
 
     Args:
         loads: of the feet, N, shape (legs,).
         least: load of a foot that stands, N.
         swinging: whether each leg is meant to, shape (legs,).
-        fraction: of the new in the mean.
+        fraction: weight of the new value in the mean.
         before: the mean so far.
 
     """

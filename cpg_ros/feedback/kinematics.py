@@ -30,7 +30,7 @@ from cpg_ros.motion.body_file import BodyGeometry
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: Of free fall, m/s^2.
+#: GRAVITY: acceleration of free fall, m/s^2.
 GRAVITY = 9.81
 
 
@@ -91,12 +91,12 @@ class Geometry:
 
     @cached_property
     def arrays(self) -> LegArrays:
-        """What the kernels need of it."""
+        """The geometry as arrays, for the kernels."""
         return LegArrays(self.rows, self.columns, self.radius, self.weight)
 
 
 def bend_of(upper: complex, lower: complex, second: float) -> float:
-    """Return to which side the second of two links is bent at an angle, rad: 1 or -1."""
+    """Return the side to which the second of two links is bent at an angle in rad: 1 or -1."""
     return 1.0 if np.sin(second + np.angle(lower / upper)) >= 0.0 else -1.0
 
 
@@ -161,7 +161,7 @@ def to_leg(leg, x, y, z):
 
 @jit
 def foot_of(leg, hip, thigh, calf):
-    """Return where a leg's foot is, x, y and z in m; joints in rad."""
+    """Return a foot's place in the leg's frame, x, y and z in m; joints in rad."""
     hip, thigh, calf = leg[0] * hip, leg[1] * thigh, leg[1] * thigh + leg[2] * calf
     ct, st, cc, sc = math.cos(thigh), math.sin(thigh), math.cos(calf), math.sin(calf)
     y, z = leg[7], leg[8] + leg[9] * ct - leg[10] * st + leg[11] * cc - leg[12] * sc
@@ -232,10 +232,10 @@ def joints_of(leg, x, y, z):
 
 @jit
 def move_foot(leg, columns, angles, foot, way):
-    """Move a foot at a place by a way, m, shapes (3,): changes its leg's of all angles, rad.
+    """Change the angles of a leg, rad, so that its foot moves by a displacement, m, shape (3,).
 
-    No way changes no bit of them, nor does any of a leg whose geometry is not known; limits are
-    the caller's business.
+    A displacement of 0, and a leg of unknown geometry, leave the angles exactly as they are. The
+    limits of the joints are up to the caller.
     """
     if leg[1] == 0.0 or (way[0] == 0.0 and way[1] == 0.0 and way[2] == 0.0):
         return
@@ -256,7 +256,7 @@ def _feet(rows, columns, angles, out):
 
 
 def forward(geometry: Geometry, angles: np.ndarray) -> np.ndarray:
-    """Return where the feet are, m, shape (..., legs, 3); angles in rad, shape (..., joints)."""
+    """Return the places of the feet, m, shape (..., legs, 3), for angles in rad, (..., joints)."""
     out = np.empty((*angles.shape[:-1], len(geometry.hips), 3))
     flat = np.ascontiguousarray(angles, dtype=float).reshape(-1, angles.shape[-1])
     _feet(geometry.rows, geometry.columns, flat, out.reshape(-1, *out.shape[-2:]))

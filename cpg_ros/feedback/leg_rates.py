@@ -26,24 +26,23 @@ from cpg_ros.feedback.estimate import SensorData, TOUCH, velocity_by_leg
 from cpg_ros.feedback.kinematics import foot_of, Geometry
 import numpy as np
 
-#: Ways of mounting the IMU, each with the measured x and y axis in the base's frame: as it should
-#: be, turned by quarters about z, and the same with its pitch mirrored.
+#: MOUNTS: ways of mounting the IMU, each as its x and y axis in the base's frame: as it should be,
+#: turned by quarters about z, and the same four with the pitch mirrored.
 MOUNTS = np.array([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 0.0, -1.0],
                    [0.0, -1.0, 1.0, 0.0], [1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 1.0, 0.0],
                    [-1.0, 0.0, 0.0, 1.0], [0.0, -1.0, -1.0, 0.0]])
-#: What each of MOUNTS means for a user.
+#: MOUNTED: text for the user on each of MOUNTS.
 MOUNTED = ('', 'turned by 90 degrees about z', 'turned by 180 degrees about z',
            'turned by -90 degrees about z', *['with a wrong sign of an axis'] * 4)
-#: Numbers of the memory: for each of MOUNTS the mean square of the part of the feet's relative
-#: motion that it leaves unexplained, (rad/s)^2; the time with two feet on the ground, s; the
-#: verdict.
+#: RATES_MEMORY: values of the memory: for each of MOUNTS the mean square of the feet's relative
+#: motion that it leaves unexplained, (rad/s)^2; time with two feet on the ground, s; the verdict.
 RATES_MEMORY = len(MOUNTS) + 2
-#: Time on two feet over which the squares are averaged, s, and from which on they are judged, s.
+#: MEAN: time constant of these means, s on two feet; LEAST: time from which on they are judged, s.
 MEAN, LEAST = 1.0, 0.15
-#: Feet that slip: their samples count half from this mismatch on, rad/s.
+#: SLIPS: least mismatch of all mounts, rad/s, at which a sample counts half: the feet slip.
 SLIPS = 0.2
-#: A mount is judged wrong if another one leaves less than this share unexplained, and more than
-#: this is unexplained, (rad/s)^2.
+#: The mount is wrong if it leaves more than MOVES, (rad/s)^2, unexplained, and if another mount
+#: leaves less than the share BETTER of that.
 BETTER, MOVES = 0.5, 0.0025
 
 
@@ -73,7 +72,7 @@ def _add(leg, other, turning, dt, memory):
 
 @jit_entry
 def compare_rates(legs, sensors, dt, memory, seen, scratch):
-    """Update memory with what is measured now; return an index into MOUNTED, 0 for good.
+    """Update the memory with a measurement; return an index into MOUNTED, 0 for a right mount.
 
     Args:
         legs: LegArrays of the robot.
@@ -124,7 +123,7 @@ class RatesCheck:
         self._memory[:] = 0.0
 
     def verdict(self, sensors: SensorData, dt: float) -> str:
-        """Return how the IMU is mounted wrong according to what is measured now, or ''.
+        """Return how the IMU is mounted wrong, after a further measurement; '' if it is right.
 
         Args:
             sensors: of one run.

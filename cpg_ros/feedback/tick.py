@@ -40,16 +40,16 @@ from cpg_ros.feedback.laws import (
 from cpg_ros.feedback.laws.law import low_passed
 import numpy as np
 
-#: Joints lag behind their commands, so corrections lead the pattern by this, cycles.
+#: LEAD: phase by which corrections lead the pattern, cycles, as joints lag behind their commands.
 LEAD = 0.04
-#: The wanted velocity is approached with this time constant, s.
+#: APPROACH: time constant with which the wanted velocity is approached, s.
 APPROACH = 0.2
-#: The stride frequency is never scaled to less than this.
+#: SLOWEST: least factor of the stride frequency.
 SLOWEST = 0.2
 
 
 class PlannedMotion(NamedTuple):
-    """What the pattern plans and what is commanded, of each run.
+    """Plan of the pattern and commands, for each run.
 
     Attributes:
         angles: of the joints, rad, shape (runs, joints).
@@ -72,7 +72,7 @@ class PlannedMotion(NamedTuple):
 
 
 class Deviation(NamedTuple):
-    """By how much the body's motion differs from the expected one: m/s, rad/s, rad."""
+    """Difference of the body's motion from the expected one: m/s, rad/s, rad."""
 
     vx: float
     vy: float
@@ -95,7 +95,7 @@ def _approach(target, dt, now, rate):
 
 @jit
 def _deviation(tables, memory, sensors, planned, run, level):
-    """Return what differs from the gaits' efference copies and the wanted sideways speed."""
+    """Return the deviation from the gaits' efference copies and the wanted sideways speed."""
     old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
     phase, forward = planned.phase[run], memory.wanted_velocity[run, 0, 0]
     expected, turning, rpy = memory.expected, sensors.angular_velocity[run], sensors.rpy[run]
@@ -114,7 +114,7 @@ def _deviation(tables, memory, sensors, planned, run, level):
 
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
-    """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
+    """Fill the changes of the strides; missing speed in m/s, headings in rad."""
     stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:

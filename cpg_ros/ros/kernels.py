@@ -76,7 +76,8 @@ class StartProgress:
         self._node.destroy_publisher(self._publisher)
 
 
-#: How long the kernels of the feedback and those of a biped's take, on one core of 2023, s.
+#: Durations of compilation on one core of 2023, s. FEEDBACK: the kernels of the feedback; BALANCE:
+#: those of a biped's balance.
 FEEDBACK, BALANCE = 25.0, 15.0
 #: How often it is seen whether a compiling process has ended, s.
 LOOK = 0.05

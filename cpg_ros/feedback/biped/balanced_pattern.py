@@ -31,29 +31,34 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
 
-#: A base that leans more than this, rad, or a centre of mass lower than this share of its height
-#: has fallen.
+#: LEANS: lean of the base, rad, above which the robot has fallen; LOW: height of the centre of
+#: mass, as a share of the wanted one, below which it has fallen.
 LEANS, LOW = 1.0, 0.6
-#: It stands or crouches on its feet if the base leans less than this and no joint is further from
-#: the pose, rad, and if the feet bear this share of the weight, all for this time, s.
+#: The robot is on its feet, and balance begins, if all of these hold for a time of STEADY, s:
+#: UPRIGHT: largest lean of the base, rad, in the stand; CROUCHED: the same in the crouch;
+#: NEAR: largest distance of a joint from the pose, rad; BORNE: least share of the weight on the
+#: feet.
 UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
-#: From where joints are into the stand, and into the crouch, s.
+#: RETURN: duration of the way back into the stand, s; LOWER: duration of the way into the crouch,
+#: s.
 RETURN, LOWER = 0.3, 0.45
-#: How long it stands before it crouches, and the longest time in which it comes to a stand once
-#: an input has failed, s.
+#: SETTLED: time in the stand before it crouches, s; PATIENCE: longest time after the failure of an
+#: input in which it comes to a stand, s.
 SETTLED, PATIENCE = 0.3, 4.0
-#: Shares of a swing between which the body passes over the foot that stands: the best time to
-#: crouch without any sensor.
+#: PASSING: begin and end, as shares of a swing, of the time in which the body passes over the foot
+#: that stands: the best time to crouch without any sensor.
 PASSING = 0.38, 0.6
-#: A foot in the middle of its swing that bears so many times the other's load contradicts.
+#: CONTRARY: ratio of the swinging foot's load to the other's above which loads contradict the
+#: gait.
 CONTRARY = 4.0
-#: Inputs that failed count as valid again after this time, s.
+#: GOOD: time, s, after which an input that failed counts as valid again.
 GOOD = 0.3
-#: Joints that move further than this from tick to tick, rad and rad/s, were moved by hand.
+#: A joint was moved by hand, or its sensor failed, if it moves from one tick to the next by more
+#: than JUMP, rad, plus FASTEST, rad/s, times the time between.
 JUMP, FASTEST = 0.15, 40.0
-#: From the angles that are held to those of the feedback, s.
+#: TAKEOVER: duration of the transition from the angles that are held to those of balance, s.
 TAKEOVER = 0.1
-#: Fastest sideways, m/s, and fastest turn, rad/s.
+#: ASIDE: largest speed sideways, m/s; TURN: largest yaw rate, rad/s.
 ASIDE, TURN = 0.2, 0.5
 
 
@@ -124,7 +129,7 @@ class BalancedPattern(Pattern):
             self._follow.append(GaitRunner(plan, SHORTEST))
 
     def enable(self, enabled: bool, ramp: float) -> None:
-        """Walk, or come to a stand; what contradicted is judged anew."""
+        """Walk, or come to a stand; inputs that contradicted others are judged anew."""
         self._anew = True
         super().enable(enabled, ramp)
 
@@ -174,7 +179,7 @@ class BalancedPattern(Pattern):
         return self._lowers
 
     def release(self) -> None:
-        """Forget the balance, as where the sensors are out: the stand's angles are held."""
+        """Stop balancing, as without sensors, and hold the angles of the stand."""
         self.balancing, self._stood = False, 0.0
 
     def advance(self, dt: float) -> None:
@@ -250,7 +255,7 @@ class BalancedPattern(Pattern):
 
     def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
                   ) -> np.ndarray | None:
-        """Return where balance wants the joints, rad; None if the robot has fallen."""
+        """Return the angles that balance requests, rad, (joints,); None after a fall."""
         if self.enabled and not (self._stops or self._lowers):
             forward, left, turn = self.wish
             balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
@@ -294,7 +299,7 @@ class BalancedPattern(Pattern):
             self._run([balance.track])
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
-        """Count inputs as out that contradict the others while it balances."""
+        """Count an input as out if it contradicts the others while the robot balances."""
         memory = balance.memory
         joints = sensors.joint_positions[0]
         jumps = np.abs(joints - self._measured) > JUMP + FASTEST * (self._gap + dt)

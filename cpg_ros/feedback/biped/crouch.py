@@ -23,11 +23,11 @@ from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: Joints whose axis is this close to the lateral one, as a cosine, pitch a leg.
+#: LATERAL: least cosine between the axis of a joint that pitches a leg and the lateral axis.
 LATERAL = 0.9
-#: Bisections of the range of the hips: to 1e-6 rad.
+#: HALVINGS: bisections of the range of the hips, which give 1e-6 rad.
 HALVINGS = 22
-#: Shares of the knees' range, the most bent first, that are tried.
+#: BENT: bends of the knees that are tried, as shares of their range, the most bent first.
 BENT = np.arange(1.0, 0.4, -0.05)
 
 

@@ -31,18 +31,20 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
-#: Time in which the weight goes to the second foot before the first step, and until that, s.
+#: SHIFTING: duration of the shift of the weight to the second foot before the first step, s;
+#: FIRST_STEP: time from the begin of the shift to the first step, s.
 SHIFTING, FIRST_STEP = 0.8, 1.0
-#: With which a crouching robot stands up, m/s.
+#: RISING: speed at which a crouching robot stands up, m/s.
 RISING = 0.2
-#: At most this fast, m/s, and with this error of the capture point, m, a walk ends on two feet.
+#: A walk ends on two feet when the centre of mass is slower than twice STILL, m/s, and the error
+#: of the capture point is below CAUGHT, m.
 STILL, CAUGHT = 0.15, 0.05
-#: A run slows down to this multiple of the fastest walk before it becomes one.
+#: SLOWED: speed at which a run may become a walk, as a multiple of the fastest walk.
 SLOWED = 1.2
-#: How the legs go in the gaits that there are laws for.
+#: KINDS: gait -> how its legs go, for all gaits that the laws can balance.
 KINDS = {'walk': WALKS, 'run': RUNS, 'two_legged_hop': HOPS, 'two_legged_jump': HOPS}
 WALK_GAIT = 'walk'
-#: Phase of the first leg's flexor, cycles, with which each kind begins.
+#: STARTS: kind of gait -> phase of the first leg's flexor, cycles, at which it begins.
 STARTS = {WALKS: 0.75, RUNS: 0.0, HOPS: 0.5}
 
 
@@ -227,7 +229,7 @@ class BipedFeedback:
         return self.positions
 
     def _limit(self) -> None:
-        """Fill what is wished of the gait in force, which may be on its way to another."""
+        """Fill the velocity requested of the gait in force, which may be changing to another."""
         if self._stops:
             self.command[:] = 0.0
             return
@@ -245,12 +247,12 @@ class BipedFeedback:
 
     @property
     def _stops(self) -> bool:
-        """Whether it has to come to a stand, be it for another gait."""
+        """Whether it has to come to a stand, at a request or to change the gait."""
         wanted = KINDS[self._goal.plan.gait]
         return not self._walks or (self.changing and HOPS in (wanted, self.kind))
 
     def _choose(self, dt: float) -> None:
-        """Change mode and gait where it is time, and read the clock."""
+        """Change mode and gait when it is time, and read the clock."""
         memory = self.memory
         if self.mode == WALK:
             half = 0.5 * (1.0 - self.gains.duty)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gains of a biped's feedback, those of its laws together."""
+"""Memory, outputs and gains of a biped's feedback: the gains of all its laws, for each gait."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -31,14 +31,15 @@ from cpg_ros.feedback.laws.law import Gain, named_tuple
 from cpg_ros.motion.body_file import BipedBody
 import numpy as np
 
-# What a biped's feedback keeps from tick to tick, and what it puts out.
+# Memory and outputs of a biped's feedback.
 
-#: Modes: standing on both legs, shifting the weight to the second foot, following the clock.
+#: Modes. STAND: stand on both legs; SHIFT: shift the weight to the second foot; WALK: follow the
+#: clock, in any gait.
 STAND, SHIFT, WALK = 0, 1, 2
 
 
 class BipedMemory(NamedTuple):
-    """Arrays that a tick changes; the world's axes, places from the base unless said otherwise.
+    """Arrays that a tick changes; world axes, places from the base unless stated otherwise.
 
     Attributes:
         pose: of the links.

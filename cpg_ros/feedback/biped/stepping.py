@@ -37,13 +37,14 @@ SWING_GAINS = {
     'sole_kp': Gain(30.2, 500.0, 'N m/rad', 'moment that keeps the sole level and ahead'),
     'sole_kd': Gain(0.716, 50.0, 'N m s/rad', 'the same by its rate'),
     'press': Gain(0.012, 0.1, 'm', 'how far below the ground a path ends')}
-#: Share of the forces that is left once the foot has landed, and of the damping of its joints.
+#: LANDED: factor of the swing's forces on a foot that has landed early; SWUNG: factor of the
+#: stance's damping on the joints of a leg that bears nothing.
 LANDED, SWUNG = 0.2, 0.2
 
 
 @jit
 def path(fraction, duration, lift_off, target, gains, out):
-    """Fill place, velocity and acceleration of a foot on its path, m, s, shape (3, 3).
+    """Fill place, velocity and acceleration of a foot on its path, m and s, rows of out.
 
     Args:
         fraction: of the swing that is over, 0 to 1.
@@ -93,7 +94,7 @@ def level_moment(turn, heading, turning, gains):
 
     """
     c, s = math.cos(heading), math.sin(heading)
-    # Half the sum of the products of the axes that are and those that are to be.
+    # Half the sum of the cross products of the present axes and the wanted ones.
     x = 0.5 * (-turn[2, 0] * s - turn[2, 1] * c + turn[1, 2])
     y = 0.5 * (turn[2, 0] * c - turn[2, 1] * s - turn[0, 2])
     z = 0.5 * (turn[0, 0] * s - turn[1, 0] * c + turn[0, 1] * c + turn[1, 1] * s)
@@ -102,7 +103,8 @@ def level_moment(turn, heading, turning, gains):
             gains.sole_kp * z - gains.sole_kd * turning[2])
 
 
-# Clock of a biped: which leg swings, what share of the weight each bears, by the legs' phases.
+# Clock of a biped: from the legs' phases, which leg swings and what share of the weight each
+# bears.
 
 CLOCK_GAINS = {
     'frequency': Gain(1.65, 4.0, 'Hz', 'strides per second of the undisturbed walk'),
@@ -110,7 +112,7 @@ CLOCK_GAINS = {
     'touchdown': Gain(0.09, 1.0, '', "share of the robot's weight on a swinging foot from which "
                       'on, late in the swing, it has landed: the clock leaps to the stance'),
     'early': Gain(0.3, 1.0, '', 'share of the load that a leg takes which has landed early')}
-#: Share of the swing before which nothing counts as a touchdown.
+#: LATE: share of the swing before which a load on the foot does not count as a touchdown.
 LATE = 0.6
 
 
@@ -168,15 +170,16 @@ FLIGHT_GAINS = {
                          'of a stance'),
     'flight_x': Gain(0.159, 1.0, 's', 'foot further ahead by what the speed is too high'),
     'flight_y': Gain(0.0512, 1.0, 's', 'the same sideways')}
-#: Most upward force by the weight, furthest foot from the body and least sideways, m.
+#: MOST: largest upward force, as a multiple of the weight; REACH: largest distance of a foothold
+#: from the centre of mass, forward and sideways, m; ASIDE: least distance to the leg's side, m.
 MOST, REACH, ASIDE = 3.5, 0.35, 0.045
-#: How legs go: in turn without flight, in turn with flight, together.
+#: Kinds of gaits. WALKS: legs in turn without flight; RUNS: in turn with flight; HOPS: together.
 WALKS, RUNS, HOPS = 0, 1, 2
 
 
 @jit
 def spans(kind, gains):
-    """Return how long a stance is, and how long it is from one to the next, s."""
+    """Return the duration of a stance and the time from one stance to the next, s."""
     return gains.duty / gains.frequency, (1.0 if kind == HOPS else 0.5) / gains.frequency
 
 
@@ -211,7 +214,7 @@ def upward_force(fraction, kind, height, rise, mass, gains):
 
 @jit
 def foothold(speed, wanted, side, remaining, gains):
-    """Return where a foot is to land from the centre of mass, forward and left, m.
+    """Return the foothold relative to the centre of mass, forward and left, m.
 
     Args:
         speed: forward and left, m/s.
@@ -248,9 +251,11 @@ PLACEMENT_GAINS = {
     'speed_up': Gain(4.90, 20.0, '1/m', "speed-up of the clock by the capture point's error"),
     'speed_up_from': Gain(0.047, 0.5, 'm', 'error that does not speed the clock up'),
     'speed_up_most': Gain(0.6, 2.0, '', 'largest speed-up')}
-#: Shortest time to a touchdown that a foot is placed for, s; lowest centre of mass, m.
+#: SOONEST: least time to the touchdown, s, for which footholds are computed; LOWEST: least height
+#: of the centre of mass over the feet, m, for the growth rate of the capture point.
 SOONEST, LOWEST = 0.02, 0.3
-#: Largest integral of the missing speed, m, and largest speed missing in it, m/s.
+#: INTEGRAL: limit of the integral of the missing speed, m; MISSING: limit of the missing speed
+#: that it integrates, m/s.
 INTEGRAL, MISSING = 0.4, 1.0
 
 
@@ -262,7 +267,7 @@ def growth_rate(height):
 
 @jit
 def offsets(speed, sideways, rate, gains):
-    """Return where the capture point is from a foot that has just landed, forward and outward.
+    """Return the capture point relative to a foot that has just landed, forward and outward.
 
     Args:
         speed: forward, m/s.
@@ -282,7 +287,7 @@ def offsets(speed, sideways, rate, gains):
 
 @jit
 def capture_error(xi, side, time, rate, wanted, gains):
-    """Return by how much the capture point is off its course, forward and left, m.
+    """Return the error of the capture point, forward and left, m.
 
     Args:
         xi: capture point from the foot that stands, heading's axes, m, a pair.
@@ -300,7 +305,7 @@ def capture_error(xi, side, time, rate, wanted, gains):
 
 @jit
 def step(error, side, remaining, rate, wanted, gains):
-    """Return where a foot is to land from the one that stands, forward and left, m.
+    """Return the foothold relative to the foot that stands, forward and left, m.
 
     Args:
         error: see capture_error.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a biped takes for a measurement that does not arrive, for as long as it needs to stop.
+"""Substitutes for measurements of a biped that do not arrive, for as long as it needs to stop.
 
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
 the inertial unit: it is level and still, so the joints say how the base leans and turns. Loads on
@@ -29,13 +29,15 @@ import numpy as np
 
 #: Inputs in the order of their ages.
 IMU, JOINTS, FEET = range(3)
-#: Measurements this old go on as their rates say, s; older ones are replaced.
+#: EXTRAPOLATED: age, s, up to which a measurement is extrapolated by its rate; later it is
+#: replaced.
 EXTRAPOLATED = 0.05
-#: Rate at which a predicted sole approaches its path, 1/s, and damping of the prediction's rates.
+#: FOLLOWED: rate at which a predicted sole approaches its path, 1/s; DAMPED: damping of the least
+#: squares that give the rates of the joints.
 FOLLOWED, DAMPED = 20.0, 1e-3
-#: Largest rate of a predicted joint, rad/s.
+#: FASTEST: largest rate of a predicted joint, rad/s.
 FASTEST = 15.0
-#: Time in which orientation and angular velocity of the sole's come to be used, s.
+#: ADOPTED: duration of the transition to orientation and angular velocity from the sole, s.
 ADOPTED = 0.02
 
 
@@ -61,7 +63,7 @@ class Substitutes:
 
     def fill(self, measured: SensorData, ages: np.ndarray, memory: BipedMemory, dt: float
              ) -> SensorData:
-        """Return the measurements of now.
+        """Return the present measurements, with substitutes for those that are late.
 
         Args:
             measured: the last valid ones.
@@ -83,7 +85,7 @@ class Substitutes:
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
         if late[IMU] and late[JOINTS]:
-            # Nothing says how the base turns.
+            # Neither input tells how the base turns: let its angular velocity fade.
             sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
         if ages[FEET] > EXTRAPOLATED:
             weight = GRAVITY * memory.pose.carried[0]
@@ -91,7 +93,7 @@ class Substitutes:
         return sensors
 
     def _move(self, memory: BipedMemory, dt: float) -> None:
-        """Let the joints of the legs go on from where they were for dt in s."""
+        """Predict the joints of the legs dt in s later."""
         pose, rates = memory.pose, self.sensors.joint_velocities[0]
         rates[:] = 0.0
         for leg, chain in enumerate(self._links.chains):
@@ -108,7 +110,7 @@ class Substitutes:
         self.sensors.joint_positions[0] = self._angles
 
     def _turn(self, measured: SensorData, time: float) -> None:
-        """Let the orientation go on with the angular velocity for a time in s."""
+        """Extrapolate the orientation by the angular velocity for a time in s."""
         roll, pitch, _ = measured.rpy[0]
         x, y, z = measured.angular_velocity[0]
         c, s, cosine = np.cos(roll), np.sin(roll), max(np.cos(pitch), 0.1)
@@ -116,7 +118,7 @@ class Substitutes:
         self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
 
     def _lean_on_sole(self, memory: BipedMemory, fraction: float) -> None:
-        """Take the base to lean and turn as the joints of the leg that bears more say."""
+        """Set lean and rates of the base from the joints of the leg that bears more."""
         sensors, pose = self.sensors, self._pose
         self._kinematics(self._links, self._still, sensors.joint_positions[0],
                          (self._still, sensors.joint_velocities[0]), pose, self._center,

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Force of the legs that stand: height, attitude, centre of pressure within the soles.
+"""Velocity of a biped's base, its arms, and the force of the legs that stand.
 
 One force and one moment are wanted of the ground. Its horizontal part points from the centre of
 pressure to the centre of mass, which turns nothing; what is to turn the body is added. The legs
@@ -29,14 +29,16 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-# Velocity of a biped's base from the sole that stands, the accelerometer in between.
+# Velocity of a biped's base, from the soles that stand and the accelerometer.
 
 VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
                                         'in which the soles that stand correct the '
                                "accelerometer's velocity")}
-#: Share of the weight from which on a sole counts, and over which it comes to count in full.
+#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, shares of the
+#: weight.
 FROM, OVER = 0.06, 0.18
-#: Speed and rate of turning of a sole at which it counts half, m/s and rad/s.
+#: SLIP: speed of a sole at which it counts half, m/s; ROLL: angular speed with the same effect,
+#: rad/s.
 SLIP, ROLL = 0.2, 1.0
 
 
@@ -47,7 +49,7 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
     Args:
         turn: rotation of the base, shape (3, 3).
         acceleration: as an accelerometer measures it, m/s^2, shape (3,).
-        soles: velocities of the soles from the base's, m/s, shape (2, 6).
+        soles: velocities of the soles relative to the base, m/s and rad/s, shape (2, 6).
         loads: share of the weight on each foot, shape (2,).
         dt: since the last time, s.
         gains: BipedGains.
@@ -68,7 +70,7 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
 
 @jit
 def _trust(sole, load, velocity):
-    """Return how far a sole counts as standing, 0 to 1.
+    """Return the weight of a sole in the velocity, 0 to 1: 1 if it bears load and is still.
 
     One that turns rolls over an edge or strikes the ground; one that moves at this velocity of the
     base slips. It still counts a little, since integrated accelerations drift.
@@ -83,16 +85,16 @@ def _trust(sole, load, velocity):
 
 # Arms of a biped: joints of no leg that swing with the waveforms of the network's cells.
 
-#: From rest to the whole swing, and back, s.
+#: RISE: duration of the ramp from rest to the full swing of the arms, and back, s.
 RISE = 1.0
-#: Largest speed, also where gaits change, rad/s.
+#: FASTEST: largest speed of a joint, rad/s, also while gaits change.
 FASTEST = 10.0
-#: Instants at which an orbit is searched for the range of a cell.
+#: SAMPLES: number of points of an orbit from which the range of a cell is read.
 SAMPLES = 256
 
 
 class Arms:
-    """Where the joints that a robot file holds are to be driven.
+    """Target angles of the joints that a robot file holds, which may swing with the cells.
 
     One with a cell and a swing goes by that many radians about its angle as the cell's last
     variable goes from its mean to its peak; the others stay where they are held. Of a Morris-Lecar
@@ -109,7 +111,7 @@ class Arms:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Take what the robot file holds."""
+        """Prepare for the joints that the robot file holds."""
         links = robot.biped.links if robot.biped is not None else {}
         self.names = tuple(robot.held)
         self.rest = np.array(list(robot.held.values()))
@@ -173,7 +175,7 @@ STANCE_GAINS = {
     'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
     'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
     'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
-#: Least and most upward force by the weight.
+#: LEAST, MOST: limits of the upward force, as multiples of the weight.
 LEAST, MOST = 0.3, 1.8
 
 

@@ -29,13 +29,13 @@ from cpg_ros.feedback.biped.links import (
 )
 from cpg_ros.feedback.kinematics import cross, GRAVITY, wrapped
 
-#: Share of the load that each foot keeps while standing.
+#: KEPT: least share of the load on each foot while standing.
 KEPT = 0.02
 
 
 @jit
 def _sense(links, gains, memory, sensors, dt):
-    """Fill pose, velocities and loads from what is measured."""
+    """Fill pose, velocities and loads from the measurements."""
     pose, rates, weight = memory.pose, sensors.joint_velocities[0], GRAVITY
     place(links, sensors.rpy[0], sensors.joint_positions[0], pose)
     weight *= pose.carried[0]
@@ -172,7 +172,7 @@ def _upward(gains, memory, mass, mode, kind, level):
 
 @jit
 def _bear(links, gains, memory, sensors, shift, mode, kind):
-    """Fill the torques of the legs that stand; shift of the centre of pressure in soles, m."""
+    """Fill the torques of the legs that stand; shift is the centre of pressure's, m."""
     pose, fractions = memory.pose, memory.fractions
     turns = (pose.turns[links.chains[0, -1]], pose.turns[links.chains[1, -1]])
     first, second = pose.soles[0], pose.soles[1]
@@ -187,7 +187,7 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
     x, y, z = support.attitude_moment(sensors.rpy[0], memory.turning,
                                      wrapped(memory.heading[0] - sensors.rpy[0, 2]),
                                      memory.reaction, gains)
-    # Where feet are pressed little, they cannot turn the body.
+    # Feet that bear little cannot turn the body.
     firm = 1.0 if kind == stepping.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
     moment = (firm * x, firm * y, firm * z)
     force = support.ground_force(memory.center[0], pressure, up, moment, gains)
@@ -207,7 +207,7 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
 
 @jit
 def _swing(links, gains, memory, leg, kind):
-    """Add the torques of a leg that swings, and fill the moment that it takes."""
+    """Add the torques of a leg that swings, and its reaction moment on the body, N m."""
     pose, other, way = memory.pose, 1 - leg, memory.path
     duration = stepping.swing_share(gains) / gains.frequency
     fraction = min(max(memory.phases[leg] / stepping.swing_share(gains), 0.0), 1.0)
@@ -232,7 +232,7 @@ def _swing(links, gains, memory, leg, kind):
 
 @jit_entry
 def tick(links, gains, memory, sensors, command, mode, step):
-    """Fill the memory's torques, and what the clock is to do.
+    """Fill the memory's torques, and the speed and phase shift of the clock.
 
     Args:
         links: Links of the robot.

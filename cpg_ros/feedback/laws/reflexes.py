@@ -35,17 +35,18 @@ LAW = Law(
     memory={
         'reflex_state': StateVariable('of each leg, see LIFT to LANDED', ('legs', 5))})
 
-#: Shares of the swing in which a foot may stumble, and from which on it may land early; before,
-#: it may still be on its way off the ground.
+#: A contact between the shares STUMBLE and EARLY of the swing is a stumble, from EARLY on an early
+#: landing; before STUMBLE the foot may not have left the ground yet.
 STUMBLE, EARLY = 0.2, 0.65
-#: Share of the stance from which on a foot that has no ground reaches for it.
+#: MISSED: share of the stance from which on a foot without contact reaches for the ground.
 MISSED = 0.1
-#: A foot that a lean lifts by more has its ground where it was, m.
+#: LEANS: lift of a foot by an unexpected lean, m, above which it does not reach: the lean, not a
+#: hole, explains why it has no contact.
 LEANS = 0.005
-#: Time in which a foot is lifted over what it hits, s.
+#: LIFTING: time, s, in which a foot is lifted in full over an obstacle that it hits.
 LIFTING = 0.01
-#: State of a foot's reflexes: the lift over an obstacle, the reach for the ground and the height
-#: held after an early landing, m; the height at which it landed early, m; whether it has.
+#: Indices of a foot's state. LIFT: lift over an obstacle, m; REACH: reach for the ground, m; HELD:
+#: lift held after an early landing, m; HEIGHT: height of that landing, m; LANDED: 1 after it.
 LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
 
 
@@ -69,7 +70,7 @@ def advance(state, contact, swinging, progress, height, lifted, gains, dt):
     if swinging and contact and STUMBLE < progress < EARLY:
         state[LIFT] = min(state[LIFT] + gains.lift * dt / LIFTING, gains.lift)
     elif late:
-        # Back to where the gait lands, or the leg were too short for the body's weight.
+        # Return to the gait's landing: a leg that is drawn in is too short to bear the body.
         state[LIFT] = min(state[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
     elif not swinging:
         state[LIFT] *= fade

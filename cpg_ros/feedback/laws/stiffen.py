@@ -38,7 +38,7 @@ LAW = Law(
 
 @jit
 def remaining(before, error, gains, dt):
-    """Return for how long servos stay stiff, s.
+    """Return the time for which servos stay stiff, s.
 
     Args:
         before: the same, dt in s earlier.

@@ -30,10 +30,10 @@ LAW = Law(
     memory={
         'phase_correction': StateVariable('still to be made after landings [cycles]')})
 
-#: Time constant with which a change of the phase is made, s; largest relative change of the
-#: stride frequency.
+#: SETTLING: time constant with which a change of the phase is made, s; MOST: largest relative
+#: change of the stride frequency.
 SETTLING, MOST = 0.05, 0.5
-#: A foot that lands earlier than this share of its swing has met something else.
+#: EARLIEST: share of the swing before which a contact is an obstacle, not the ground.
 EARLIEST = 0.5
 
 

@@ -44,7 +44,7 @@ LAW = Law(
 
 @jit
 def acts(spent, stiff, delay, gains):
-    """Return whether targets go too far.
+    """Return whether the law acts, that is, whether targets go further than the wanted angles.
 
     Args:
         spent: see spend.
@@ -58,7 +58,7 @@ def acts(spent, stiff, delay, gains):
 
 @jit
 def spend(spent, acting, gains, dt):
-    """Return for how long it has acted, s; below 0, what is left of its rest.
+    """Return the time for which the law has acted, s; if negative, minus the rest that is left.
 
     Args:
         spent: the same, dt in s earlier.
@@ -76,13 +76,13 @@ def spend(spent, acting, gains, dt):
 
 def targets(wanted: np.ndarray, measured: np.ndarray, acting: np.ndarray, gains: Any,
             limits: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return what to send to joints, rad: targets that go too far where the law acts.
+    """Return the targets of the joints, rad, which go further than wanted where the law acts.
 
-    Limits of speed do not hold for them, as no joint is meant to get there.
+    Speed limits do not apply to these targets, as joints are not meant to reach them.
 
     Args:
         wanted: angles within all limits, rad, shape (runs, joints).
-        measured: the same.
+        measured: angles, rad, shape (runs, joints).
         acting: whether the law acts, shape (runs,).
         gains: of the law.
         limits: lowest and highest angles, rad, shape (joints,) each.

@@ -37,9 +37,10 @@ from cpg_ros.networks.registry import NETWORKS
 
 #: The networks of the shipped robots.
 SHIPPED = (*NETWORKS, 'delayed6')
-#: What is compiled, those that the demonstration needs first, and the longest it may take, s.
+#: PARTS: parts that are compiled, those of the demonstration first; LIMIT: longest duration, s.
 PARTS, LIMIT = ('networks', *(('feedback', 'balance') if COMPILED else ())), 85.0
-#: Of the feedback and of a biped's: their kernels are the same for every robot with such legs.
+#: ROBOT: robot for which the feedback is compiled; BIPED: robot for which balance is compiled.
+#: Their kernels are the same for every robot with such legs.
 ROBOT, BIPED = 'unitree_go2', 'humanoid'
 
 
