@@ -126,6 +126,30 @@ class FootContacts(ShortRepr):
         return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
 
 
+#: FALLS: downward acceleration over GRAVITY (m/s^2) from which on a body falls freely.
+#: NEVER, OFTEN: shares of a stride of free fall up to which it walks, and from which on it runs.
+#: HARMONICS: number of harmonics of the body's height.
+FALLS, GRAVITY, NEVER, OFTEN, HARMONICS = 0.7, 9.81, 0.02, 0.1, 6
+
+
+def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
+    """Return the share of a stride in which a body falls freely: no foot is on the ground then.
+
+    Args:
+        phases: of the stride, cycles, shape (n,).
+        height: of the body, m, shape (n,).
+        frequency: of the stride, Hz.
+
+    """
+    turn = 2j * np.pi * np.arange(1, HARMONICS + 1)
+    waves = np.exp(np.multiply.outer(phases, turn))
+    basis = np.column_stack([np.ones_like(phases), phases - phases.mean(), waves.real, waves.imag])
+    weights = np.linalg.lstsq(basis, height, rcond=None)[0][2:].reshape(2, -1)
+    grid = np.exp(np.multiply.outer(np.arange(POINTS) / POINTS, turn)) * (turn * frequency)**2
+    downward = -(grid.real @ weights[0] + grid.imag @ weights[1])
+    return float(np.mean(downward > FALLS * GRAVITY))
+
+
 def _touchdown(stands: np.ndarray) -> float | None:
     """Return where the longest stance begins, cycles, or None if the strides disagree too much.
 

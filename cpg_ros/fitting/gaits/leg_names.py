@@ -41,7 +41,8 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
 #: OTHER: words of joints of no leg; UPPER: words of a biped's arms, which a quadruped's fore legs
 #: have as well.
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
-         'thumb', 'hand', 'wheel', 'caster', 'rotor', 'eye', 'ear', 'camera', 'antenna'}
+         'thumb', 'hand', 'pelvis', 'thorax', 'progress', 'wheel', 'caster', 'rotor', 'eye', 'ear',
+         'camera', 'antenna'}
 UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 #: JOINTS: names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',

@@ -26,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cpg_ros.fitting.gaits.foot_contacts import FootContacts
+from cpg_ros.fitting.gaits.foot_contacts import FootContacts, NEVER, OFTEN
 from cpg_ros.fitting.gaits.leg_names import HEXAPOD, role_of
 from cpg_ros.fitting.gaits.mean_cycle import blocks, PhaseAverage
 from cpg_ros.fitting.gaits.recognition import best_shift, recognise
@@ -428,18 +428,26 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
                      1.0 / (1.0 + _odds(distance, second, network.cells)), ())
 
 
-def match_gait_by_contacts(match: GaitMatch, contacts: FootContacts) -> GaitMatch:
-    """Tell walk from run by the feet's contacts, where the legs move alike in both.
+def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float | None
+                ) -> GaitMatch:
+    """Tell walk from run by flight, where the legs move alike in both.
 
     Args:
         match: by the legs' phases.
-        contacts: of the feet.
+        contacts: of the feet, if they are known.
+        falling: share of the stride in which the body falls freely, if its height is known.
 
     """
-    gait = contacts.gait
-    if set(match.alike) != {'walk', 'run'} or gait is None:
+    if set(match.alike) != {'walk', 'run'}:
+        return match
+    gait, why = (None, '') if contacts is None else (
+        contacts.gait, f'by the loads on the feet: {contacts}')
+    if gait is None and falling is not None:
+        gait = 'walk' if falling <= NEVER else 'run' if falling >= OFTEN else None
+        why = (f'by the height of the body, which falls freely in {falling:.0%} of the stride')
+    if gait is None:
         return match
     # The other one was a rival with even odds.
     return replace(match, gait=match.gait and gait, nearest=gait, alike=(gait,),
                    sure=1.0 / (1.0 / match.sure - 1.0),
-                   notes=(f'{gait}, by the loads on the feet: {contacts}',))
+                   notes=(f'{gait}, {why}',))

@@ -14,7 +14,7 @@
 
 """Plausibility checks of a recording's stride, legs and travel, and the confidence they leave."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -144,18 +144,23 @@ def check_legs(vague: Sequence[str]) -> list[QualityIssue]:
 
 
 def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
-                 names: Sequence[str]) -> list[QualityIssue]:
+                 names: Sequence[str], gait_of: Callable[[Mapping[str, float]], str | None]
+                 ) -> list[QualityIssue]:
     """Return an issue if the legs' phases differ between parts of the stretch.
+
+    Animals' phases do so within one gait, too: parts that are all of the same gait are no issue.
 
     Args:
         phases: of the samples of a stretch, cycles, shape (n,).
         x: rad, nan where missing, shape (n, joints).
         legs: leg -> its joints.
         names: of the joints.
+        gait_of: returns the gait of phases, None if it is none.
 
     """
     parts = _by_parts(phases, x, legs, names)
-    if not parts:
+    gaits = {gait_of(part) for part in parts}
+    if not parts or (len(gaits) == 1 and None not in gaits):
         return []
 
     def moved(leg: str, pair: tuple[int, int]) -> float:
@@ -224,6 +229,11 @@ def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]
 PATH, SURE_AREA = 0.25, 0.4
 #: MOVES: a joint is ignored if it moves by less than this share of the leg's largest motion.
 MOVES = 0.1
+#: COPY: largest share of its motion that a copy of another joint has for itself.
+#: JOINT_WORDS: words in common of joints that are copies whatever their ratio.
+COPY, JOINT_WORDS = 0.1, frozenset({'hip', 'thigh', 'knee', 'calf', 'shank', 'ankle'})
+#: TRAVELS: travel of the body in a stride from which on it does not step on the spot, m.
+TRAVELS = 0.1
 
 
 def _area(a: np.ndarray, b: np.ndarray) -> float:
@@ -231,6 +241,24 @@ def _area(a: np.ndarray, b: np.ndarray) -> float:
     n = np.arange(1, a.size)
     sizes = np.sum(n * np.abs(a[1:])**2) * np.sum(n * np.abs(b[1:])**2)
     return float(np.sum(n * (a[1:].conj() * b[1:]).imag) / max(np.sqrt(sizes), 1e-300))
+
+
+def _without_copies(legs: Sequence[Mapping[str, str]], c: Mapping[str, np.ndarray],
+                    roles: Sequence[str]) -> list[str]:
+    """Return roles but those of joints that only copy another one: in a linkage, or twice."""
+    kept: list[str] = []
+    for role in roles:
+        def copies(other: str, role: str = role) -> bool:
+            pairs = [(c[own[other]][1:], c[own[role]][1:]) for own in legs]
+            ratios = [float(np.sum(a.conj() * b).real / max(np.sum(np.abs(a)**2), 1e-300))
+                      for a, b in pairs]
+            alike = all(np.sum(np.abs(b - ratio * a)**2) < COPY**2 * np.sum(np.abs(b)**2)
+                        for ratio, (a, b) in zip(ratios, pairs, strict=True))
+            return alike and (all(abs(abs(ratio) - 1.0) < COPY for ratio in ratios)
+                              or bool(JOINT_WORDS & set(other.split()) & set(role.split())))
+        if not any(map(copies, kept)):
+            kept.append(role)
+    return kept
 
 
 def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
@@ -242,7 +270,7 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
     roles = [{role_of(name): name for name in listed} for listed in legs.values()]
     power = {role: sum(float(np.sum(np.abs(c[own[role]][1:])**2)) for own in roles)
              for role in sorted(set.intersection(*map(set, roles)))}
-    most = sorted(power, key=lambda role: -power[role])[:2]
+    most = _without_copies(roles, c, sorted(power, key=lambda role: -power[role]))[:2]
     if len(most) < 2 or power[most[1]] < MOVES**2 * power[most[0]]:
         return {}, set()
     return ({leg: _area(*(c[own[role]] for role in sorted(most)))
@@ -251,7 +279,8 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 
 
 def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
-                 girdles: Mapping[str, str], opposite: Collection[str]) -> list[QualityIssue]:
+                 girdles: Mapping[str, str], opposite: Collection[str], travel: float
+                 ) -> list[QualityIssue]:
     """Return an issue if the gait steps on the spot or turns on the spot.
 
     Args:
@@ -259,10 +288,11 @@ def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
         girdles: leg -> fore or hind, where the legs have these.
         opposite: joints that count angles in the opposite sense of the first leg's.
+        travel: of the body in a stride, m; 0 if that is not known.
 
     """
     loops, joints = _loops(legs, c)
-    if not loops:
+    if not loops or travel > TRAVELS:
         return []
     if max(map(abs, loops.values())) < PATH:
         return [QualityIssue('the joints of each leg go to and fro on one path: the legs step, '

@@ -22,15 +22,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
-from cpg_ros.fitting.gaits.foot_contacts import foot_contacts, FootContacts
+from cpg_ros.fitting.gaits.foot_contacts import (
+    falling_share,
+    foot_contacts,
+    FootContacts,
+)
 from cpg_ros.fitting.gaits.leg_names import Legs
 from cpg_ros.fitting.gaits.leg_phases import (
     leg_phases,
     match_gait,
     match_gait_by_cells,
-    match_gait_by_contacts,
     phase_scatter,
     PhaseScatter,
+    walk_or_run,
 )
 from cpg_ros.fitting.gaits.mean_cycle import average_cycles
 from cpg_ros.fitting.gaits.phase_estimation import (
@@ -51,6 +55,7 @@ from cpg_ros.fitting.gaits.quality_checks import (
     quality_notes,
     QualityIssue,
     SURE,
+    SWING,
 )
 from cpg_ros.fitting.gaits.steady_stretch import (
     best_stretch,
@@ -172,7 +177,7 @@ LEFT = 0.5
 #: noted.
 SEEDS, OTHERS = 4, 3.0
 #: FEW_CYCLES: factor of the confidence for fewer cycles than SURE.
-FEW_CYCLES = 0.9
+FEW_CYCLES = 0.95
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -250,7 +255,8 @@ class Stride(ShortRepr):
 def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str]],
                 network: type[Network] | Network, cells: Mapping[str, int] | None = None,
                 gains: Mapping[str, complex] | None = None,
-                loads: FootLoadsLike | None = None) -> Stride:
+                loads: FootLoadsLike | None = None, body: np.ndarray | None = None,
+                known: str = '') -> Stride:
     """Find the steady gait of a recording.
 
     Args:
@@ -264,6 +270,9 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
             has a joint.
         loads: on the feet, at the recording's times or others. The legs' phases are then those
             of touchdown, and they tell walk from run where legs move alike in both.
+        body: where the body was, m, the last axis upward, shape (n, 3); how it falls tells walk
+            from run, too.
+        known: the gait, where that is no question: confidence is then that of the frequency.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
@@ -287,7 +296,8 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     warp = estimate_phase(times, positions, rough)
     if warp.cycles < CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
-                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
+                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed: '
+                           f'record {SURE:g} strides or more, {SURE / warp.frequency:.3g} s')
     inside = index_range(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
@@ -323,16 +333,20 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
               *check_angles(names, mean), *check_legs(vague),
               *check_sway(ahead, mean),
-              *check_change(phases, x, leading, names),
-              *check_travel(usable, c, kind.girdles, opposite)]
+              *check_change(phases, x, leading, names, lambda part: match_gait(part, kind).gait),
+              *check_travel(usable, c, kind.girdles, opposite, _travel(body, inside, warp))]
     if warp.cycles < SURE:
         issues.append(QualityIssue('', FEW_CYCLES))
     if cells is not None and gains is not None and len(gait.alike) > 1:
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
-    if contacts is not None:
-        gait = match_gait_by_contacts(gait, contacts)
+    gait = walk_or_run(gait, contacts, None if body is None else falling_share(
+        phases, body[inside][:, 2], warp.frequency))
+    if known:
+        gait = replace(gait, sure=1.0)
+        if known in gait.alike:
+            gait = replace(gait, gait=known, nearest=known, alike=(known,))
     if len(gait.alike) > 1:
         # The odds of the gait have this already.
         issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
@@ -348,6 +362,13 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                   replace(warp, phases=warp.phases - found.zero), contacts)
 
 
+def _travel(body: np.ndarray | None, inside: slice, warp: PhaseEstimate) -> float:
+    """Return by how much the body goes on in a stride, m, 0 if that is not known."""
+    if body is None:
+        return 0.0
+    return float(np.linalg.norm(np.ptp(body[inside][:, :2], axis=0)) / warp.cycles)
+
+
 def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
     """Find the longest stretch of steady motion; return it, and notes on the others."""
     reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
@@ -359,7 +380,8 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
     if not found:
         raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
                            f'{reach.max():.2g} rad, but nowhere do they repeat that over '
-                           f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s')
+                           f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s' + _hint(
+                               times, x, reach))
     regions: list[tuple[RoughPhase, float]] = []
     largest = max(one.size for one in found)
     for _ in range(SEEDS):
@@ -375,7 +397,8 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
                  and one.cycles >= OTHERS and one.size >= 0.5 * largest]
     if not regions:
         raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
-                           f'only roughly, and for {seed.cycles:.1f} cycles')
+                           f'only roughly, and for {seed.cycles:.1f} cycles of '
+                           f'{seed.period:.3g} s: record {SURE:g} strides or more')
     regions.sort(key=lambda one: one[0].begin - one[0].end)
     rough = regions[0][0]
     notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {one.begin:.2f} to '
@@ -384,6 +407,20 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
              if min(one.end, rough.end) - max(one.begin, rough.begin) < 0.5 * (one.end - one.begin)
              and one.end - one.begin >= OTHERS * period]
     return rough, notes
+
+
+def _hint(times: np.ndarray, x: np.ndarray, reach: np.ndarray) -> str:
+    """Return what may help where joints do not repeat themselves: another unit, more strides."""
+    if reach.max() > SWING:
+        return ': if the angles are in degrees, declare it (--unit deg)'
+    # Half a stride is at least as long as the slowest joint takes from its least to its largest.
+    there = [np.flatnonzero(np.isfinite(column)) for column in x.T]
+    half = max(abs(float(times[own[np.argmax(column[own])]] - times[own[np.argmin(column[own])]]))
+               for own, column in zip(there, x.T, strict=True))
+    if times[-1] > 2.0 * CYCLES * half:
+        return ''
+    return (f': it lasts {times[-1]:.3g} s, which may be a single stride: record {SURE:g} or '
+            f'more, {2.0 * SURE * half:.2g} s or longer')
 
 
 def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],

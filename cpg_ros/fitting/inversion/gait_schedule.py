@@ -169,6 +169,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
     found: list[tuple[float, float, Stride]] = []
     remains = [(0.0, float(recording.times[-1]))]
     why: NoSteadyGait | None = None
+    longest: Stride | None = None
     while remains:
         begin, end = remains.pop()
         try:
@@ -188,11 +189,16 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
                                (origin + change + 1.0 / stride.frequency, end))
             continue
         first, last = origin + stride.begin, origin + stride.end
+        longest = longest or stride
         if stride.cycles >= SURE:
             found.append((first, last, stride))
         remains += _longer((begin, first), (last, end))
     if not found:
-        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {SURE:g} strides')
+        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {SURE:g} strides'
+                                  + (f', only of {longest.cycles}, of '
+                                     f'{1.0 / longest.frequency:.3g} s each: record '
+                                     f'{SURE / longest.frequency:.2g} s or more'
+                                     if longest else ''))
     return sorted(found, key=lambda one: one[0])
 
 

@@ -286,14 +286,19 @@ def networks_of(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Netwo
 
 
 def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
-              robot: Robot | None) -> tuple[dict[str, int], Stride]:
-    """Return joint -> its cell in a network, and the steady stride of the recording."""
+              robot: Robot | None, gait: str = '') -> tuple[dict[str, int], Stride]:
+    """Return joint -> its cell in a network, and the steady stride, of a known gait or any."""
     cells = cells_of(robot if robot is not None else legs, kind)
     cells = {name: cell for name, cell in cells.items() if name in recording.joints}
     gains = None if robot is None else {
         joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
-    stride = find_stride(recording.select(tuple(cells)), legs, kind,
-                         None if robot is None else cells, gains, recording.loads)
+    try:
+        stride = find_stride(recording.select(tuple(cells)), legs, kind,
+                             None if robot is None else cells, gains, recording.loads,
+                             recording.body, gait)
+    except NoSteadyGait as error:
+        # What was repaired or left out may be why.
+        raise NoSteadyGait('; '.join((str(error), *recording.notes))) from error
     if not recording.cycle:
         return cells, stride
     # Copies of one stride do not tell how strides scatter.
@@ -308,18 +313,19 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
 
 
 def _steady(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
-            robot: Robot | None) -> tuple[Recording, dict[str, int], Stride, list[str]]:
+            robot: Robot | None, gait: str
+            ) -> tuple[Recording, dict[str, int], Stride, list[str]]:
     """Return the recording, cells, stride and warnings; a single stride is enough.
 
     A recording without a steady gait may be exactly one stride; copies of it then take its place.
     """
     try:
-        return recording, *stride_of(recording, legs, kind, robot), []
+        return recording, *stride_of(recording, legs, kind, robot, gait), []
     except NoSteadyGait:
         recognised = recognise_stride(recording)
         if recognised is None:
             raise
-    cells, stride = stride_of(recognised, legs, kind, robot)
+    cells, stride = stride_of(recognised, legs, kind, robot, gait)
     return recognised, cells, replace(stride, confidence=0.5 * stride.confidence), [
         f'taken for exactly one stride, of {recognised.cycle:.4g} s, as it ends where it begins: '
         'say so (--cycle), or record several strides']
@@ -382,14 +388,14 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    recording, cells, stride, guessed = _steady(recording, legs, kind, robot)
+    recording, cells, stride, guessed = _steady(recording, legs, kind, robot, gait)
     between = ''
     if not (gait or stride.gait or network_given or kind.offsets):
         between = _none_of(kind, stride)
         as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
         if as_they_are is not None:
             kind = as_they_are
-            cells, stride = stride_of(recording, legs, kind, robot)
+            cells, stride = stride_of(recording, legs, kind, robot, gait)
             between += f'; they are fitted as they are, by the network {kind.name}'
     warnings = [*guessed, *([between] if between else []), *stride.issues]
     if not gait:

@@ -89,11 +89,19 @@ def _reason(code: int, errors: bytes, seconds: float) -> str:
     return lines[-1] if lines else f'the library ezc3d ended with {code}'
 
 
-def _point(parameters: Any) -> dict[str, Any]:
-    """Return the values of the parameters that are used."""
-    wanted = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS')
-    return {key: [one if isinstance(one, str) else float(one) for one in entry['value']]
-            for key, entry in parameters.items() if key.startswith(wanted)}
+def _point(parameters: Any, first: int) -> dict[str, Any]:
+    """Return the values of the parameters of points and events that are used."""
+    wanted = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS', 'UNITS')
+    found: dict[str, Any] = {
+        key: [one if isinstance(one, str) else float(one) for one in entry['value']]
+        for key, entry in parameters['POINT'].items() if key.startswith(wanted)}
+    if 'EVENT' in parameters:
+        known = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
+                 if key in parameters['EVENT']}
+        minutes, seconds = np.asarray(known.pop('TIMES', np.zeros((2, 0)))).reshape(2, -1)
+        found['EVENT'] = {**known, 'TIMES': (60.0 * minutes + seconds
+                                             - first / found['RATE'][0]).tolist()}
+    return found
 
 
 def main(path: str, out: str, memory: str, seconds: str) -> int:
@@ -104,7 +112,8 @@ def main(path: str, out: str, memory: str, seconds: str) -> int:
     try:
         import ezc3d
         file: Any = ezc3d.c3d(path)
-        np.savez(out, point=json.dumps(_point(file['parameters']['POINT'])),
+        first = int(file['header']['points']['first_frame'])
+        np.savez(out, point=json.dumps(_point(file['parameters'], first)),
                  points=np.asarray(file['data']['points'], float),
                  residuals=np.asarray(file['data']['meta_points']['residuals'], float)[0])
     except MemoryError:

@@ -17,6 +17,8 @@ of Open Source Software 6(58), 2911), which runs in a process of its own (see c3
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+import math
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +30,12 @@ from cpg_ros.fitting.recordings.markers import (
     marker_names,
     Markers,
     SEGMENTS,
+    UNITS,
 )
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLES,
+    FootLoads,
     JOINTS,
     matching,
     Recording,
@@ -67,10 +71,50 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
             angle of a joint.
 
     """
-    markers, angles, unit = _contents(Path(path))
-    if segments is None and angles:
-        return _modelled(markers, angles, unit, joints)
-    return joint_recording(markers, segments, joints)
+    markers, angles, unit, events = _contents(Path(path))
+    recording = (_modelled(markers, angles, unit, joints) if segments is None and angles else
+                 joint_recording(markers, segments, joints))
+    if (loads := contacts(events, recording.start, recording.times)) is None:
+        return recording
+    return replace(recording, loads=loads, notes=(*recording.notes, 'which foot is on the ground '
+                                                  "is taken from the file's events"))
+
+
+#: STRIKE, OFF: events of a foot that lands, and of one that leaves the ground.
+STRIKE, OFF = ('foot strike', 'heel strike', 'hs'), ('foot off', 'toe off', 'to')
+
+
+def contacts(events: Mapping[str, Any], start: float, times: np.ndarray) -> FootLoads | None:
+    """Return which foot is on the ground, between the first and the last event of each side.
+
+    Args:
+        events: LABELS, CONTEXTS (Left, Right) and TIMES (s) of the parameters EVENT; a label
+            may have the side as its first letter, LHS.
+        start: of the recording, s.
+        times: of the recording, s, shape (n,).
+
+    Returns:
+        1 on the ground and 0 in the air; None unless both feet land and leave the ground.
+
+    """
+    known: dict[str, list[tuple[float, bool]]] = {'left': [], 'right': []}
+    labels = events.get('LABELS', ())
+    sides = [*events.get('CONTEXTS', ()), *[''] * len(labels)]
+    for label, side, time in zip(labels, sides, events.get('TIMES', ()), strict=False):
+        name = ' '.join(label.lower().split())
+        if side.lower() not in known:
+            side, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
+        if side.lower() in known and name in STRIKE + OFF:
+            known[side.lower()].append((time - start, name in STRIKE))
+    if not all(len({down for _, down in own}) == 2 for own in known.values()):
+        return None
+    within = [min(own)[0] for own in known.values()], [max(own)[0] for own in known.values()]
+    times = times[(times >= max(within[0])) & (times <= min(within[1]))]
+    rows = []
+    for own in known.values():
+        when, down = zip(*sorted(own), strict=True)
+        rows.append(np.array(down, float)[np.searchsorted(when, times, side='right') - 1])
+    return FootLoads(tuple(known), times, np.column_stack(rows))
 
 
 def c3d_markers(path: str | Path) -> Markers:
@@ -86,8 +130,8 @@ def c3d_markers(path: str | Path) -> Markers:
     return _contents(Path(path))[0]
 
 
-def _contents(path: Path) -> tuple[Markers, list[str], str]:
-    """Return the points, the names of those that are angles, and the unit of these, '' if none."""
+def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
+    """Return points, names of those that are angles, the unit of these, '' if none, and events."""
     stated = _stated(path)
     needed('ezc3d')
     try:
@@ -110,11 +154,12 @@ def _contents(path: Path) -> tuple[Markers, list[str], str]:
              if frames < stated else [])
     names, doubles = marker_names(labels, places)
     found = Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
-                    notes=(*notes, *doubles))
+                    notes=(*notes, *doubles),
+                    unit=UNITS.get(''.join(map(str, point.get('UNITS', ['']))), math.nan))
     known = {name.rpartition(':')[2] for name in angles}
     return found, [name for name, label in zip(names, labels, strict=True)
                    if label in angles or label.rpartition(':')[2] in known
-                   ], ''.join(units[:1]).strip()
+                   ], ''.join(units[:1]).strip(), point.get('EVENT', {})
 
 
 def _names(point: Mapping[str, Any], key: str) -> list[str]:

@@ -90,6 +90,8 @@ class Segments:
         joints: name -> angle.
         least_likelihood: below it, a marker is not seen.
         alternatives: marker -> other names for it, or for what may stand in its place.
+        body: markers whose mean is the place of the body.
+        feet: markers below it.
 
     """
 
@@ -97,6 +99,8 @@ class Segments:
     joints: Mapping[str, JointAngle]
     least_likelihood: Annotated[float, within(0.0, 1.0)] = LIKELY
     alternatives: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    body: tuple[str, ...] = ()
+    feet: tuple[str, ...] = ()
 
     def named_as(self, there: Sequence[str]) -> 'Segments':
         """Return the same with those alternatives for markers that are there."""
@@ -107,7 +111,8 @@ class Segments:
             return tuple(dict.fromkeys(names.get(one, one) for one in markers))
 
         return replace(self, segments={name: Segment(ends(one.begin), ends(one.end))
-                                       for name, one in self.segments.items()})
+                                       for name, one in self.segments.items()},
+                       body=ends(self.body), feet=ends(self.feet))
 
     def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
         """Return the markers that a joint's angle is made of, each once.
@@ -162,6 +167,8 @@ def load_segments(name: str | Path) -> Segments:
           knee: {between: [thigh, shank], axis: leftward, neutral: 0.0}
         alternatives:               # optional: other names for a marker, the first that is there
           hip: [greater_trochanter]
+        body: [pelvis_left, pelvis_right]   # optional: what carries the legs, and what is below
+        feet: [toe]                         # it, which tells where up is
 
     In three dimensions, a joint with an axis is the angle that its two segments have as seen along
     the axis, positive by the right hand; one without is the angle between them, which is never
@@ -198,6 +205,8 @@ def load_segments(name: str | Path) -> Segments:
 
 #: SHORTEST: share of a segment's length across the axis below which it has no direction.
 SHORTEST = 1e-3
+#: UNITS: what files call the unit of places -> that in m.
+UNITS = {'mm': 1e-3, 'cm': 1e-2, 'm': 1.0}
 #: FARTHEST: largest coordinate of a marker, in any unit.
 FARTHEST = 1e9
 
@@ -215,6 +224,7 @@ class Markers(ShortRepr):
         likelihoods: that a marker is where it is said to be, 0 to 1, shape (n, markers), nan if
             that is not known; None where all are certain.
         notes: what was repaired or left out, one line each.
+        unit: of the points, m; nan if that is not known.
 
     """
 
@@ -224,6 +234,7 @@ class Markers(ShortRepr):
     source: Path
     likelihoods: np.ndarray | None = None
     notes: tuple[str, ...] = ()
+    unit: float = math.nan
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.names)} markers in {self.points.shape[-1]} '
@@ -331,15 +342,31 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
     points = _seen(markers, segments.least_likelihood, used, notes)
     angles = {name: _angle(name, segments, markers, points) for name in found}
     silent = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
+    empty = [name for name in used
+             if not np.isfinite(points[:, markers.names.index(name)]).all(axis=1).any()]
+    lacking = f'; without any place: {abbreviate(empty)}' if empty else ''
     if silent and (joints or len(silent) == len(angles)):
         raise RecordingError(f'{source}: no angle of {abbreviate(silent)}: its markers are never '
-                             'seen '
-                             'together')
+                             f'seen together{lacking}')
     if silent:
-        notes.append(f'never seen, left out: {abbreviate(silent)}')
+        notes.append(f'never seen, left out: {abbreviate(silent)}{lacking}')
     kept = [name for name in angles if name not in silent]
     return recording_of(source, markers.stamps, kept,
-                        np.column_stack([angles[name] for name in kept]), notes)
+                        np.column_stack([angles[name] for name in kept]), notes,
+                        body=_body(segments, markers, points))
+
+
+def _body(segments: Segments, markers: Markers, points: np.ndarray) -> np.ndarray | None:
+    """Return where the body is, m, shape (n, 3), the last axis from the feet upward."""
+    body, feet = ([markers.names.index(name) for name in names if name in markers.names]
+                  for names in (segments.body, segments.feet))
+    if points.shape[2] < 3 or not body or not feet or math.isnan(markers.unit):
+        return None
+    place = markers.unit * points[:, body].mean(axis=1)
+    below = np.nanmean(points[:, body][:, :, None] - points[:, feet][:, None], axis=(0, 1, 2)
+                       ) if np.isfinite(points[:, feet]).any() else np.zeros(3)
+    up = int(np.argmax(np.abs(below)))
+    return np.sign(below[up]) * np.roll(place, 2 - up, axis=1)
 
 
 def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:

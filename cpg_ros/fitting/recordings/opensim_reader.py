@@ -20,6 +20,7 @@ header tells apart but their names do, and of states the speeds and the muscles'
 
 from collections.abc import Sequence
 from dataclasses import replace
+import math
 from pathlib import Path
 import re
 
@@ -29,9 +30,11 @@ from cpg_ros.fitting.recordings.markers import (
     marker_names,
     Markers,
     SEGMENTS,
+    UNITS,
 )
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    ANGLES,
     JOINTS,
     LATEST,
     matching,
@@ -107,7 +110,7 @@ def trc_markers(path: str | Path) -> Markers:
     points[unseen] = np.nan
     names, doubles = marker_names(labels, points)
     return Markers(names, np.rint(seconds * 1e9).astype(np.int64), points, path,
-                   notes=(*notes, *doubles))
+                   notes=(*notes, *doubles), unit=UNITS.get(facts.get('Units', ''), math.nan))
 
 
 TRC = RecordingFormat(
@@ -118,6 +121,8 @@ TRC = RecordingFormat(
 
 #: STATE: path of a state: '/jointset/hip_r/hip_flexion_r/value'.
 STATE = re.compile(r'^(?:.*/)?([^/]+)/(value|speed|activation|fiber_length)$')
+#: PELVIS: name of a translation of the pelvis, m; its group is the axis.
+PELVIS = re.compile(r'^(?:.*/)?pelvis_t([xyz])(?:/value)?$')
 #: NO_ANGLE: names of translations and forces, whose columns look like those of angles.
 NO_ANGLE = re.compile(r'_t[xyz]$|^ground_(force|torque|moment)|_(force|moment|torque)$'
                       r'|_[fmp][xyz]$|force_v?[xyz]|force_p[xyz]', re.I)
@@ -153,8 +158,17 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
                              f'{abbreviate(columns, 20)}')
     require(list(angles.values()), list(angles.values()), str(path))
     names = matching(joints, list(angles.values()), str(path))
-    found = read_csv(path, unit, progress=progress, joints=[
-        next(column for column, joint in angles.items() if joint == name) for name in names])
+    # As it is no angle, the unit of angles does not hold for the pelvis. Models in a plane have
+    # no z.
+    body = {match[1]: column for column in columns if (match := PELVIS.match(column))}
+    found = read_csv(path, unit, progress=progress, joints=[*(
+        next(column for column, joint in angles.items() if joint == name) for name in names),
+        *body.values()])
+    place = dict(zip(body, found.positions[:, len(names):].T / ANGLES[declared or unit or 'rad'],
+                     strict=True))
+    found = replace(found, joints=tuple(names), positions=found.positions[:, :len(names)],
+                    body=np.column_stack([place.get(axis, 0.0 * place['y']) for axis in 'xzy'])
+                    if 'y' in place and np.isfinite([*place.values()]).all() else None)
     notes: list[str] = []
     if declared is None and unit is None:
         notes.append("the header has no 'inDegrees': the angles are taken to be in rad")
@@ -163,7 +177,7 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
         notes.append(f'{pluralize(len(left), "column")} left out, no angles: {abbreviate(left)}')
     if rows is not None and (there := len(found.times)) < rows:
         notes.append(f'{there} rows, where the header states {rows}')
-    return replace(found, joints=tuple(names), notes=(*notes, *found.notes))
+    return replace(found, notes=(*notes, *found.notes))
 
 
 def _joint(column: str) -> str:

@@ -89,6 +89,7 @@ class Recording(ShortRepr):
         loads: on the feet, where they were recorded, too.
         cycle: duration of a stride, s, of which the recording is copies; nan where its times are
             shares of one stride of unknown duration; 0 for all other recordings.
+        body: where the body was, m, the last axis upward, shape (n, 3), where that was recorded.
 
     Raises:
         RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
@@ -104,6 +105,7 @@ class Recording(ShortRepr):
     notes: tuple[str, ...] = ()
     loads: FootLoads | None = None
     cycle: float = 0.0
+    body: np.ndarray | None = None
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '
@@ -146,7 +148,8 @@ class Recording(ShortRepr):
             held = (loads.times >= begin) & (loads.times <= end)
             loads = replace(loads, times=loads.times[held] - first, loads=loads.loads[held])
         return replace(self, times=times - first, positions=self.positions[within],
-                       start=self.start + first, loads=loads)
+                       start=self.start + first, loads=loads,
+                       body=None if self.body is None else self.body[within])
 
 
 def refuse_stand_in(path: Path, head: bytes) -> None:
@@ -227,7 +230,8 @@ def unwrapped(angles: np.ndarray) -> np.ndarray:
 
 
 def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: np.ndarray,
-                 notes: Sequence[str] = (), joints: Sequence[str] = ()) -> Recording:
+                 notes: Sequence[str] = (), joints: Sequence[str] = (),
+                 body: np.ndarray | None = None) -> Recording:
     """Make a recording of all angles of a file.
 
     Args:
@@ -237,6 +241,7 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
         angles: rad, shape (n, names).
         notes: to begin with.
         joints: names or patterns, in this order; all joints, if empty.
+        body: as of Recording, at these stamps, nan where missing; None if unknown.
 
     Raises:
         RecordingError: see `merged` and `matching`.
@@ -245,6 +250,10 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
     require(names, names, str(path))
     found = merged([(stamps, names, angles)], printable(str(path)),
                    matching(joints, names, str(path)))
+    if body is not None and (there := np.isfinite(body).all(axis=1)).any():
+        times = 1e-9 * stamps[there] - found.start
+        body = np.column_stack([np.interp(found.times, times, one) for one in body[there].T])
+        found = replace(found, body=body)
     return replace(found, notes=(*map(printable, notes), *found.notes))
 
 
@@ -485,6 +494,7 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
     return replace(
         recording, times=scale * (starts + recording.times[:count]).ravel(), loads=loads,
         positions=np.tile(recording.positions[:count], (COPIES, 1)), cycle=scale * own,
+        body=None if recording.body is None else np.tile(recording.body[:count], (COPIES, 1)),
         notes=(*recording.notes, f'one stride, of {scale * own:.4g} s, which is repeated: it '
                'does not tell how strides differ'))
 

@@ -150,7 +150,8 @@ def test_joints_without_markers_are_left_out_with_a_note_or_refused_if_asked_for
     points[:, names.index('LKNE')] = np.nan
     found = joint_recording(markers(points, names), HUMAN)
     assert found.joints == ('right_hip', 'right_knee')
-    assert "never seen, left out: 'left_hip', 'left_knee'" in found.notes
+    assert ("never seen, left out: 'left_hip', 'left_knee'; without any place: 'LKNE'"
+            in found.notes)
     assert joint_recording(markers(points, names), HUMAN, ['right_k*']).joints == ('right_knee',)
     for joints, words in ((['left_ankle'], "no marker 'LTOE', which 'left_ankle' needs; there "),
                           (['left_knee'], "no angle of 'left_knee': its markers are never seen"),
