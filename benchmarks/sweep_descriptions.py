@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What check_robot finds in each URDF and MJCF file of a folder: legs and joints, or the reason.
+"""What check_robot makes of each URDF and MJCF file of a folder: legs and joints, or the reason.
 
 Usage: python3 benchmarks/sweep_descriptions.py FOLDER
 """
@@ -21,19 +21,22 @@ from pathlib import Path
 import sys
 
 from cpg_ros.common.errors import CpgError
-from cpg_ros.motion.description import load_urdf
+from cpg_ros.simulation.robot_setup.description_match import walking_faults
+from cpg_ros.simulation.robot_setup.first_robot import robot_from
 from cpg_ros.simulation.robot_setup.leg_chains import legs_in
-from cpg_ros.simulation.robot_setup.model_reading import load_mjcf
+from cpg_ros.simulation.robot_setup.model_reading import load_description
 
 
 def found_in(path: Path) -> list[str]:
-    """Return a line for each leg and for what is held, or the reason why there are no legs."""
+    """Return what each leg's joints do and what is held, or the reason why there is no robot."""
     try:
-        legs = legs_in(load_urdf(path) if path.suffix == '.urdf' else load_mjcf(str(path)))
+        known = load_description(str(path))
+        legs = legs_in(known)
+        robot, notes = robot_from(known, path.stem, legs)
+        faults = walking_faults(robot, known)
     except CpgError as error:
         return [f'refused: {error}']
-    lines = [f'{leg}: {" ".join(legs[leg])}' for leg in legs]
-    lines += legs.explanation.splitlines()
+    lines = [*notes.splitlines(), *(f'refused: {fault}' for fault in faults)]
     return lines + ([f'of no leg: {" ".join(legs.unassigned)}'] if legs.unassigned else [])
 
 

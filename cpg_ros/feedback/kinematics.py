@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
-from cpg_ros.motion.body_file import BodyGeometry
+from cpg_ros.motion.body_file import BodyGeometry, leg_axes
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
@@ -100,14 +100,6 @@ def bend_of(upper: complex, lower: complex, second: float) -> float:
     return 1.0 if np.sin(second + np.angle(lower / upper)) >= 0.0 else -1.0
 
 
-def _axes(yaw: float | None) -> np.ndarray:
-    """Return the axes of a leg's frame: the base's, or those of one whose hip turns about z."""
-    if yaw is None:
-        return np.eye(3)
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.array([[0.0, -s, -c], [0.0, c, -s], [1.0, 0.0, 0.0]])
-
-
 def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
     """Return the geometry of a robot's legs: its file's, or another one.
 
@@ -134,7 +126,7 @@ def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
         leg = body.legs[name]
         own = [joints[joint] for joint in leg.joints]
         columns[k], turns[k, -len(own):] = own if len(own) == 3 else [own[0], *own], leg.turns
-        hips[k], frames[k] = leg.hip, _axes(leg.yaw)
+        hips[k], frames[k] = leg.hip, leg_axes(leg.yaw, leg.roll)
         thighs[k], calf, foot = (np.array(link) @ frames[k]
                                  for link in (leg.thigh, leg.calf, leg.foot))
         # What the links themselves are off sideways belongs to the leg's plane.

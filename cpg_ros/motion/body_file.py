@@ -18,14 +18,16 @@ Part ``geometry`` has the lengths and axes of legs that feedback can displace, `
 gait what the base does by itself in it.
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.common.yaml_reader import plain, positive, quoted, required, YamlReader
-from cpg_ros.motion.description import outward, sprawls
+from cpg_ros.motion.description import LegChain, outward, sprawls
+from cpg_ros.motion.rotations import rotation
 from cpg_ros.networks.library.biped import CELLS
 import numpy as np
 
@@ -216,7 +218,7 @@ def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
 BINS, SPEEDS = 64, 10
 #: LEGS: text for messages on the legs that feedback can displace.
 LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
-        'hip about z, then two about one level axis')
+        'hip about z, then two about one level axis; further joints are held')
 #: SIGNALS: signals of the table: velocities, m/s, rates, rad/s, and angles, rad, of the base in
 #: its own frame.
 SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
@@ -237,6 +239,8 @@ class LegGeometry:
         foot: the middle of the foot, from the calf joint.
         yaw: of a leg whose hip turns about z, the way in which it reaches from there: 0 forward,
             positive to the left, rad.
+        roll: by how much the other joints' axes are turned about x from y, rad, of a leg that is
+            spread where all joints are at 0.
 
     """
 
@@ -247,6 +251,7 @@ class LegGeometry:
     calf: Vector
     foot: Vector
     yaw: float | None = None
+    roll: float | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -281,59 +286,58 @@ class EfferenceTable(ShortRepr):
     rows: dict[str, tuple[tuple[float, ...], ...]]
 
 
-class LegChain(NamedTuple):
-    """A leg as a model of the robot has it, with all joints at 0, in the frame of the base.
-
-    Attributes:
-        joints: names down the leg.
-        axes: of the joints, unit vectors, shape (joints, 3).
-        anchors: points on them, m, the same.
-        foot: the middle of the foot, m, shape (3,).
-        radius: of the foot, m.
-
-    """
-
-    joints: Sequence[str]
-    axes: np.ndarray
-    anchors: np.ndarray
-    foot: np.ndarray
-    radius: float
-
-
-def body_geometry(mass: float, chains: Mapping[str, LegChain]) -> BodyGeometry:
+def body_geometry(mass: float, chains: Mapping[str, LegChain],
+                  stand: Mapping[str, float]) -> BodyGeometry:
     """Return the geometry of a body.
 
-    Legs are left out that are not LEGS.
+    Of a leg with more joints than LEGS the others are held. Legs that are not LEGS are left out.
 
     Args:
         mass: of the robot, kg.
         chains: its legs, by name.
+        stand: angles of their joints, rad, by name.
 
     """
-    legs = {leg: found for leg, chain in chains.items() if (found := _leg_geometry(*chain[:4]))}
+    legs = {}
+    for leg, chain in chains.items():
+        for moved in (*combinations(chain.joints, 3), *combinations(chain.joints, 2)):
+            found = _leg_geometry(chain.holding({name: stand[name] for name in chain.joints
+                                                 if name not in moved}))
+            if found is not None:
+                legs[leg] = found
+                break
     radius = float(np.mean([chains[leg].radius for leg in legs] or 0.0))
     return BodyGeometry(round(mass, 6), round(radius, 6), legs)
 
 
-def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
-                  ) -> LegGeometry | None:
-    if len(joints) not in (2, 3):
-        return None
-    wanted, yaw = np.eye(3)[[0, 1, 1][-len(joints):]], None
+def _leg_geometry(chain: LegChain) -> LegGeometry | None:
+    axes, anchors, yaw, roll = chain.axes, chain.anchors, None, None
     if sprawls(axes):
-        out = outward(axes[1], foot - anchors[0])
+        out = outward(axes[1], chain.foot - anchors[0])
         yaw = round(float(np.arctan2(out[1], out[0])), 6)
-        wanted = np.array([[0.0, 0.0, 1.0], *[[-np.sin(yaw), np.cos(yaw), 0.0]] * 2])
-    turns = np.sign((axes * wanted).sum(axis=1))
-    if np.abs(axes - turns[:, None] * wanted).max() > 0.01:
+    elif len(axes) == 3 and abs(axes[1, 1]) < 1.0 - 1e-6:
+        roll = round(math.atan2(axes[1, 2], axes[1, 1]), 6)
+        roll -= math.copysign(round(math.pi, 6), roll) if axes[1, 1] < 0.0 else 0.0
+    frame = leg_axes(yaw, roll)
+    turns = np.sign((axes * frame.T[[0, 1, 1][-len(axes):]]).sum(axis=1))
+    if (np.abs(axes - turns[:, None] * frame.T[[0, 1, 1][-len(axes):]]).max() > 0.01
+            or min(chain.lengths[-2:]) < 1e-3):
         return None
-    hip, thigh, calf = anchors[[0, 0, 1] if len(joints) == 2 else [0, 1, 2]]
+    hip, thigh, calf = anchors[[0, 0, 1] if len(axes) == 2 else [0, 1, 2]]
 
     def rounded(place: np.ndarray) -> tuple[float, ...]:
         return tuple((np.round(place, 6) + 0.0).tolist())
 
-    return LegGeometry(tuple(joints), tuple(turns.tolist()), rounded(hip), rounded(thigh - hip),
-                       rounded(calf - thigh), rounded(foot - calf), yaw)
+    return LegGeometry(chain.joints, tuple(turns.tolist()), rounded(hip), rounded(thigh - hip),
+                       rounded(calf - thigh), rounded(chain.foot - calf), yaw, roll)
+
+
+def leg_axes(yaw: float | None, roll: float | None) -> np.ndarray:
+    """Return the axes of a leg's frame as columns: the base's, turned, or of a hip about z."""
+    if yaw is None:
+        return rotation((roll or 0.0, 0.0, 0.0))
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([[0.0, -s, -c], [0.0, c, -s], [1.0, 0.0, 0.0]])
 
 
 def read_geometry(reader: YamlReader, tree: Any,
@@ -358,10 +362,8 @@ def _leg(reader: YamlReader, tree: Any, where: str, names: set[str]) -> LegGeome
                    lambda turn: '' if turn in (1.0, -1.0) else f'{turn:g} must be 1 or -1')
     if leg.yaw is not None and len(leg.joints) == 2:
         raise reader.fail(f'{where}.yaw', 'is of a leg of three joints, the first about z')
-    # Level and upward, of what is in the plane of the leg.
-    level = np.array([1.0, 0.0] if leg.yaw is None else [np.cos(leg.yaw), np.sin(leg.yaw)])
     for key, link in (('calf', leg.calf), ('foot', leg.foot)):
-        if np.hypot(level @ link[:2], link[2]) < 1e-9:
+        if np.linalg.norm(link @ leg_axes(leg.yaw, leg.roll)[:, ::2]) < 1e-9:
             raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
     return leg
 

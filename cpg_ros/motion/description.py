@@ -12,12 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Description of a robot by a model file: joints, links and their frames; reader of URDF.
+"""Description of a robot by a model file: joints, links and their frames; reader of URDF."""
 
-``urdf`` reads it from URDF, ``simulation.mjcf_description`` from MJCF.
-"""
-
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -25,18 +22,19 @@ import math
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from cpg_ros.common.errors import CpgError
+from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.common.files import one_line, parse, read_bytes
 from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
-from cpg_ros.motion.rotations import rotation
+from cpg_ros.motion.rotations import rotation, rotation_about
 import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
 #: END: share of the reach of a leg's last link beyond which its points belong to the foot.
 END = 0.97
-#: SLOW: speed limit, rad/s, below which a model's limit is doubted; SERVOS: text for that message.
-SLOW, SERVOS = 5.0, 'hobby servos reach about 5 to 10 rad/s'
+#: SLOW, FASTEST: speed limits, rad/s, below and above which a model's limit is doubted; SERVOS:
+#: text for that message.
+SLOW, FASTEST, SERVOS = 5.0, 100.0, 'hobby servos reach about 5 to 10 rad/s'
 
 
 class DescriptionError(CpgError):
@@ -51,7 +49,7 @@ class JointDescription:
         name: as in the file.
         kind: as URDF has it: revolute, continuous, prismatic, fixed, ...
         lower, upper: limits in rad (m of a prismatic joint), infinite where there are none.
-        velocity: limit in rad/s, infinite where the file gives none or 0.
+        velocity: limit in rad/s, infinite where the file gives none, 0 or more than FASTEST.
         mimic: the joint that it follows, '' for none.
         parent, child: links.
         xyz, rpy: where it is in its parent, m and rad.
@@ -91,24 +89,25 @@ class CollisionShape:
         xyz, rpy: where it is in its link, m and rad.
         size: of a box along x, y and z, m; of a cylinder its two widths and its length; of a mesh
             the factors on its vertices.
-        mesh: file that has the vertices, None for the corners.
+        mesh: vertices, shape (n, 3), or the file that has them; None for the corners.
 
     """
 
     xyz: tuple[float, ...]
     rpy: tuple[float, ...]
     size: tuple[float, ...]
-    mesh: Path | None = None
+    mesh: Path | np.ndarray | None = None
 
     def points(self) -> np.ndarray:
         """Return its corners or vertices in the link's frame, m, shape (points, 3).
 
         A mesh that cannot be read has none: who draws or simulates it reports that.
         """
-        corners = np.array(list(product((-0.5, 0.5), repeat=3)))
-        if self.mesh is not None:
+        corners = (np.array(list(product((-0.5, 0.5), repeat=3))) if self.mesh is None
+                   else self.mesh)
+        if isinstance(corners, Path):
             try:
-                corners = read_mesh(self.mesh).points
+                corners = read_mesh(corners).points
             except MeshError:
                 return np.empty((0, 3))
         return self.xyz + corners * self.size @ rotation(self.rpy).T
@@ -139,7 +138,7 @@ class RobotDescription:
     Attributes:
         format: URDF or MJCF, for messages.
         joints: by name.
-        links: by name; of URDF only.
+        links: by name.
 
     """
 
@@ -200,32 +199,95 @@ class RobotDescription:
             raise DescriptionError(f"the joint '{name}' has no axis to turn about")
         return axis / length
 
+    def leg(self, names: Iterable[str]) -> 'LegChain':
+        """Return a leg by the names of its joints, in any order; errors as of ``direction``."""
+        joints = sorted(names, key=lambda name: len(self.chain(name)))
+        return LegChain(tuple(joints), np.array([self.direction(name) for name in joints]),
+                        np.array([self.frame(name)[0] for name in joints]),
+                        *self.foot_below(joints[-1]))
+
     def foot_below(self, last: str) -> tuple[np.ndarray, float]:
         """Return the middle of the foot below a leg's last joint, m, (3,), and its radius, m.
 
         It is the furthest sphere of what that joint moves with all others at 0, or else the
         middle of the end of shapes and frames, which has no radius.
         """
-        begin, axes = self.frame(last)
-        found = [(begin, axes, self.joints[last].child)]
-        for place, turned, link in found:
-            found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
-                      for joint in self.joints.values()
-                      if joint.parent == link]
-        there = [(place, turned, self.links[link]) for place, turned, link in found
-                 if link in self.links]
-        balls = [(place + turned @ link.centre, link.radius) for place, turned, link in there
+        begin = self.frame(last)[0]
+        below = self._below(last)
+        balls = [(place + turned @ link.centre, link.radius) for place, turned, link in below
                  if link.radius]
         if balls:
             return max(balls, key=lambda ball: float(np.linalg.norm(ball[0] - begin)))
-        points = np.concatenate([np.array([place for place, _, _ in found]), *(
-            place + shape.points() @ turned.T for place, turned, link in there
-            for shape in link.shapes)])
+        points = np.concatenate([np.array([place for place, _, _ in below]), self.shapes(last)])
         reach = points - begin
         furthest = reach[np.linalg.norm(reach, axis=1).argmax()]
         along = reach @ furthest
         end = points[along >= END * along.max()]
         return 0.5 * (end.min(axis=0) + end.max(axis=0)), 0.0
+
+    def shapes(self, last: str) -> np.ndarray:
+        """Return points of the shapes below a joint with all joints at 0, m, shape (n, 3)."""
+        return np.concatenate([np.empty((0, 3)), *(
+            place + shape.points() @ turned.T for place, turned, link in self._below(last)
+            for shape in link.shapes)])
+
+    def _below(self, last: str) -> list[tuple[np.ndarray, np.ndarray, LinkDescription]]:
+        """Return place, axes and link of everything that a joint moves with all others at 0."""
+        found = [(*self.frame(last), self.joints[last].child)]
+        for place, turned, link in found:
+            found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
+                      for joint in self.joints.values() if joint.parent == link]
+        return [(place, turned, self.links.get(link, LinkDescription()))
+                for place, turned, link in found]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LegChain(ShortRepr):
+    """A leg with all joints at 0, in the frame of the root.
+
+    Attributes:
+        joints: names, outwards.
+        axes: of the joints, unit vectors, shape (joints, 3).
+        anchors: points on them, m, the same.
+        foot: the middle of the foot, m, shape (3,).
+        radius: of the foot, m.
+
+    """
+
+    joints: tuple[str, ...]
+    axes: np.ndarray
+    anchors: np.ndarray
+    foot: np.ndarray
+    radius: float = 0.0
+
+    @property
+    def lengths(self) -> np.ndarray:
+        """From each joint to the next, and to the foot, m, shape (joints,)."""
+        return np.linalg.norm(np.diff([*self.anchors, self.foot], axis=0), axis=1)
+
+    def posed(self, angles: Sequence[float] | np.ndarray
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the leg with joints at angles, rad.
+
+        Returns:
+            Axes, shape (joints, 3), anchors and the foot, m, shape (joints + 1, 3), and what
+            turns vectors of the last link as they are at 0, shape (3, 3).
+
+        """
+        turn, axes, points = np.eye(3), np.empty_like(self.axes), [self.anchors[0]]
+        links = np.diff([*self.anchors, self.foot], axis=0)
+        for k, angle in enumerate(angles):
+            axes[k] = turn @ self.axes[k]
+            turn = turn @ rotation_about(self.axes[k], float(angle))
+            points.append(points[-1] + turn @ links[k])
+        return axes, np.array(points), turn
+
+    def holding(self, angles: Mapping[str, float]) -> 'LegChain':
+        """Return the leg of its other joints where some are held at angles, rad."""
+        axes, points, _ = self.posed([angles.get(name, 0.0) for name in self.joints])
+        rest = [k for k, name in enumerate(self.joints) if name not in angles]
+        return LegChain(tuple(self.joints[k] for k in rest), axes[rest], points[rest],
+                        points[-1], self.radius)
 
 
 # URDF files: joints with their limits and places, links with their masses and feet.
@@ -377,11 +439,13 @@ def _joint(element: Element, source: str) -> JointDescription:
     bounded = kind in ('revolute', 'prismatic')
     if bounded and 'limit' not in parts:
         raise _error(source, f"the joint '{name}' is {kind}, but has no <limit>")
+    # As programs write them that know no limits.
+    bounded &= lower != 0.0 or upper != 0.0
     return JointDescription(
         name, kind, lower if bounded else -math.inf, upper if bounded else math.inf,
-        abs(velocity) if velocity else math.inf, text('mimic', 'joint'), text('parent', 'link'),
-        text('child', 'link'), read('origin', 'xyz', '0 0 0'), read('origin', 'rpy', '0 0 0'),
-        read('axis', 'xyz', '1 0 0'))
+        abs(velocity) if 0.0 < abs(velocity) <= FASTEST else math.inf, text('mimic', 'joint'),
+        text('parent', 'link'), text('child', 'link'), read('origin', 'xyz', '0 0 0'),
+        read('origin', 'rpy', '0 0 0'), read('axis', 'xyz', '1 0 0'))
 
 
 def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
@@ -391,7 +455,8 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     shapes: list[CollisionShape] = []
     for part in element.iterfind('inertial/mass'):
         mass = sum(numbers(part.get('value', ''), 1))
-    for collision in element.iterfind('collision'):
+    # Where nothing collides, what is seen tells where a link ends.
+    for collision in element.findall('collision') or element.findall('visual'):
         origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
         place = {} if origin is None else origin.attrib
         if sphere is not None and not radius:
@@ -417,12 +482,10 @@ def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float
                         find_mesh(mesh.get('filename', ''), path, folder))
 
 
-# Legs that reach to the side, as those of insects: which they are, and how they stand at first.
+# Legs that reach to the side, as those of insects.
 
 #: ACROSS: component of the femur's axis across the body from which on it swings the leg forward.
 ACROSS = 0.9
-#: Angles of a first stand, rad. RAISED: femur above level; LOWERED: tibia below level.
-RAISED, LOWERED = 0.4, 1.3
 
 
 def sprawls(axes: np.ndarray) -> bool:
@@ -449,26 +512,3 @@ def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """
     out = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])
     return out if out @ reach[:2] >= 0.0 else -out
-
-
-def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return a stand with the foot out to the side and below, and the roles of the joints.
-
-    Args:
-        places: of coxa, femur, tibia and foot with all joints at 0, m, shape (4, 3).
-        axes: of the joints, unit vectors, shape (3, 3).
-
-    Returns:
-        Angles of coxa, femur and tibia, rad, the coxa's 0; then 1 or -1 by whether positive
-        angles of the coxa take the foot forward, and of femur and tibia upward.
-
-    """
-    out = outward(axes[1], places[3] - places[0])
-    # As complex numbers out + i up; turns of femur and tibia by what they do to out.
-    upper, lower = np.diff(places[1:, :2] @ out + 1j * places[1:, 2])
-    turns = np.sign(np.cross(axes[1:], [*out, 0.0])[:, 2])
-    femur = RAISED - np.angle(upper)
-    tibia = -LOWERED - np.angle(lower) - femur
-    angles = (np.array([0.0, turns[0] * femur, turns[1] * tibia]) + math.pi) % (2.0 * math.pi)
-    forward = -math.copysign(1.0, axes[0, 2] * out[1])
-    return angles - math.pi, np.array([forward, *turns])

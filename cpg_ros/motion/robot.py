@@ -111,6 +111,7 @@ class Motion(ShortRepr):
         joints: by name.
         steering: None if it has not been measured.
         duty: share of the stride that legs are to stand, None for what they do by themselves.
+        verdict: of a trial in simulation, which begins with good or poor; '' if there was none.
         stance: phase of a leg's cell at which it begins to stand by the weights there are, and
             for which share of the stride, cycles; None if it stands while its cell falls.
         efference: what the base does by itself, None if it has not been measured.
@@ -123,6 +124,7 @@ class Motion(ShortRepr):
     efference: EfferenceTable | None = None
     duty: Annotated[float | None, within(0.3, 0.9, '0.3 to 0.9')] = None
     stance: tuple[float, float] | None = None
+    verdict: str = ''
 
 
 @dataclass(frozen=True, repr=False)

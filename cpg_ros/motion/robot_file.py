@@ -283,5 +283,5 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
 
 def _motion_tree(motion: Motion) -> dict[str, Any]:
     tree = {**plain(motion), 'efference': motion.efference and efference_tree(motion.efference)}
-    return {key: tree[key] for key in ('frequency', 'duty', 'stance', 'joints', 'steering',
-                                       'efference') if tree.get(key) is not None}
+    return {key: tree[key] for key in ('verdict', 'frequency', 'duty', 'stance', 'joints',
+                                       'steering', 'efference') if tree.get(key)}

@@ -35,6 +35,13 @@ def rotation(rpy: tuple[float, ...]) -> np.ndarray:
     return out
 
 
+def rotation_about(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the matrix that turns about a unit axis by an angle, rad, shape (3, 3)."""
+    (x, y, z), c, s = axis, math.cos(angle), math.sin(angle)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return c * np.eye(3) + s * cross + (1.0 - c) * np.outer(axis, axis)
+
+
 def fill_quaternion(roll: float, pitch: float, yaw: float, out: np.ndarray) -> None:
     """Fill an orientation, w x y z, from its angles, rad."""
     roll, pitch, yaw = 0.5 * roll, 0.5 * pitch, 0.5 * yaw

@@ -33,11 +33,11 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.simulation.bodies import BatchPhysics
 from cpg_ros.simulation.body import Body, FALLEN
+from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 from cpg_ros.simulation.run_metrics import BEGINNING, cost_of_transport, motor_power, torques
 from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground
-from cpg_ros.simulation.tuning.foot_path import read_geometry
 import numpy as np
 
 # The patterns of many runs: ramped in, steered, switched, corrected, held to limits.
@@ -150,7 +150,7 @@ class ClosedLoopBatch(BatchPhysics):
         super().__init__(Body(name, self._robot, kp, kd, timestep, add_ground), threads)
         self.plans = {plan.name: plan for plan in plans}
         self.geometry = geometry_of(self._robot, self._robot.geometry
-                                    or read_geometry(self.body, self.parts))
+                                    or geometry_from(self._robot, load_description(name)))
 
     @property
     def plan(self) -> GaitPlan:

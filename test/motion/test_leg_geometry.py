@@ -59,12 +59,14 @@ def test_a_displaced_foot_of_the_made_robot_arrives(tmp_path):
 
 
 def test_a_leg_that_feedback_cannot_move_is_named_and_stays(tmp_path, capsys):
-    """Its hip turns about z, and its foot is below that."""
+    """Its thigh and calf are askew to the hip."""
     text = URDF.read_text()
-    at = text.index('<joint name="lh_hip_joint"')
-    begin = text.index('<axis', at)
-    end = text.index('/>', begin)
-    (tmp_path / 'other.urdf').write_text(text[:begin] + '<axis xyz="0 0 1"' + text[end:])
+    for name, axis in (('thigh', '0.1 0.995 0'), ('calf', '0.1 0.995 0')):
+        at = text.index(f'<joint name="lh_{name}_joint"')
+        begin = text.index('<axis', at)
+        end = text.index('/>', begin)
+        text = text[:begin] + f'<axis xyz="{axis}"' + text[end:]
+    (tmp_path / 'other.urdf').write_text(text)
     robot = made(tmp_path, tmp_path / 'other.urdf')
     assert 'feedback moves no foot of lh' in capsys.readouterr().err
     assert set(robot.geometry.legs) == {'rh', 'lf', 'rf'}

@@ -26,8 +26,9 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot, read_robot, write_robot
 from cpg_ros.networks.registry import find_network
-from cpg_ros.simulation.robot_setup.check_robot import main, robot_from
+from cpg_ros.simulation.robot_setup.check_robot import main
 from cpg_ros.simulation.robot_setup.description_match import checked
+from cpg_ros.simulation.robot_setup.first_robot import robot_from
 from cpg_ros.simulation.robot_setup.leg_chains import legs_in
 import numpy as np
 import pytest
@@ -118,7 +119,7 @@ def test_a_robot_file_is_made_from_a_urdf_of_six_legs(tmp_path):
     # Legs that swing about y, as those of quadrupeds do.
     path.write_text(text.replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"').replace(
         'axis xyz="0 0 -1"', 'axis xyz="0 1 0"'))
-    robot, says = robot_from(known := load_urdf(path), 'six', {}.get, legs_in(known))
+    robot, says = robot_from(known := load_urdf(path), 'six', legs_in(known))
     assert robot.networks[0] == 'delayed6' and len(robot.joints) == 18
     assert 'lm_coxa_joint swings' in says
     write_robot(tmp_path / 'six.yaml', robot)

@@ -22,10 +22,17 @@ LEGS = ('lh', 'rh', 'lf', 'rf')
 
 
 def joint_of(name, kind='revolute', limit='lower="-1" upper="1" velocity="20"', axis='0 1 0',
-             parent='base', more=''):
+             parent='base', more='', at='0 0 0', shape=''):
+    if 'origin' not in more:
+        more += f'<origin xyz="{at}"/>'
     return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_l"/>'
             f'<axis xyz="{axis}"/><limit effort="1" {limit}/>{more}</joint>'
-            f'<link name="{name}_l"/>')
+            f'<link name="{name}_l">{shape}</link>')
+
+
+def foot_at(below, kind='sphere radius=".02"'):
+    """Return a shape that collides, so far below its link's frame, m."""
+    return (f'<collision><origin xyz="0 0 {-below}"/><geometry><{kind}/></geometry></collision>')
 
 
 def robot_of(*joints):
@@ -37,21 +44,29 @@ def quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="20"', axis='0 1 0',
                    roll='1 0 0'):
     """Return a quadruped named as Unitree does, calves given before thighs."""
     joints = []
-    for leg in ('FL', 'FR', 'RL', 'RR'):
+    for leg, (x, y) in {'FL': (0.3, 0.1), 'FR': (0.3, -0.1), 'RL': (-0.3, 0.1),
+                        'RR': (-0.3, -0.1)}.items():
         joints += [joint_of(f'{leg}_calf_joint', limit=calf, axis=axis,
-                            parent=f'{leg}_thigh_joint_l'),
+                            parent=f'{leg}_thigh_joint_l', at='0 0 -1', shape=foot_at(1.0)),
                    joint_of(f'{leg}_thigh_joint', limit=thigh, axis=axis,
                             parent=f'{leg}_hip_joint_l'),
                    joint_of(f'{leg}_hip_joint', limit=hip, axis=roll,
-                            more=f'<origin rpy="{rpy}"/>')]
+                            more=f'<origin xyz="{x} {y} 0" rpy="{rpy}"/>')]
     return robot_of(*joints, joint_of('neck_joint'))
 
 
 def biped_of(left, right, *more):
     """Return a URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
     joints = []
-    for side in (left, right):
-        for name, parent in (('HIP_P', ''), ('KNEE', 'HIP_P'), ('ANKLE_P', 'KNEE')):
-            joints.append(joint_of(f'{side}_{name}', limit='lower="-2" upper="2" velocity="20"',
-                                   parent=f'{side}_{parent}_l' if parent else 'base'))
-    return robot_of(*joints, *(joint_of(name, axis='1 0 0') for name in more))
+    for side, y in ((left, 0.1), (right, -0.1)):
+        parent = ''
+        for name, axis, at in (('HIP_Y', '0 0 1', f'0 {y} 0'), ('HIP_P', '0 1 0', '0 0 0'),
+                               ('KNEE', '0 1 0', '0 0 -.3'), ('ANKLE_P', '0 1 0', '0 0 -.3'),
+                               ('ANKLE_R', '1 0 0', '0 0 0')):
+            joints.append(joint_of(
+                f'{side}_{name}', limit='lower="-2" upper="2" velocity="20"', axis=axis, at=at,
+                parent=f'{side}_{parent}_l' if parent else 'base',
+                shape=foot_at(0.05, 'box size=".2 .1 .02"') if name == 'ANKLE_R' else ''))
+            parent = name
+    return robot_of(*joints, *(joint_of(name, axis='1 0 0', parent=parent, at='0 0 -.02')
+                               for name, parent in more))

@@ -143,12 +143,11 @@ def role_of(name: str) -> str:
     return ' '.join(word for word in words if word not in words_used)
 
 
-def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
+def legs_of(joints: Sequence[str]) -> Legs:
     """Guess the legs of joints from their names.
 
     Args:
         joints: names.
-        whole: these are all that the robot has, so that one with FL and FR alone is a biped.
 
     Raises:
         LegsError: no leg, or not all of two, four or six legs can be identified, or they are of
@@ -171,9 +170,6 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
                             and not others & set(_moved(words[name]))) for leg in known}
         there = [leg for leg in known if found[leg]]
         if len(there) == len(known):
-            break
-        if whole and column == 0 and [leg[0] for leg in sorted(there)] == ['l', 'r']:
-            found = dict(zip(BIPED, (found[leg] for leg in sorted(there)), strict=True))
             break
         # Two codes may be left and right of a biped by chance, three are a quadruped's.
         if column == 0 and len(there) >= 2 and not _directions(there, read, joints):

@@ -342,6 +342,10 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
         _tune(args, steps, (file, tuned), gaits)
     robot = load_robot(str(tuned))
     gaits, steered = _ranked(robot.motions)
+    say('gaits, best first: ' + ', '.join(
+        f'{gait} ({robot.motions[gait].verdict or "not judged"})' for gait in gaits))
+    if robot.motions[gaits[0]].verdict.startswith('poor'):
+        say(f'no gait is good: the robot begins with the {gaits[0]}, which is poor')
     return DemoRobot(str(tuned.absolute()), source[1], name, gaits, steered,
                      unjudged=robot.feedback is None)
 
@@ -380,8 +384,9 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
 
 
 def _ranked(motions: dict[str, Motion]) -> tuple[tuple[str, ...], bool]:
-    """Return gaits, those that go fastest when steered first, and whether the first can be."""
+    """Return gaits, good ones first, then by speed, and whether the first can be steered."""
     fastest = {gait: motion.steering.speed[-1] if motion.steering is not None else 0.0
                for gait, motion in motions.items()}
-    gaits = sorted(fastest, key=lambda gait: -fastest[gait])
+    gaits = sorted(fastest, key=lambda gait: (motions[gait].verdict.startswith('poor'),
+                                              -fastest[gait]))
     return tuple(gaits), bool(gaits) and fastest[gaits[0]] > 0.0

@@ -14,5 +14,5 @@
 
 """Robot files from descriptions: templates, checks and calibration."""
 
-__all__ = ['calibrate', 'check_robot', 'description_match', 'geometry_match', 'leg_chains',
+__all__ = ['calibrate', 'check_robot', 'description_match', 'first_robot', 'leg_chains',
            'model_reading', 'walk_recording']

@@ -12,9 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Comparison of a robot file with the robot's description: names, kinds, limits, shape, gaits."""
+"""Comparison of a robot file with the robot's description: names, kinds, limits, shape, gaits.
 
-from collections.abc import Iterator, Mapping, Sequence
+Legs are compared by forward kinematics: on which side they are, where the feet are in the stand,
+and which way they move while they are low.
+"""
+
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -23,55 +27,36 @@ from math import inf, nan
 from typing import Any
 
 from cpg_ros.common.command_line import table
-from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError, role_of
-from cpg_ros.motion.body_file import body_geometry, BodyGeometry, LegChain, LEGS
-from cpg_ros.motion.description import JointDescription, RobotDescription, SERVOS, SLOW
-from cpg_ros.motion.plan import plan_gait, PlanError
-from cpg_ros.motion.robot import Joint, Motion, Robot
-from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.simulation.robot_setup.geometry_match import (
-    differing,
-    FORWARD_GAITS,
-    implausible,
-    walks_backward,
+from cpg_ros.motion.body_file import BodyGeometry, LegGeometry
+from cpg_ros.motion.description import (
+    JointDescription,
+    LegChain,
+    RobotDescription,
+    SERVOS,
+    SLOW,
 )
+from cpg_ros.motion.plan import GaitPlan, plan_gait, PlanError
+from cpg_ros.motion.robot import Joint, Motion, Robot
+from cpg_ros.networks.leg_numbers import GIRDLES
+from cpg_ros.networks.registry import NETWORKS
 import numpy as np
-
-# The part ``geometry`` of a first robot file, from the robot's description.
-
-def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
-    """Return a robot's geometry, with those of its legs that feedback can displace."""
-    chains = {}
-    for leg, joints in robot.legs.items():
-        names = sorted((joint.name for joint in joints), key=lambda one: len(known.chain(one)))
-        foot, radius = known.foot_below(names[-1])
-        places = np.array([known.frame(name)[0] for name in names])
-        if np.linalg.norm(foot - places[-1]) <= 1e-3:
-            continue
-        axes = np.array([known.direction(name) for name in names])
-        chains[leg] = LegChain(names, axes, places, foot, radius)
-    return body_geometry(sum(link.mass for link in known.links.values()), chains)
-
-
-def usable(robot: Robot, found: BodyGeometry, what: str) -> tuple[BodyGeometry | None, str]:
-    """Return the geometry, None where it is of no use, and which legs feedback can displace.
-
-    Args:
-        robot: with all its legs.
-        found: its geometry.
-        what: format of the file that this is from.
-
-    """
-    if not found.legs or found.mass <= 0.0:
-        return None, (f'feedback: the {what} gives no mass' if found.legs else
-                      f'feedback: no leg is {LEGS}')
-    others = [leg for leg in robot.legs if leg not in found.legs]
-    return found, 'feedback can move all feet' if not others else (
-        f'feedback moves no foot of {", ".join(others)}: a leg must be {LEGS}')
-
 
 #: ROUNDING: difference of limits, rad or rad/s, that is ignored, as files have rounded limits.
 ROUNDING = 1e-4
+#: Differences of lengths that are ignored. LENGTH_SHARE: by the length; LENGTH: m.
+LENGTH_SHARE, LENGTH = 0.05, 0.003
+#: MASS_RATIO: ratio of masses up to which they agree.
+MASS_RATIO = 1.25
+#: LONGEST_LEG: length of the longest leg of a robot, m; DENSITIES: least and largest mass over the
+#: cube of the longest leg, kg/m^3 (of robots 50 to 600).
+LONGEST_LEG, DENSITIES = 5.0, (5.0, 6000.0)
+#: FORWARD: share of a stride by which a foot must go the wrong way; LEAST: least way of a foot,
+#: over the leg's length.
+FORWARD, LEAST = 0.25, 0.002
+#: LEVEL: largest tilt of a sole in the stand, rad.
+LEVEL = 0.1
+#: FORWARD_GAITS: gaits in which a robot walks forward, with alternating legs.
+FORWARD_GAITS = ('walk', 'trot', 'pace', 'tripod', 'run')
 #: USUAL_FREQUENCY: default stride frequency, Hz.
 USUAL_FREQUENCY = 1.0
 
@@ -213,30 +198,148 @@ def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
 
 def _shape(robot: Robot, known: RobotDescription, gaits: Sequence[tuple[str, str]],
            geometry: BodyGeometry | None) -> Iterator[str]:
-    """Say what is wrong with lengths, masses and senses of rotation."""
-    yield from implausible(robot, known)
+    """Say what is wrong with lengths, masses, sides, the stand and the steps."""
+    yield from _implausible(robot, known)
     if robot.geometry is not None and geometry is not None:
-        yield from differing(robot.geometry, geometry, known.format)
-    for network, name in gaits:
+        yield from _differing(robot.geometry, geometry, known.format)
+    yield from walking_faults(robot, known, gaits)
+
+
+def walking_faults(robot: Robot, known: RobotDescription,
+                   gaits: Sequence[tuple[str, str]] = ()) -> list[str]:
+    """Say by forward kinematics why a robot does not stand or walk forward.
+
+    Args:
+        robot: what a robot file says.
+        known: the description.
+        gaits: networks and their presets, of which the first that goes forward is looked at;
+            none for all gaits of the robot's first network.
+
+    """
+    own = robot.networks[0]
+    faults = list(_misplaced(robot, known))
+    for network, name in gaits or [(own, gait) for gait in NETWORKS[own].gaits()]:
         if NETWORKS[network].presets()[name].gait in FORWARD_GAITS:
             with suppress(PlanError):    # which the gait's own check reports
-                yield from walks_backward(robot, known, plan_gait(
-                    unlimited(robot), name, USUAL_FREQUENCY, network=network))
-                return
+                return faults + list(_missteps(robot, known, plan_gait(
+                    unlimited(robot), name, USUAL_FREQUENCY, network=network)))
+    return faults
+
+
+def _chains(robot: Robot, known: RobotDescription) -> dict[str, LegChain]:
+    """Return the legs whose joints and foot the description has."""
+    found = {}
+    for leg, joints in robot.legs.items():
+        if all(joint.name in known.joints and not known.joints[joint.name].flaw
+               for joint in joints):
+            chain = known.leg(joint.name for joint in joints)
+            if chain.lengths[-1] > 0.0:
+                found[leg] = chain
+    return found
 
 
 def _lopsided(robot: Robot) -> Iterator[str]:
-    """Say which legs have joints that those of the other side do not have."""
+    """Say which legs have fewer joints than those of the other side."""
     for left, right in combinations(robot.legs, 2):
         sides = [robot.sides.get(leg) for leg in (left, right)]
-        if (len(robot.legs[left]) == len(robot.legs[right]) or None in sides
-                or sides[0] == sides[1] or robot.girdles.get(left) != robot.girdles.get(right)):
-            continue
         fewer, more = sorted((left, right), key=lambda leg: len(robot.legs[leg]))
-        known = {role_of(joint.name) for joint in robot.legs[fewer]}
-        alone = [joint.name for joint in robot.legs[more] if role_of(joint.name) not in known]
-        yield (f'{fewer}: has {len(robot.legs[fewer])} joints and {more} '
-               f'{len(robot.legs[more])}, none there like {", ".join(alone) or "the rest"}')
+        if (len(robot.legs[left]) != len(robot.legs[right]) and None not in sides
+                and sides[0] != sides[1] and robot.girdles.get(left) == robot.girdles.get(right)):
+            yield (f'{fewer}: has {len(robot.legs[fewer])} joints and {more} '
+                   f'{len(robot.legs[more])}')
+
+
+def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
+    """Say which legs are on another side or end than the file says, and which do not stand."""
+    chains, what = _chains(robot, known), known.format
+    for one, other in combinations(chains, 2):
+        x, y, _ = chains[one].anchors[0] - chains[other].anchors[0]
+        sides, girdles = ([places.get(leg) for leg in (one, other)]
+                          for places in (robot.sides, robot.girdles))
+        if girdles[0] == girdles[1] and sides[0] != sides[1] and y * (
+                1.0 if sides[0] == 'left' else -1.0) < 0.0:
+            yield f'{one} is at the {sides[1]} of {other} in the {what}'
+        order = [GIRDLES.index(girdle) if girdle in GIRDLES else 0 for girdle in girdles]
+        if sides[0] == sides[1] and order[0] != order[1] and x * (order[1] - order[0]) < 0.0:
+            yield f'{one} is {"behind" if x < 0.0 else "ahead of"} {other} in the {what}'
+    stand = {joint.name: joint.offset for joint in robot.joints}
+    for leg, chain in chains.items():
+        _, points, turn = chain.posed([stand[name] for name in chain.joints])
+        high = float(points[-1, 2] - points[:-1, 2].min())
+        if high > 0.0:
+            yield (f'{leg}: in the stand its foot is {high:.3g} m above its lowest joint: its '
+                   f"joints' limits, axes or offsets do not let it stand")
+        tilt = float(np.arccos(np.clip(turn[2, 2], -1.0, 1.0)))
+        if len(robot.legs) == 2 and len(chain.joints) > 4 and tilt > LEVEL:
+            yield (f'{leg}: in the stand its sole is {tilt:.2g} rad off level, if it is level '
+                   'with all joints at 0')
+
+
+def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator[str]:
+    """Say which feet move forward while they are low, or hardly move, in a gait forward."""
+    names = [joint.name for joint in robot.joints]
+    readout, count = gait.readout, 64
+    phases, points = np.arange(count) / count, readout.angles.shape[1]
+    offsets = robot.column('offset') + gait.shift
+    angles = {name: offsets[k] + np.interp(
+        phases + gait.orbit.phases[robot.cells[k]], np.arange(points) / points,
+        readout.angles[k], period=1.0) for k, name in enumerate(names)}
+    for leg, chain in _chains(robot, known).items():
+        path = np.array([chain.posed([angles[name][k] for name in chain.joints])[1][-1]
+                         for k in range(count)])
+        steps = np.roll(path[:, 0], -1) - path[:, 0]
+        height = path[:, 2] + 0.5 * (np.roll(path[:, 2], -1) - path[:, 2])
+        low = height < np.median(height)
+        stride, lift = float(np.ptp(path[:, 0])), float(np.ptp(path[:, 2]))
+        if lift > 0.02 * stride and steps[low].sum() > FORWARD * stride > 0.0:
+            yield (f'{leg}: its foot moves forward while it is low in the {gait.name}, so that '
+                   f'the robot walks backward: are the axes of the {known.format} turned the '
+                   'other way?')
+        elif min(lift, stride) < LEAST * sum(chain.lengths):
+            yield (f'{leg}: its foot moves by {1e3 * stride:.2g} mm forward and '
+                   f'{1e3 * lift:.2g} mm upward only in the {gait.name}')
+
+
+def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
+    """Say which lengths and masses of a description no walking robot has."""
+    legs, what = _chains(robot, known), known.format
+    longest = max((float(sum(chain.lengths)) for chain in legs.values()), default=0.0)
+    for leg, chain in legs.items():
+        if sum(chain.lengths) > LONGEST_LEG:
+            k = int(np.argmax(chain.lengths))
+            yield (f'{leg}: the link below {chain.joints[k]} is {chain.lengths[k]:.4g} m long in '
+                   f'the {what}: are its lengths in mm?')
+    mass = sum(link.mass for link in known.links.values())
+    if legs and mass > 0.0 and 0.0 < longest <= LONGEST_LEG:
+        density = mass / longest**3
+        if not DENSITIES[0] <= density <= DENSITIES[1]:
+            yield (f'the {what} has a mass of {mass:.3g} kg with legs of {longest:.3g} m, which '
+                   'no walking robot has')
+
+
+def _differing(stated: BodyGeometry, found: BodyGeometry, what: str) -> Iterator[str]:
+    """Say where the geometry of a robot file is not the description's; what is its format."""
+    if found.mass > 0.0 and not 1.0 / MASS_RATIO <= stated.mass / found.mass <= MASS_RATIO:
+        yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {found.mass:.4g} kg"
+    for leg, own in stated.legs.items():
+        other = found.legs.get(leg)
+        if other is not None:
+            yield from (f'geometry.legs.{leg}.{fault}' for fault in _leg_faults(own, other, what))
+
+
+def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str]:
+    if set(own.joints) == set(other.joints) and own.joints != other.joints:
+        yield f"joints: {', '.join(own.joints)} come in the {what} as {', '.join(other.joints)}"
+        return
+    for name, turn, described in zip(own.joints, own.turns, other.turns, strict=False):
+        if turn != described:
+            yield (f'turns: {name} turns the other way in the {what}: {turn:g} where it has '
+                   f'{described:g}')
+    for key in ('hip', 'thigh', 'calf', 'foot'):
+        mine, theirs = np.array(getattr(own, key)), np.array(getattr(other, key))
+        room = LENGTH + LENGTH_SHARE * float(np.linalg.norm(theirs))
+        if (off := float(np.linalg.norm(mine - theirs))) > room:
+            yield f"{key}: {mine.tolist()} m is {off:.4g} m from the {what}'s {theirs.tolist()}"
 
 
 def _faults(joint: Joint, known: RobotDescription, near: str) -> Iterator[str]:
@@ -308,23 +411,10 @@ def _fastest(motion: Motion) -> float:
 def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
     """Return for joints that the description does not have the likeliest of those it has."""
     there = {joint.name for joint in robot.joints}
-    able = [name for name, joint in described.joints.items() if not joint.flaw]
-    free = [name for name in able if name not in there]
-    try:
-        legs: Mapping[str, Sequence[str]] = legs_of(able, True).joints
-    except LegsError:
-        legs = {}
-    near = {}
-    for joint in robot.joints:
-        # The same joint of another leg is spelt like it, too: the robot file knows the leg.
-        same = {role_of(name): name for name in legs.get(joint.leg, ()) if name in free}
-        wanted, known = ((role_of(joint.name), same) if same else
-                         (joint.name.lower(), {name.lower(): name for name in free}))
-        likely = get_close_matches(wanted, list(known),
-                                   1) or (list(same) if len(same) == 1 else [])
-        if likely:
-            near[joint.name] = known[likely[0]]
-    return near
+    free = {name.lower(): name for name, joint in described.joints.items()
+            if not joint.flaw and name not in there}
+    return {joint.name: free[near] for joint in robot.joints
+            for near in get_close_matches(joint.name.lower(), list(free), 1)}
 
 
 def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:

@@ -19,14 +19,12 @@ are found from these alone. Names decide only which way a robot faces and what i
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
 
-from cpg_ros.common.errors import ShortRepr
-from cpg_ros.fitting.gaits.leg_names import Legs, legs_of, LegsError, no_leg, place_of, UPPER
+from cpg_ros.fitting.gaits.leg_names import Legs, LegsError, no_leg, place_of, UPPER
 from cpg_ros.motion.description import (
     DescriptionError,
     JointDescription,
+    LegChain,
     RobotDescription,
     sprawls,
     TURNING,
@@ -47,29 +45,17 @@ UNLIKE = 0.2
 SHORTER, HIGHER = 0.35, 0.4
 #: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
 CROSSWISE = 1.3
+#: MOST_JOINTS: largest number of driven joints of a leg.
+MOST_JOINTS = 6
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Chain(ShortRepr):
-    """Joints of a limb, outwards; where its first one is, m, and its stretched length, m."""
-
-    joints: tuple[str, ...]
-    anchor: np.ndarray
-    length: float
-
-    @property
-    def bottom(self) -> float:
-        """How low it could reach, m."""
-        return float(self.anchor[2]) - self.length
-
-
-def legs_in(known: RobotDescription, forward: str = '',
+def legs_in(known: RobotDescription, faces_x: bool = False,
             given: Mapping[str, str] | None = None) -> Legs:
     """Find the legs of a robot; the explanation has a line for each thing that is held.
 
     Args:
         known: the description.
-        forward: the direction in which it faces, of FACING; '' to find it out.
+        faces_x: whether x is forward, whatever names and axes say.
         given: leg -> text that the names of its joints contain, of all legs; none to find them.
 
     Raises:
@@ -81,34 +67,24 @@ def legs_in(known: RobotDescription, forward: str = '',
         return _cleaned(known, _named(known, given))
     paths = _paths(known)
     crosswise = _crosswise(known, paths)
-    turns = (FACING.index(forward),) if forward else (1, 3) if crosswise else (0, 2)
+    turns = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
     found = {turn: legs for turn in turns if (legs := _assigned(known, paths, turn))}
-    if crosswise and not forward and (legs := _assigned(known, paths, 0)) and all(
+    if crosswise and not faces_x and (legs := _assigned(known, paths, 0)) and all(
             place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
         found = {0: legs}
     if not found:
-        names = [joint.name for joint in known.joints.values() if not joint.flaw]
-        places = [known.frame(name)[0] for name in names] or [np.zeros(3)]
-        if np.ptp(places, axis=0).max() < 1e-6:
-            # Nothing has a place: only names are left.
-            return legs_of(names, True)
-        raise LegsError(
-            f'no legs are found among {", ".join(names[:6])} ...: no two limbs of two or more '
-            'joints that reach down are mirror images of each other; --legs LEG=TEXT ... states a '
-            "part of the joints' names of each leg")
-    fitting = [turn for turn in found if forward or not _misnamed(found[turn])]
+        raise LegsError(_question(known, paths))
+    fitting = [turn for turn in found if faces_x or not _misnamed(found[turn])]
     if not fitting:
         raise LegsError(_contradiction(known, next(iter(found.values()))))
-    turn = fitting[0]
-    if turn:
+    if fitting[0]:
         ways = ' or '.join(FACING[turn] for turn in fitting)
         raise LegsError(
             f'the robot faces {ways} of the {known.format}, by '
             f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
-            'forward (REP 103): put a root link above it, with a fixed joint of '
-            f'rpy="0 0 {-np.pi / 2 * (turn if turn < 3 else -1):.6g}" between the two, or, if x '
-            'is forward, say --forward x')
-    return _cleaned(known, found[turn])
+            f'forward (REP 103): --forward {FACING[fitting[0]]} makes a URDF that is turned, '
+            '--forward x takes x for forward')
+    return _cleaned(known, found[fitting[0]])
 
 
 def _paths(known: RobotDescription) -> list[tuple[str, ...]]:
@@ -135,55 +111,83 @@ def _assigned(known: RobotDescription, paths: Sequence[Sequence[str]], turn: int
     """Return the legs of a robot that faces a direction, from behind; nothing without pairs."""
     ahead = np.round([np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
-    pairs = _pairs(_limbs(known, paths, left), left)
-    legs = [pair for pair in pairs if not any(no_leg(chain.joints) for chain in pair)]
+    legs = [pair for pair in _pairs(_limbs(known, paths, left), left) if not any(
+        no_leg(limb.joints) or sum(not known.joints[name].flaw for name in limb.joints)
+        > MOST_JOINTS for limb in pair)]
     if not legs:
         return {}
-    lowest = min(legs, key=lambda pair: pair[0].bottom)[0]
-    legs = [pair for pair in legs
-            if pair[0].bottom <= lowest.bottom + SHORTER * lowest.length
-            and pair[0].anchor[2] <= lowest.anchor[2] + HIGHER * lowest.length]
-    legs.sort(key=lambda pair: float(pair[0].anchor @ ahead))
+    lowest = min((pair[0] for pair in legs), key=_bottom)
+    length = sum(lowest.lengths)
+    legs = [pair for pair in legs if _bottom(pair[0]) <= _bottom(lowest) + SHORTER * length
+            and pair[0].anchors[0, 2] <= lowest.anchors[0, 2] + HIGHER * length]
+    legs.sort(key=lambda pair: float(pair[0].anchors[0] @ ahead))
     if len(legs) > 3 or (len(legs) == 1 and no_leg(legs[0][0].joints, UPPER)):
         return {}
-    return dict(zip(leg_names(2 * len(legs)), (chain.joints for pair in legs for chain in pair),
+    return dict(zip(leg_names(2 * len(legs)), (limb.joints for pair in legs for limb in pair),
                     strict=True))
 
 
+def _bottom(limb: LegChain) -> float:
+    """Return how low a limb could reach, m."""
+    return float(limb.anchors[0, 2] - sum(limb.lengths))
+
+
 def _limbs(known: RobotDescription, paths: Sequence[Sequence[str]], left: np.ndarray
-           ) -> list[Chain]:
+           ) -> list[LegChain]:
     """Return the longest chain of each part of the body that begins beside its middle."""
-    places = {name: known.frame(name)[0] for path in paths for name in path}
-    widest = max((abs(float(place @ left)) for place in places.values()), default=0.0)
-    limbs: dict[str, Chain] = {}
+    aside = {name: abs(float(known.frame(name)[0] @ left)) for path in paths for name in path}
+    middle = max(MIDDLE * max(aside.values(), default=0.0), 1e-6)
+    limbs: dict[str, LegChain] = {}
     for path in paths:
-        beside = [k for k, name in enumerate(path)
-                  if abs(float(places[name] @ left)) > max(MIDDLE * widest, 1e-6)]
-        if not beside:
-            continue
-        joints = tuple(path[beside[0]:])
-        points = [*(places[name] for name in joints), known.foot_below(joints[-1])[0]]
-        length = float(sum(np.linalg.norm(b - a) for a, b in pairwise(points)))
-        if length > 0.0 and (joints[0] not in limbs or length > limbs[joints[0]].length):
-            limbs[joints[0]] = Chain(joints, points[0], length)
-    return list(limbs.values())
+        joints = path[next((k for k, name in enumerate(path) if aside[name] > middle), len(path)):]
+        if joints:
+            limb = known.leg(joints)
+            limbs[joints[0]] = max(limb, limbs.get(joints[0], limb),
+                                   key=lambda one: float(sum(one.lengths)))
+    return [limb for limb in limbs.values() if sum(limb.lengths) > 0.0]
 
 
-def _pairs(limbs: Sequence[Chain], left: np.ndarray) -> list[tuple[Chain, Chain]]:
+def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, LegChain]]:
     """Return limbs with their mirror images, the left ones first."""
-    free = [limb for limb in limbs if limb.anchor @ left < 0.0]
+    free = [limb for limb in limbs if limb.anchors[0] @ left < 0.0]
     pairs = []
     for limb in limbs:
-        if limb.anchor @ left < 0.0 or not free:
+        if limb.anchors[0] @ left < 0.0 or not free:
             continue
-        mirrored = limb.anchor - 2.0 * (limb.anchor @ left) * left
-        nearest = min(free, key=lambda other: float(np.linalg.norm(other.anchor - mirrored)))
-        off = max(float(np.linalg.norm(nearest.anchor - mirrored)),
-                  abs(nearest.length - limb.length))
-        if off <= UNLIKE * max(limb.length, nearest.length):
+        mirrored = limb.anchors[0] - 2.0 * (limb.anchors[0] @ left) * left
+        nearest = min(free, key=lambda other: float(np.linalg.norm(other.anchors[0] - mirrored)))
+        lengths = [float(sum(one.lengths)) for one in (limb, nearest)]
+        if max(float(np.linalg.norm(nearest.anchors[0] - mirrored)),
+               max(lengths) - min(lengths)) <= UNLIKE * max(lengths):
             pairs.append((limb, nearest))
             free.remove(nearest)
     return pairs
+
+
+def _question(known: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
+    """Ask which limbs are legs, with the option that says so."""
+    limbs = [limb for limb in _limbs(known, paths, np.array([0.0, 1.0, 0.0]))
+             if 1 < len(limb.joints) <= MOST_JOINTS]
+    why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
+           'images of each other')
+    limbs.sort(key=lambda limb: float(limb.anchors[0, 0]))
+    left, right = ([limb for limb in limbs if sign * limb.anchors[0, 1] > 0.0]
+                   for sign in (1.0, -1.0))
+    if not 1 <= len(left) == len(right) <= 3:
+        return f'{why}; --legs LEG=TEXT ... states a part of the names of the joints of each leg'
+    limbs = [limb for pair in zip(left, right, strict=True) for limb in pair]
+    options = [f'{leg}={_in_all(limb.joints)}'
+               for leg, limb in zip(leg_names(len(limbs)), limbs, strict=True)]
+    return (f'{why}: are the limbs at '
+            + ', '.join(f'({x:.2g}, {y:.2g}) m' for x, y, _ in (one.anchors[0] for one in limbs))
+            + f' the legs? Then say --legs {" ".join(options)}')
+
+
+def _in_all(names: Sequence[str]) -> str:
+    """Return what names begin with alike, else the first of them."""
+    count = next((k for k, letters in enumerate(zip(*names, strict=False))
+                  if len(set(letters)) > 1), 0)
+    return names[0][:count] or names[0]
 
 
 def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
@@ -198,11 +202,12 @@ def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
 
 def _contradiction(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> str:
     leg = _misnamed(legs)[0]
-    place = known.frame(legs[leg][0])[0]
-    return (f"'{legs[leg][0]}' is at x {place[0]:.3g} m, y {place[1]:.3g} m, where {leg} is if x "
-            'is forward and y to the left, and no way of turning the robot fits all names: '
-            'correct the description; say --forward x if positions are right and names are not, '
-            f"or --legs {leg}=TEXT ... with a part of the joints' names of every leg")
+    x, y, _ = known.frame(legs[leg][0])[0]
+    return (f"'{legs[leg][0]}' is at x {x:.3g} m, y {y:.3g} m, where {leg} is if x is forward and "
+            'y to the left, and no way of turning the robot fits all names: correct the '
+            'description; say --forward x if positions are right and names are not, or --legs '
+            + ' '.join(f'{leg}={_in_all(joints)}'
+                       for leg, joints in legs.items()) + ', changed as it is right')
 
 
 def _named(known: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:

@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Reading of models: MJCF joints as a description, and a biped's links, soles and servos."""
+"""Descriptions of robots from URDF and MuJoCo models; a biped's links, soles and servos."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 import math
 from typing import Any
@@ -22,19 +23,43 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import one_line, opened
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, links_of
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.body_file import BASE, BipedBody, BipedLink
-from cpg_ros.motion.description import JointDescription, RobotDescription
+from cpg_ros.motion.body_file import (
+    BASE,
+    BipedBody,
+    BipedLink,
+    body_geometry,
+    BodyGeometry,
+)
+from cpg_ros.motion.description import (
+    CollisionShape,
+    JointDescription,
+    LinkDescription,
+    load_urdf,
+    RobotDescription,
+)
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.robot_model import engine, find_model, load, SimulationError
 import numpy as np
-
-# Joints of a MuJoCo model (MJCF) as a description of the robot, as ``robots.urdf`` reads URDF.
 
 UNLIMITED = -math.inf, math.inf
 
 
 class SolesError(InputError):
     """A biped's leg has nothing to stand on."""
+
+
+def load_description(name: str) -> RobotDescription:
+    """Read a URDF or MJCF file; name as ``find_model`` takes it, errors as of both readers."""
+    path = find_model(name)
+    return load_urdf(path) if path.suffix == '.urdf' else load_mjcf(name)
+
+
+def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
+    """Return a robot's geometry, with those of its legs that feedback can displace."""
+    return body_geometry(
+        sum(link.mass for link in known.links.values()),
+        {leg: known.leg(joint.name for joint in joints) for leg, joints in robot.legs.items()},
+        {joint.name: joint.offset for joint in robot.joints})
 
 
 def load_mjcf(name: str) -> RobotDescription:
@@ -59,13 +84,12 @@ def load_mjcf(name: str) -> RobotDescription:
             model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
         raise SimulationError(one_line(f'model {path}: {error}')) from error
-    joints = _joints(mujoco, model)
-    if not joints:
+    if not model.njnt:
         raise SimulationError(f'model {path}: it has no joints')
-    return RobotDescription('MJCF', joints)
+    return _described(mujoco, model)
 
 
-def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
+def _described(mujoco: Any, model: Any) -> RobotDescription:
     kinds, data = mujoco.mjtJoint, mujoco.MjData(model)
     single = (model.jnt_type == kinds.mjJNT_HINGE) | (model.jnt_type == kinds.mjJNT_SLIDE)
     data.qpos[model.jnt_qposadr[single]] = 0.0
@@ -74,7 +98,7 @@ def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
     base = int(model.jnt_bodyid[free[0]]) if len(free) else 0
     axes = data.xmat[base].reshape(3, 3)
     # The link of each body, and where its frame is.
-    links, origins = {0: 'world'}, {'world': np.zeros(3)}
+    links, origins = {0: 'world'}, {'world': data.xpos[base]}
     found: dict[str, JointDescription] = {}
     for body in range(1, model.nbody):
         link = links[int(model.body_parentid[body])]
@@ -97,7 +121,47 @@ def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
         name = model.joint(follower).name
         if name in found and leader >= 0:
             found[name] = replace(found[name], mimic=model.joint(leader).name)
-    return found
+    return RobotDescription('MJCF', found, {
+        link: _link(model, data, [body for body in links if links[body] == link], place, axes)
+        for link, place in origins.items()})
+
+
+def _link(model: Any, data: Any, bodies: Sequence[int], place: np.ndarray, axes: np.ndarray
+          ) -> LinkDescription:
+    """Return mass and shapes of some bodies, relative to a place along axes."""
+    kinds, radius, centre, shapes = engine().mjtGeom, 0.0, np.zeros(3), []
+    for geom in range(model.ngeom):
+        kind = model.geom_type[geom]
+        if model.geom_bodyid[geom] not in bodies or kind == kinds.mjGEOM_PLANE or not (
+                model.geom_contype[geom] or model.geom_conaffinity[geom]):
+            continue
+        points, round_ = _points(model, data, geom)
+        points = (points - place) @ axes
+        if kind == kinds.mjGEOM_SPHERE or (round_ and not radius):
+            radius, centre = round_, max(points, key=lambda end: float(np.linalg.norm(end)))
+        if kind != kinds.mjGEOM_SPHERE:
+            shapes.append(CollisionShape((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0),
+                                         points))
+    return LinkDescription(float(model.body_mass[bodies].sum()), radius,
+                           tuple(centre.tolist()), tuple(shapes))
+
+
+def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
+    """Return points in the world that are a shape's corners but for a distance, both m."""
+    mujoco, kind, round_ = engine(), model.geom_type[geom], 0.0
+    size, turn = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        corners, round_ = np.array([[0.0, 0.0, size[1]], [0.0, 0.0, -size[1]]]), size[0]
+    elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        corners, round_ = np.zeros((1, 3)), size[0]
+    elif kind == mujoco.mjtGeom.mjGEOM_MESH:
+        # Its box is along axes of its inertia, and would reach below it.
+        mesh = model.geom_dataid[geom]
+        corners = model.mesh_vert[model.mesh_vertadr[mesh]:][:model.mesh_vertnum[mesh]]
+    else:
+        signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+        corners = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
+    return data.geom_xpos[geom] + corners @ turn.T, float(round_)
 
 
 def _kind(mujoco: Any, model: Any, k: int) -> str:
@@ -253,27 +317,12 @@ def _outwards(model: Any, robot: Robot, leg: str) -> list[Any]:
 
 def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the middle of a sole and its length and width, m: what is lowest of a foot."""
-    mujoco, points = engine(), []
+    points = []
     for geom in range(model.ngeom):
-        if model.geom_bodyid[geom] not in bodies or not model.geom_contype[geom]:
-            continue
-        size, turn = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
-        kind, round_ = model.geom_type[geom], 0.0
-        if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-            corners, round_ = np.array([[0.0, 0.0, size[1]], [0.0, 0.0, -size[1]]]), size[0]
-        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-            corners, round_ = np.zeros((1, 3)), size[0]
-        elif kind == mujoco.mjtGeom.mjGEOM_MESH:
-            # Its box is along axes of its inertia, and would reach below it.
-            mesh = model.geom_dataid[geom]
-            first = model.mesh_vertadr[mesh]
-            corners = model.mesh_vert[first:first + model.mesh_vertnum[mesh]]
-        else:
-            signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-            corners = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
-        places = data.geom_xpos[geom] + corners @ turn.T
-        # A round shape touches the floor below its axis.
-        points.append(places - [0.0, 0.0, round_])
+        if model.geom_bodyid[geom] in bodies and model.geom_contype[geom]:
+            places, round_ = _points(model, data, geom)
+            # A round shape touches the floor below its axis.
+            points.append(places - [0.0, 0.0, round_])
     if not points:
         raise SolesError(f'leg {leg} has no shape that could touch the floor')
     found = np.concatenate(points)

@@ -27,8 +27,8 @@ from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
+from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 from cpg_ros.simulation.scenario import Scenario
-from cpg_ros.simulation.tuning.foot_path import read_geometry
 import numpy as np
 
 # Measurement of a gait's efference copy: the body's motion on flat ground without feedback.
@@ -84,12 +84,11 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
         InputError: a robot did not go through all phases of a stride.
 
     """
-    motions = dict(robot.motions)
+    motions, geometry = dict(robot.motions), geometry_from(robot, load_description(model))
+    if not geometry.legs:
+        return robot
     for gait in gaits:
         loop = ClosedLoopBatch(model, plan_gait(robot, gait), kp=kp, kd=kd)
-        geometry = read_geometry(loop.body, loop.parts)
-        if not geometry.legs:
-            return robot
         motions[gait] = replace(robot.motion(gait, gait),
                                 efference=measure_efference(loop).as_table())
         robot = replace(robot, geometry=geometry)

@@ -22,39 +22,22 @@ a few harmonics can do; that they stand longer is the duty factor's.
 
 from dataclasses import dataclass, replace
 import math
-from typing import Any
 
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.feedback.efference_copy import periodic
 from cpg_ros.feedback.kinematics import foot_of, geometry_of, joints_of
-from cpg_ros.motion.body_file import body_geometry, BodyGeometry, LegChain, LegGeometry
-from cpg_ros.motion.description import outward, sprawls
+from cpg_ros.motion.body_file import BodyGeometry, leg_axes, LEGS
 from cpg_ros.motion.phase_readout import joint_readout, standing
 from cpg_ros.motion.readout import Duty
 from cpg_ros.motion.robot import Joint, JointMotion, Robot
 from cpg_ros.simulation.body import Anatomy, Body
-from cpg_ros.simulation.robot_model import engine, legs, SimulationError
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 import numpy as np
-
-# The geometry of a robot's legs, read off its model.
 
 #: CENTRED: distance of the centre of mass from the middle of the feet, as a share of half the
 #: distance from hind to fore feet, that is ignored.
 CENTRED = 0.1
-
-
-def at_zero(body: Body) -> Any:
-    """Return a ``mujoco.MjData`` with all joints at 0, kinematics done."""
-    data = engine().MjData(body.model)
-    engine().mj_kinematics(body.model, data)
-    return data
-
-
-def chain_of(body: Body, leg: str) -> tuple[list[Joint], list[int]]:
-    """Return a leg's joints from the base outwards, and their indices in the model."""
-    chain = sorted(body.robot.legs[leg],
-                   key=lambda joint: body.model.joint(joint.name).bodyid[0])
-    return chain, [body.model.joint(joint.name).id for joint in chain]
 
 
 def centre_ahead(body: Body, parts: Anatomy) -> float:
@@ -66,59 +49,6 @@ def centre_ahead(body: Body, parts: Anatomy) -> float:
     feet = parts.places(body.data)[:, 0]
     ahead = float(body.data.subtree_com[parts.base, 0] - feet.mean())
     return ahead if abs(ahead) > 0.5 * CENTRED * np.ptp(feet) else 0.0
-
-
-def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
-    """Read the geometry of the legs that feedback can displace off a model."""
-    data, chains = at_zero(body), {}
-    base = data.xpos[parts.base]
-    for foot, leg in zip(parts.feet, legs(body.robot), strict=True):
-        chain, ids = chain_of(body, leg)
-        chains[leg] = LegChain([joint.name for joint in chain], data.xaxis[ids],
-                               data.xanchor[ids] - base, data.geom_xpos[foot] - base,
-                               body.model.geom_size[foot, 0])
-    return body_geometry(body.mass, chains)
-
-
-def feet_at_zero(name: str, robot: Robot) -> dict[str, np.ndarray]:
-    """Return where each leg's foot is from its last joint with all joints at 0, m, shape (3,).
-
-    It is the middle of a ball, or else the furthest that what the last joint moves reaches.
-
-    Args:
-        name: of the model, as of ``find_model``.
-        robot: whose legs' joints count, not its stand.
-
-    Raises:
-        SimulationError: MuJoCo is missing, the model cannot be used, or a leg has no shape.
-
-    """
-    body = Body(name, robot)
-    model, data, found = body.model, at_zero(body), {}
-    for leg in legs(robot):
-        last = chain_of(body, leg)[1][-1]
-        points = [data.geom_xpos[geom] + _ends(model, geom) @ data.geom_xmat[geom].reshape(3, 3).T
-                  for geom in range(model.ngeom) if model.geom_contype[geom]
-                  and model.body_weldid[model.geom_bodyid[geom]] == model.jnt_bodyid[last]]
-        if not points:
-            raise SimulationError(f'model: leg {leg} has no shape that could touch the floor')
-        balls = [point for point in points if len(point) == 1]
-        reach = np.concatenate(balls or points) - data.xanchor[last]
-        found[leg] = reach[np.linalg.norm(reach, axis=1).argmax()]
-    return found
-
-
-def _ends(model: Any, geom: int) -> np.ndarray:
-    """Return a ball's middle, a mesh's vertices, or both ends of another shape, in its frame."""
-    mujoco, kind = engine(), model.geom_type[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return np.zeros((1, 3))
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = model.geom_dataid[geom]
-        return model.mesh_vert[model.mesh_vertadr[mesh]:][:model.mesh_vertnum[mesh]]
-    middle, half = np.split(model.geom_aabb[geom], 2)
-    longest = np.where(half == half.max(), half, 0.0)
-    return np.array([middle - longest, middle + longest])
 
 
 #: POINTS: points of a cycle at which curves are fitted.
@@ -169,15 +99,11 @@ class FootTrajectory:
         return x, z - self.height
 
 
-#: BESIDE: largest distance of a joint or the foot from a sprawled leg's plane, over its length.
-BESIDE = 0.1
-
-
 class Leg:
-    """The joints of a leg that move its foot in a stride, read off a model.
+    """The joints of a leg that move its foot in a stride, by the robot's geometry.
 
-    They are the last two of a leg that moves in a vertical plane, or coxa, femur and tibia of one
-    that reaches to the side (see description.sprawls).
+    They are thigh and calf of a leg that moves in a vertical plane, or coxa, femur and tibia of
+    one that reaches to the side.
 
     Attributes:
         joints: from the base outwards.
@@ -186,45 +112,29 @@ class Leg:
 
     """
 
-    def __init__(self, body: Body, parts: Anatomy, leg: str) -> None:
-        """Read a leg with all joints at 0.
+    def __init__(self, robot: Robot, body: BodyGeometry, leg: str) -> None:
+        """Read a leg.
 
         Raises:
-            SimulationError: its last two joints do not turn about parallel axes across the body,
-                or its foot is far beside the plane that the coxa turns.
+            SimulationError: the geometry does not have it.
 
         """
-        data, (chain, ids) = at_zero(body), chain_of(body, leg)
-        if len(chain) < 2:
-            raise SimulationError(f'leg {leg} has fewer than two joints')
-        sprawled, yaw = sprawls(data.xaxis[ids]), None
-        count = 3 if sprawled else 2
-        self.joints: tuple[Joint, ...] = tuple(chain[-count:])
-        axes, anchors = data.xaxis[ids[-count:]], data.xanchor[ids[-count:]]
-        foot = parts.places(data)[legs(body.robot).index(leg)]
-        across, names = np.array([0.0, 1.0, 0.0]), [joint.name for joint in self.joints]
-        if sprawled:
-            out = outward(axes[1], foot - anchors[0])
-            yaw, across = math.atan2(out[1], out[0]), np.array([-out[1], out[0], 0.0])
-            corners = np.stack([*anchors, foot]) - anchors[0]
-            beside = np.abs(corners @ across).max()
-            if beside > BESIDE * np.linalg.norm(np.diff(corners, axis=0), axis=1).sum():
-                raise SimulationError(f'leg {leg}: its foot is {100.0 * beside:.1f} cm beside the '
-                                      f'plane in which {names[1]} and {names[2]} move it')
-        turns = np.array([*axes[:-2, 2], *axes[-2:] @ across])
-        if np.abs(turns).min() < 0.99:
-            raise SimulationError(f'leg {leg}: {names[0]} and {names[1]} do not both turn about '
-                                  'an axis across the body')
-        # From the first of these joints.
-        thigh = anchors[-2] - anchors[0]
-        shape = LegGeometry(tuple(names), tuple(np.sign(turns)), (0.0, 0.0, 0.0), tuple(thigh),
-                            tuple(anchors[-1] - anchors[-2]), tuple(foot - anchors[-1]), yaw)
-        geometry = geometry_of(body.robot, BodyGeometry(body.mass, 0.0, {leg: shape}))
-        self._row = geometry.rows[list(body.robot.legs).index(leg)]
-        angles = [0.0] * (3 - count) + [joint.offset for joint in self.joints]
-        x, y, z = foot_of(self._row, *angles)
-        self._origin = (x, y, thigh[2]) if sprawled else (0.0, 0.0, 0.0)
-        self.length = thigh[2] - z if sprawled else math.hypot(x, z)
+        if leg not in body.legs:
+            raise SimulationError(f'leg {leg} cannot be tuned: it is not {LEGS}')
+        own = body.legs[leg]
+        names = own.joints if own.yaw is not None else own.joints[-2:]
+        by_name = {joint.name: joint for joint in robot.legs[leg]}
+        self.joints: tuple[Joint, ...] = tuple(by_name[name] for name in names)
+        axes, origin = leg_axes(None, own.roll), (0.0, 0.0, 0.0)
+        own = replace(own, joints=names, turns=own.turns[-len(names):], hip=origin, roll=None,
+                      thigh=origin if own.yaw is None else own.thigh,
+                      calf=tuple(own.calf @ axes), foot=tuple(own.foot @ axes))
+        geometry = geometry_of(robot, BodyGeometry(body.mass, 0.0, {leg: own}))
+        self._row = geometry.rows[list(robot.legs).index(leg)]
+        x, y, z = foot_of(self._row, *[0.0] * (3 - len(names)),
+                          *(joint.offset for joint in self.joints))
+        self._origin = (0.0, 0.0, 0.0) if own.yaw is None else (x, y, own.thigh[2])
+        self.length = math.hypot(x, z) if own.yaw is None else own.thigh[2] - z
 
     def angles(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the joints' angles that put the foot there, rad, shape (joints, n).
@@ -284,10 +194,11 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
 class FootTrajectoryFit:
     """The motions of a robot's joints that move its feet along given trajectories."""
 
-    def __init__(self, body: Body, parts: Anatomy) -> None:
-        """Read all legs; errors as of Leg."""
-        self.robot = body.robot
-        self.legs = {leg: Leg(body, parts, leg) for leg in legs(body.robot)}
+    def __init__(self, robot: Robot, model: str) -> None:
+        """Read all legs, by the robot file or else by the model; errors as of Leg."""
+        self.robot = robot
+        geometry = robot.geometry or geometry_from(robot, load_description(model))
+        self.legs = {leg: Leg(robot, geometry, leg) for leg in robot.legs}
 
     @property
     def length(self) -> float:

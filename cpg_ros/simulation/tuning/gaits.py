@@ -187,7 +187,7 @@ class Tuner:
         body = self.batch.body
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
             + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
-        self.feet = FootTrajectoryFit(self.batch.body, self.batch.parts)
+        self.feet = FootTrajectoryFit(robot, model)
         self.scale = self.feet.length / LENGTH
         # Designs are of robots whose feet bear alike.
         self.ahead = centre_ahead(body, self.batch.parts)
@@ -407,7 +407,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         if isinstance(best, NoDesign):
             missing.append(str(best))
             continue
-        motions[gait] = best.motion
+        motions[gait] = replace(best.motion, verdict=best.verdict)
         found.append(best)
     # Let the progress bar end.
     next(results, None)

@@ -15,6 +15,7 @@
 """From a URDF to a robot that one drives: which steps run, what is used again, what is refused."""
 
 from argparse import Namespace
+from dataclasses import replace
 import importlib.util
 import os
 from pathlib import Path
@@ -23,6 +24,7 @@ import shutil
 import signal
 
 from cpg_ros.common.errors import InputError
+from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.ros.cli import demo as tool
 from cpg_ros.ros.cli import demo_parts
 from cpg_ros.ros.cli.demo_parts import StepFailed
@@ -71,7 +73,9 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
     assert not robot.unjudged
     # The shipped Go2's trot is faster than its walk.
     assert robot.file == str(tuned) and robot.gaits[:2] == ('trot', 'walk') and robot.steered
-    assert capsys.readouterr().out == f'the files of the robot go into {tmp_path}\n'
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == f'the files of the robot go into {tmp_path}' and len(said) == 2
+    assert said[1].startswith('gaits, best first: trot (')
     steps = Made()
     assert demo_parts.prepare(args(tmp_path), steps) == robot and not steps.words
     assert capsys.readouterr().out.count('is used again') == 2
@@ -87,6 +91,24 @@ def test_gains_of_servos_tune_the_robot_and_drive_it(tmp_path):
     assert all(words[-4:] == ['--kp', '14', '--kd', '0.35'] for words in steps.words[1:])
     body, _ = tool._nodes(given, robot)
     assert 'kp:=14.0' in body and 'kd:=0.35' in body
+
+
+@pytest.mark.parametrize(('trot', 'walk', 'first'), [
+    ('poor: falls after 2.1 s', 'good: 0.20 m/s', 'walk'),
+    ('good: 0.50 m/s', 'poor: 0.02 m/s', 'trot'),
+    ('poor: 0.05 m/s', 'poor: 0.02 m/s', 'trot')])
+def test_the_best_gait_by_its_verdict_is_the_first_and_a_poor_one_is_said(
+        tmp_path, capsys, trot, walk, first):
+    robot = load_robot(str(FILE))
+    motions = {gait: replace(robot.motions[gait], verdict=verdict)
+               for gait, verdict in (('trot', trot), ('walk', walk))}
+    for name in ('quadruped.yaml', 'quadruped_tuned.yaml'):
+        write_robot(tmp_path / name, replace(robot, motions=motions))
+    assert demo_parts.prepare(args(tmp_path), Made()).gaits[0] == first
+    said = capsys.readouterr().out
+    assert f'trot ({trot})' in said and f'walk ({walk})' in said
+    poor = motions[first].verdict.startswith('poor')
+    assert (f'begins with the {first}, which is poor' in said) == poor
 
 
 def test_an_old_file_is_used_again_and_that_it_is_old_is_said(tmp_path, capsys):
@@ -114,9 +136,9 @@ def test_a_gait_that_cannot_be_had_does_not_stop_the_other(tmp_path, capsys):
 
 def test_where_no_gait_is_good_it_says_what_to_try(tmp_path, capsys):
     assert demo_parts.prepare(args(tmp_path), Made(0, 1, 1, writing=(0, 1))).gaits
-    assert capsys.readouterr().out.endswith(
+    assert (
         f"no gait is good: delete {tmp_path / 'quadruped_tuned.yaml'}, and --evaluations 240 "
-        'searches for longer, --kp and --kd give stiffer joints\n')
+        'searches for longer, --kp and --kd give stiffer joints\n') in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [

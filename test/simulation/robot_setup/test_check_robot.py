@@ -57,7 +57,6 @@ def test_the_shipped_quadruped_matches_its_urdf(check):
 @pytest.mark.parametrize(('pattern', 'instead', 'joint', 'words'), [
     ('lf_thigh_joint', 'lf_thing_joint', 'lf_thigh_joint',
      "the URDF has no such joint, did you mean 'lf_thing_joint'?"),
-    ('lf_thigh_joint', 'FL_HFE', 'lf_thigh_joint', "did you mean 'FL_HFE'?"),
     ('rf_calf_joint" type="revolute"', 'rf_calf_joint" type="fixed"', 'rf_calf_joint',
      'cannot be driven, in the URDF it is fixed'),
     ('rf_calf_joint" type="revolute"', 'rf_calf_joint" type="prismatic"', 'rf_calf_joint',
@@ -260,8 +259,8 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt does not end in .yaml'),
     (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'already exists'),
     (('--urdf', 'URDF', '--make', 'nowhere/a.yaml'), 'No such file or directory'),
-    (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'cannot identify legs from the joint names'),
-    (('--urdf', 'SIDEWAYS', '--make', 'a.yaml'), 'nothing would swing it'),
+    (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'no legs are found'),
+    (('--urdf', 'SIDEWAYS', '--make', 'a.yaml'), 'forward and'),
     (('--urdf', 'STIFF', '--make', 'a.yaml'), 'no room to move'),
     (('--urdf', 'ROUND', '--make', 'a.yaml'), 'form a loop')])
 def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
@@ -269,7 +268,7 @@ def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, wor
     for name, content in {
             'URDF': URDF, 'URDF.yaml': '', 'NAMELESS': robot_of(joint_of('one'), joint_of('two')),
             'SIDEWAYS': quadruped_urdf(axis='1 0 0'),
-            'STIFF': quadruped_urdf(hip='lower="0" upper="0"'),
+            'STIFF': quadruped_urdf(hip='lower=".5" upper=".5"'),
             'ROUND': quadruped_urdf().replace('link="base"/><child', 'link="FL_calf_joint_l"/>'
                                               '<child')}.items():
         Path(name).write_text(content)

@@ -14,14 +14,17 @@
 
 """Legs are found in the body: by chains, positions and axes; names only break ties."""
 
-import math
+from pathlib import Path
 
+from cpg_ros.feedback.kinematics import forward, geometry_of
 from cpg_ros.fitting.gaits.leg_names import LegsError
 from cpg_ros.motion.description import describe, DescriptionError, load_urdf, parse_tree
 from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.networks.leg_numbers import leg_names
 from cpg_ros.simulation.robot_setup.check_robot import main
-from cpg_ros.simulation.robot_setup.geometry_match import LegKinematics
+from cpg_ros.simulation.robot_setup.first_robot import robot_from
 from cpg_ros.simulation.robot_setup.leg_chains import legs_in
+from cpg_ros.simulation.robot_setup.model_reading import geometry_from
 import numpy as np
 import pytest
 
@@ -114,7 +117,7 @@ def test_arms_and_fingers_are_not_legs(urdf):
         joint(f'{side}_elbow', f'{side}_shoulder_l', (0, 0, -0.2), (0, 1, 0)))))],
     ids=['wheels', 'arms alone'])
 def test_what_has_no_legs_is_refused(urdf):
-    with pytest.raises(LegsError, match='--legs LEG=TEXT'):
+    with pytest.raises(LegsError, match='--legs '):
         legs_of(urdf)
 
 
@@ -140,22 +143,22 @@ def test_legs_of_any_names_are_told_by_their_places(names):
 
 def test_a_robot_that_faces_backward_is_refused_with_the_remedy():
     urdf = quadruped(places={leg: (-x, -y) for leg, (x, y) in QUADRUPED.items()})
-    with pytest.raises(LegsError, match=r'faces -x .* names .* rpy="0 0 -3.14159".*--forward x'):
+    with pytest.raises(LegsError, match=r'faces -x .* names .* --forward -x makes.*--forward x'):
         legs_of(urdf)
-    assert legs_of(urdf, 'x')['lf'][0] == 'rear_right_hip'
+    assert legs_of(urdf, True)['lf'][0] == 'rear_right_hip'
 
 
 def test_names_on_the_wrong_side_are_refused_and_can_be_overruled():
     urdf = quadruped(places={leg: (x, -y) for leg, (x, y) in QUADRUPED.items()})
     with pytest.raises(LegsError, match=r'--forward x .*--legs'):
         legs_of(urdf)
-    assert legs_of(urdf, 'x')['lf'][0] == 'front_right_hip'
-    assert legs_of(urdf, '', WORDS)['lf'][0] == 'front_left_hip'
+    assert legs_of(urdf, True)['lf'][0] == 'front_right_hip'
+    assert legs_of(urdf, False, WORDS)['lf'][0] == 'front_left_hip'
 
 
 def test_a_robot_that_faces_y_is_refused_with_the_remedy():
     places = {leg: (-y, x) for leg, (x, y) in QUADRUPED.items()}
-    with pytest.raises(LegsError, match=r'faces y .* axes .* rpy="0 0 -1.5708"'):
+    with pytest.raises(LegsError, match=r'faces y .* axes .*--forward y makes'):
         legs_of(quadruped(places=places, crosswise=True))
 
 
@@ -195,42 +198,174 @@ def test_a_foot_that_is_a_mesh_is_where_the_mesh_ends(tmp_path):
     assert foot == pytest.approx([0.0, 0.0, -0.39]) and radius == 0.0
 
 
-@pytest.mark.parametrize('seed', range(6))
-def test_zeros_and_senses_of_joints_do_not_change_the_stand(tmp_path, seed):
-    """Random zeros and senses of thigh and calf, and limits to match: the same feet."""
-    draw = np.random.default_rng(seed)
-    zeros = draw.uniform(-1.2, 1.2, 2)
-    ways = draw.choice([-1.0, 1.0], 2)
-    feet = []
-    for zero, way, folder in ((zeros, ways, 'any'), (np.zeros(2), np.ones(2), 'plain')):
-        parts = []
-        for leg, (x, y) in QUADRUPED.items():
-            # Limits turn with the zero; a joint's frame is turned by it, and no link is straight.
-            thigh, calf = (sorted((w * (low - z), w * (high - z))) for z, w, (low, high) in zip(
-                zero, way, ((-1.0, 2.5), (-2.6, -0.5)), strict=True))
-            names = [f'{leg}_{part}' for part in ('hip', 'thigh', 'calf')]
-            parts += [joint(names[0], 'base', (x, y, 0), (1, 0, 0), (-0.8, 0.8)),
-                      joint(names[1], f'{names[0]}_l', (0, 0, 0), (0, way[0], 0), thigh).replace(
-                          '<origin xyz="0 0 0"/>', f'<origin rpy="0 {zero[0]} 0"/>', 1),
-                      joint(names[2], f'{names[1]}_l', (0, 0, -0.2), (0, way[1], 0), calf).replace(
-                          '<origin xyz="0 0 -0.2"/>',
-                          f'<origin xyz="0 0 -0.2" rpy="0 {zero[1]} 0"/>', 1),
-                      joint(f'{leg}_foot', f'{names[2]}_l', (0, 0, -0.25), (1, 0, 0),
-                            kind='fixed', shape='<geometry><sphere radius=".02"/></geometry>')]
-        (tmp_path / folder).mkdir()
-        found = made(tmp_path / folder, robot(*parts))
-        known = load_urdf(tmp_path / folder / 'my.urdf')
-        legs = []
-        for leg, joints in found.legs.items():
-            chain = LegKinematics([one.name for one in joints], known)
-            stand = {one.name: one.offset for one in joints}
-            swung = {one.name: one.offset + one.weights[0] for one in joints}
-            lifted = {one.name: one.offset + (one.weights[1] if len(one.weights) > 1 else 0.0)
-                      for one in joints}
-            hip = chain.places[1]
-            arms = [chain.foot_at(angles) - hip for angles in (stand, swung, lifted)]
-            assert math.dist(arms[2], (0, 0, 0)) < math.dist(arms[0], (0, 0, 0)), leg
-            assert arms[0][0] == pytest.approx(0.0, abs=2e-3), leg
-            legs.append(arms)
-        feet.append(legs)
-    assert np.array(feet[0]) == pytest.approx(np.array(feet[1]), abs=3e-3)
+def test_a_robot_that_faces_y_is_made_with_a_urdf_that_is_turned(tmp_path):
+    """What is written is the same robot, whose left foreleg is the one with that name."""
+    places = {leg: (-y, x) for leg, (x, y) in QUADRUPED.items()}
+    (tmp_path / 'my.urdf').write_text(quadruped(places=places, crosswise=True))
+    out = tmp_path / 'my.yaml'
+    assert main(['--urdf', str(tmp_path / 'my.urdf'), '--make', str(out), '--forward', 'y']) == 0
+    turned = tmp_path / 'my_facing_x.urdf'
+    robot = load_robot(str(out))
+    assert {leg: joints[0].name for leg, joints in robot.legs.items()} == {
+        leg: f'{name}_hip' for leg, name in WORDS.items()}
+    assert load_urdf(turned).frame('front_left_hip')[0] == pytest.approx([0.2, 0.1, 0.0])
+    assert main([str(out), '--urdf', str(turned)]) == 0
+
+
+def test_what_turning_cannot_do_leaves_no_file(tmp_path, capsys):
+    (tmp_path / 'my.urdf').write_text(quadruped())
+    assert main(['--urdf', str(tmp_path / 'my.urdf'), '--make', str(tmp_path / 'my.yaml'),
+                 '--forward', 'y']) == 2
+    assert [file.name for file in tmp_path.iterdir()] == ['my.urdf']
+    assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_the_question_which_limbs_are_legs_has_the_option_that_answers_it(tmp_path):
+    """Limbs of unlike lengths are no mirror images, but may be legs."""
+    urdf = quadruped({'lf': 'qa', 'rf': 'wb', 'lh': 'ec', 'rh': 'td'}).replace(
+        '<origin xyz="0 0 -0.2"/>', '<origin xyz="0 0 -0.5"/>', 2).replace(
+        'xyz="-0.2 0.1 0"', 'xyz="-0.9 0.1 0"')
+    with pytest.raises(LegsError) as caught:
+        legs_of(urdf.replace('xyz="0.2 0.1 0"', 'xyz="0.9 0.1 0"'))
+    text = str(caught.value)
+    assert text.endswith('--legs lh=ec_ rh=td_ lf=qa_ rf=wb_') and '\n' not in text
+
+
+@pytest.mark.parametrize(('limits', 'word'), [
+    ((2.4, 3.4), 'above its lowest joint'), ((0.6999, 0.7101), ' mm upward only')])
+def test_what_would_not_stand_or_step_is_not_written(tmp_path, capsys, limits, word):
+    urdf, out = tmp_path / 'my.urdf', tmp_path / 'my.yaml'
+    urdf.write_text(quadruped().replace('lower="-1.5" upper="1.5"', 'lower="{}" upper="{}"'.format(
+        *limits)).replace('lower="-2.6" upper="-0.5"', 'lower="-1.41" upper="-1.39"'))
+    assert main(['--urdf', str(urdf), '--make', str(out)]) == 2 and not out.exists()
+    said = capsys.readouterr().err
+    assert 'nothing is written' in said and word in said and said.count('\n') == 1
+
+
+def test_legs_at_another_place_than_the_file_says_are_found(tmp_path, capsys):
+    text = (tmp_path / 'my.urdf', tmp_path / 'my_robot.yaml')
+    made(tmp_path, quadruped())
+    for one, other, word in (('left', 'right', 'lh is at the right of rh'),
+                             ('front', 'rear', 'lh is ahead of lf')):
+        urdf = quadruped().replace(one, '?').replace(other, one).replace('?', other)
+        text[0].write_text(urdf)
+        assert main([str(text[1]), '--urdf', str(text[0])]) == 1
+        assert word in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('limit', ['velocity="1000"', 'velocity="0"'])
+def test_speeds_that_no_motor_has_are_no_limits(tmp_path, limit):
+    joints = made(tmp_path, quadruped().replace('velocity="10"', limit)).joints
+    assert {joint.velocity for joint in joints} == {20.0}
+    assert all('velocity' in joint.invented for joint in joints)
+
+
+def test_limits_of_0_and_0_are_none(tmp_path):
+    robot = made(tmp_path, quadruped().replace('lower="-0.8" upper="0.8"', 'lower="0" upper="0"'))
+    assert robot.legs['lf'][0].invented == ('lower', 'upper')
+
+
+# -- scrambled robots -----------------------------------------------------------------------------
+
+SPHERE = '<geometry><sphere radius=".02"/></geometry>'
+TURNS = {'x': (1, 0, 0), 'y': (0, 1, 0), 'z': (0, 0, 1)}
+#: Of each kind: joint, axis, limits and place of a left leg, outwards; the last is fixed.
+KINDS = {
+    4: (('hip', 'x', (-0.8, 0.8), None), ('thigh', 'y', (-1.0, 2.5), (0, 0.05, 0)),
+        ('calf', 'y', (-2.6, -0.5), (0, 0, -0.2)), ('foot', '', None, (0, 0, -0.25))),
+    6: (('coxa', 'z', (-0.8, 0.8), None), ('femur', 'x', (-1.5, 1.5), (0, 0.05, 0)),
+        ('tibia', 'x', (-2.0, 2.0), (0, 0.1, 0)), ('foot', '', None, (0, 0.15, 0))),
+    2: tuple((name, 'xyz'[axis.index(1)], limits, (0, 0, down) if k else None)
+             for k, (name, axis, limits, down) in enumerate(LEG))}
+
+
+def scrambled(legs, draw=None):
+    """Return a robot of some legs; with draws, zeros, senses and names of its joints are any."""
+    parts, names = [], {}
+    for leg in leg_names(legs):
+        side = 1.0 if leg[0] == 'l' else -1.0
+        row = {'h': -0.25, 'f': 0.25}.get(leg[1:], 0.0)
+        above = 'base'
+        for name, axis, limits, place in KINDS[legs]:
+            x, y, z = place or (row, 0.1, 0.0)
+            own = f'{leg}_{name}' if draw is None else f'j{draw.integers(10**9)}'
+            zero = 0.0 if draw is None else draw.uniform(-1.2, 1.2)
+            sense = 1.0 if draw is None else draw.choice([-1.0, 1.0])
+            if not axis:
+                parts.append(joint(own, above, (x, side * y, z), (1, 0, 0), kind='fixed',
+                                   shape=SPHERE).replace('0 0 -.02', '0 0 0'))
+                continue
+            # Mirrored, so that axes but y's turn the other way.
+            mirror = side if axis != 'y' else 1.0
+            low, high = sorted(sense * (bound - zero) for bound in limits)
+            rpy = ' '.join(str(mirror * zero * one) for one in TURNS[axis])
+            parts.append(joint(
+                own, above, (x, side * y, z), [sense * mirror * one for one in TURNS[axis]],
+                (low, high)).replace('"/><axis', f'" rpy="{rpy}"/><axis', 1))
+            names.setdefault(leg, []).append(own)
+            above = f'{own}_l'
+    return robot(*parts), names
+
+
+def postures(urdf):
+    """Return, of the robot that is made, where its joints and feet are in the stand and steps."""
+    known = describe(parse_tree(urdf.encode(), 'r'), 'r')
+    made, _ = robot_from(known, 'r', legs_in(known, True))
+    found = {}
+    for leg, joints in made.legs.items():
+        chain = known.leg(one.name for one in joints)
+        by_name = {one.name: one for one in joints}
+        ordered = [by_name[name] for name in chain.joints]
+        found[leg] = np.array([chain.posed([
+            one.offset + x * one.weights[0] + y * (*one.weights, 0.0)[1] for one in ordered])[1][
+                :None if len(made.legs) > 2 else -1]
+            for x, y in ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1))])
+    return made, known, found
+
+
+@pytest.mark.parametrize('legs', [4, 6, 2])
+@pytest.mark.parametrize('seed', range(3))
+def test_names_zeros_and_senses_do_not_change_what_feet_do(legs, seed):
+    """And feedback has the feet of a scrambled robot where they are."""
+    _, _, plain = postures(scrambled(legs)[0])
+    urdf, names = scrambled(legs, np.random.default_rng([legs, seed]))
+    made, known, found = postures(urdf)
+    assert {leg: [one.name for one in joints] for leg, joints in made.legs.items()} == names
+    for leg, points in found.items():
+        assert points == pytest.approx(plain[leg], abs=4e-3), leg
+    if legs > 2:
+        geometry = geometry_from(made, known)
+        assert set(geometry.legs) == set(made.legs)
+        feet = forward(geometry_of(made, geometry), made.column('offset'))
+        assert feet == pytest.approx(np.array([points[0, -1] for points in found.values()]),
+                                     abs=1e-5)
+
+
+def test_a_fourth_joint_of_a_hexapods_legs_is_held(tmp_path):
+    """Feedback moves the feet by the three joints above, with it where it stands."""
+    urdf = (Path(__file__).parents[3] / 'resource' / 'urdf' / 'hexapod.urdf').read_text()
+    tarsi = ''
+    known = describe(parse_tree(urdf.encode(), 'r'), 'r')
+    last = {leg: next(one for one in known.joints.values()
+                      if one.name.startswith(leg) and 'tibia' in one.name)
+            for leg in leg_names(6)}
+    for leg, tibia in last.items():
+        axis = ' '.join(map(str, tibia.axis))
+        foot = known.foot_below(tibia.name)[0] - known.frame(tibia.name)[0]
+        x, y, z = 0.5 * foot
+        tarsi += (f'<joint name="{leg}_tarsus" type="revolute"><parent link="{tibia.child}"/>'
+                  f'<child link="{leg}_tarsus_l"/><origin xyz="{x} {y} {z}"/><axis xyz="{axis}"/>'
+                  '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
+                  f'<link name="{leg}_tarsus_l">{INERTIAL}<collision><origin xyz="{x} {y} {z}"/>'
+                  f'{SPHERE}</collision></link>')
+    robot = made(tmp_path, urdf.replace('</robot>', tarsi + '</robot>'))
+    assert all(len(joints) == 4 for joints in robot.legs.values())
+    assert set(robot.geometry.legs) == set(leg_names(6))
+    known = load_urdf(tmp_path / 'my.urdf')
+    stand = {one.name: one.offset for one in robot.joints}
+    feet = forward(geometry_of(robot), robot.column('offset'))
+    for foot, leg in zip(feet, robot.legs, strict=True):
+        chain = known.leg(one.name for one in robot.legs[leg])
+        assert 'tarsus' not in ' '.join(robot.geometry.legs[leg].joints)
+        assert foot == pytest.approx(chain.posed([stand[name] for name in chain.joints])[1][-1],
+                                     abs=1e-5)

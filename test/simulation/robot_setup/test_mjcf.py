@@ -138,14 +138,3 @@ def test_one_description_of_the_right_kind(capsys, arguments, words):
         code = ended.code
     found = capsys.readouterr()
     assert code == 2 and words in found.err and found.err.count('\n') == 1
-
-
-def test_a_model_without_a_free_joint_is_made_without_geometry(tmp_path, capsys):
-    text = (SOURCE / 'resource' / 'models' / 'hexapod.xml').read_text().replace('<freejoint/>', '')
-    # Legs that swing about y, as the template knows them.
-    text = text.replace('axis="0 0 1"', 'axis="0 1 0"').replace('axis="0 0 -1"', 'axis="0 1 0"')
-    (tmp_path / 'held.xml').write_text(text)
-    assert main(['--mjcf', str(tmp_path / 'held.xml'), '--make', str(tmp_path / 'a.yaml')]) in (
-        0, 1)
-    assert 'feedback: ' in capsys.readouterr().err
-    assert read_robot(tmp_path / 'a.yaml').geometry is None

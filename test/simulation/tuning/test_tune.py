@@ -88,6 +88,7 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp
                       '7', '--seed', '2', '--jobs', '1', '--out', str(out)]) == 1
     made = read_robot(out)
     assert made.motions['walk'] == GO2.motions['walk'] != made.motions['trot']
+    assert made.motions['trot'].verdict.startswith('poor: 0.')
     assert made.motions['trot'].frequency and not made.motions['trot'].steering
     preset = PRESETS['delayed']['trot']
     assert plan(made, 'trot', preset, preset.network, made.motions['trot'].frequency)

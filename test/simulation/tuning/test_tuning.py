@@ -59,7 +59,7 @@ def batch():
 
 @pytest.fixture(scope='module')
 def feet(batch):
-    return FootTrajectoryFit(batch.body, batch.parts)
+    return FootTrajectoryFit(GO2, 'go2')
 
 
 def in_order(pattern):
@@ -150,7 +150,7 @@ def test_inverse_kinematics_against_mujocos_forward_kinematics(leg, x, z):
 @cache
 def _feet():
     made = OpenLoopBatch('go2', GO2)
-    feet = FootTrajectoryFit(made.body, made.parts)
+    feet = FootTrajectoryFit(GO2, 'go2')
     feet.body = made.body
     return feet
 

@@ -1,0 +1,285 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A first robot from a description: its stand by inverse kinematics, and small steps.
+
+Nothing depends on where joints have their zeros, in which sense they turn or what they are called:
+a leg is bent until its foot is below its hip, in a vertical plane, the way that the limits allow.
+"""
+
+from dataclasses import dataclass, replace
+from math import inf, pi
+
+from cpg_ros.fitting.gaits.leg_names import Legs
+from cpg_ros.motion.description import (
+    DescriptionError,
+    JointDescription,
+    LegChain,
+    outward,
+    RobotDescription,
+    sprawls,
+)
+from cpg_ros.motion.plan import plan_gait
+from cpg_ros.motion.robot import HARMONICS, Joint, Robot
+from cpg_ros.motion.robot_file import LIMITS
+from cpg_ros.networks.registry import NETWORKS, numbered
+from cpg_ros.simulation.robot_setup.description_match import unlimited
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.spatial import ConvexHull, QhullError
+
+#: Height of the stand over the length of the stretched leg. UPRIGHT: on two legs, to the ankle;
+#: CROUCHED: on more.
+UPRIGHT, CROUCHED = 0.97, 0.765
+#: Angles in the stand of a leg that reaches to the side, rad. RAISED: femur above level; LOWERED:
+#: tibia below level.
+RAISED, LOWERED = 0.4, 1.3
+#: Initial amplitudes of feet over the height of the stand. SWING: forward; LIFTS: upward, on two
+#: legs and on more.
+SWING, LIFTS = 0.15, (0.02, 0.06)
+#: Limits of joints that have none. UNBOUNDED: of the angle, rad; SPEED: of the speed, rad/s.
+UNBOUNDED, SPEED = pi, 20.0
+#: MARGIN: least distance of the stand from a joint's limits, as a share of its range; USED:
+#: largest share of the room to the limits that gaits use.
+MARGIN, USED = 0.1, 0.8
+#: STARTS: poses from which a stand is searched; MIDDLE: weight of the distance from the middle of
+#: the joints' ranges; OTHER_WAY, STRAIGHT: price of a knee that is bent the unusual way or not.
+STARTS, MIDDLE, OTHER_WAY, STRAIGHT = 8, 1e-3, 0.3, 1.0
+#: NEAR: price of a stand up to which no other is searched.
+NEAR = 1e-5
+#: BENT: least distance of a bent knee from the line from hip to foot, over the leg's length.
+BENT = 0.03
+#: FLAT: least area of the face of a flat foot over that of its shadow on the face's plane.
+FLAT = 0.5
+
+
+def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
+    """Make a first robot from a description; return it and what its joints do.
+
+    Args:
+        known: the description.
+        name: of the robot.
+        legs: its legs, as of ``legs_in``.
+
+    Raises:
+        DescriptionError: the links make no tree, a leg cannot be bent, or a joint has no room to
+            move.
+
+    """
+    usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
+    assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
+    networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
+    standing = {leg: _StandingLeg.of(known, legs, leg) for leg in legs}
+    # All feet are on one level.
+    ground = float(np.mean([leg.ground for leg in standing.values()]))
+    joints, notes = {}, []
+    for leg, made in standing.items():
+        angles = made.angles(ground)
+        weights, roles = made.steps(angles, len(legs))
+        by_name = dict(zip(made.chain.joints, zip(angles.tolist(), weights, strict=True),
+                           strict=True))
+        joints[leg] = tuple(
+            Joint(joint, leg, cells[leg][0], *by_name[joint], *_range(known.joints[joint]),
+                  SPEED if known.joints[joint].velocity == inf else known.joints[joint].velocity,
+                  tuple(key for key in LIMITS if abs(getattr(known.joints[joint], key)) == inf))
+            for joint in legs[leg])
+        notes.append(f'{leg}: ' + ', '.join(
+            f'{joint} {role}' for joint, role in zip(made.chain.joints, roles, strict=True)))
+    driven = {joint for leg in legs for joint in legs[leg]}
+    robot = Robot(name, networks, assignment, HARMONICS, joints,
+                  tuple(joint for joint in known.joints if joint in driven))
+    return _fitting(robot), '\n'.join([*notes, *([legs.explanation] if legs.explanation else [])])
+
+
+def _range(joint: JointDescription) -> tuple[float, float]:
+    lower, upper = max(joint.lower, -UNBOUNDED), min(joint.upper, UNBOUNDED)
+    if upper - lower < 0.01:
+        raise DescriptionError(f"the joint '{joint.name}' has no room to move: its limits are "
+                               f'{joint.lower:g} to {joint.upper:g} rad')
+    return lower, upper
+
+
+@dataclass(frozen=True, eq=False)
+class _StandingLeg:
+    """A leg that is to stand.
+
+    Attributes:
+        chain: its joints.
+        low, high: angles that it may have, rad, shape (joints,).
+        bend: index of the first of the two joints that bend it.
+        top: of the joint below which its foot, or its ankle, is to be.
+        end: of the foot, or of the ankle of a leg with a sole, among the points of the chain.
+        sole: which way is up from the sole with all joints at 0, None if it need not be level.
+        aside: of a leg that reaches to the side where femur and tibia are to end, m, else None.
+        biped: whether it is one of two.
+
+    """
+
+    chain: LegChain
+    low: np.ndarray
+    high: np.ndarray
+    bend: int
+    top: int
+    end: int
+    sole: np.ndarray | None
+    aside: np.ndarray | None
+    biped: bool
+
+    @classmethod
+    def of(cls, known: RobotDescription, legs: Legs, leg: str) -> '_StandingLeg':
+        """Return a leg of a description; errors as of ``robot_from``."""
+        chain = known.leg(legs[leg])
+        low, high = np.array([_range(known.joints[name]) for name in chain.joints]).T
+        low, high = low + MARGIN * (high - low), high - MARGIN * (high - low)
+        axes, points, _ = chain.posed(0.5 * (low + high))
+        pairs = [k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99
+                 and np.linalg.norm(points[k + 1] - points[k]) > BENT * sum(chain.lengths)
+                 and (k or abs(axes[k, 2]) < 0.7)]
+        biped, count = len(legs) == 2, len(axes)
+        if not pairs or (chain.lengths[-1] < 1e-3 and not biped):
+            why = ('no two joints in a row turn about parallel axes, so that it cannot be bent'
+                   if not pairs else f'nothing is known of what is below {chain.joints[-1]}, not '
+                   'where its foot is: give it a <collision> shape, or install the package of '
+                   'its meshes')
+            raise DescriptionError(f'leg {leg} ({", ".join(chain.joints)}): {why}')
+        bend, aside, end = pairs[0], None, count
+        # Or the leg swings about y, and is bent to the side.
+        if sprawls(axes[max(bend - 1, 0):bend + 2]) or (
+                bend and abs(axes[bend, 0]) > 0.9 and abs(axes[bend - 1, 1]) > 0.9):
+            out = np.array([*outward(axes[bend], points[-1] - points[0]), 0.0])
+            femur, tibia = (np.linalg.norm(points[b] - points[a])
+                            for a, b in ((bend, bend + 1), (bend + 1, count)))
+            aside = points[bend] + femur * (np.cos(RAISED) * out + [0.0, 0.0, np.sin(RAISED)])
+            aside += tibia * (np.cos(LOWERED) * out - [0.0, 0.0, np.sin(LOWERED)])
+        level = bend + 2 < count and aside is None
+        if level:
+            end = count - 1
+        top = 0 if abs(chain.axes[0, 1]) > 0.7 else bend
+        return cls(chain, low, high, bend, top, end,
+                   _up(known, chain.joints[-1]) if level else None, aside, biped)
+
+    @property
+    def height(self) -> float:
+        """From the foot or ankle up to the hip, m."""
+        return (UPRIGHT if self.biped else CROUCHED) * float(sum(
+            self.chain.lengths[self.top:self.end]))
+
+    @property
+    def ground(self) -> float:
+        """Where the foot would be by itself, m upward from the base."""
+        if self.aside is not None:
+            return float(self.aside[2])
+        points = self.chain.posed(0.5 * (self.low + self.high))[1]
+        return float(points[self.top, 2]) - self.height
+
+    def angles(self, ground: float) -> np.ndarray:
+        """Return the stand with the foot, or the ankle, at a height, rad, shape (joints,)."""
+        middle, length = 0.5 * (self.low + self.high), float(sum(self.chain.lengths))
+        wide = self.high - self.low
+        draws = np.random.default_rng(0).uniform(0.1, 0.9, (STARTS - 1, len(middle)))
+
+        def off(angles: np.ndarray) -> np.ndarray:
+            axes, points, turn = self.chain.posed(angles)
+            rest = MIDDLE * (angles - middle) / wide
+            if self.aside is not None:
+                return np.array([*(points[-1] - [*self.aside[:2], ground]) / length, *rest])
+            down = (points[self.end] - points[self.top]) / length
+            tilt = [] if self.sole is None else turn @ self.sole - [0.0, 0.0, 1.0]
+            return np.array([down[0], (points[self.end, 2] - ground) / length,
+                             *axes[self.bend, ::2], *tilt, *rest])
+
+        best, price = middle, inf
+        for start in (middle, *(self.low + draw * wide for draw in draws)):
+            if price > NEAR:
+                found = least_squares(off, start, bounds=(self.low, self.high), x_scale=wide)
+                if (cost := 2.0 * float(found.cost) + self._way(found.x)) < price:
+                    best, price = found.x, cost
+        return np.clip(np.round(best, 3), self.low, self.high) + 0.0
+
+    def _way(self, angles: np.ndarray) -> float:
+        """Return what it costs to have the knee on this side: behind, on two legs before."""
+        if self.aside is not None:
+            return 0.0
+        points = self.chain.posed(angles)[1]
+        hip, foot = points[self.top], points[self.end]
+        knees = points[self.top + 1:self.end]
+        shares = (knees[:, 2] - hip[2]) / min(foot[2] - hip[2], -1e-9)
+        bulges = knees[:, 0] - hip[0] - shares * (foot[0] - hip[0])
+        bulge = float(bulges[np.abs(bulges).argmax()]) * (1.0 if self.biped else -1.0)
+        needed = BENT * float(sum(self.chain.lengths[self.top:self.end]))
+        return 0.0 if bulge > needed else OTHER_WAY if bulge < -needed else STRAIGHT
+
+    def steps(self, angles: np.ndarray, legs: int) -> tuple[list[tuple[float, ...]], list[str]]:
+        """Return weights that swing the foot forward and up, rad, and what each joint does."""
+        axes, points, _ = self.chain.posed(angles)
+        slopes = np.cross(axes, points[self.end] - points[:-1])
+        if self.aside is not None:
+            moved = [max(self.bend - 1, 0), self.bend, self.bend + 1]
+            task = slopes[moved].T
+        else:
+            moved = ([k for k in range(len(axes)) if abs(axes[k, 1]) > 0.7]
+                     if self.sole is not None else [self.bend, self.bend + 1])
+            # Forward, upward, and the pitch of a sole that stays level.
+            task = np.column_stack([slopes[:, [0, 2]], axes[:, 1]])[moved].T[
+                :3 if self.sole is not None else 2]
+        ways = np.zeros((len(task), 2))
+        ways[0, 0] = SWING * self.height
+        ways[2 if self.aside is not None else 1, 1] = LIFTS[legs > 2] * self.height
+        turned = np.linalg.lstsq(task, ways, rcond=1e-3)[0]
+        weights: list[tuple[float, ...]] = [(0.0,)] * len(angles)
+        roles = ['holds still'] * len(angles)
+        for k, (swing, lift) in zip(moved, turned.tolist(), strict=True):
+            weights[k] = (swing, lift)
+            roles[k] = ('swings' if abs(swing) > abs(lift) or k == min(moved) else
+                        'lifts' if self.aside is not None else
+                        'keeps the foot level' if k > self.bend + 1 or k == self.end
+                        else 'bends in swing')
+        return weights, roles
+
+
+def _up(known: RobotDescription, last: str) -> np.ndarray:
+    """Return which way is up from the sole below a joint with all joints at 0, shape (3,).
+
+    It is the base's, unless the foot is flat on another side.
+    """
+    points, up = known.shapes(last), np.array([0.0, 0.0, 1.0])
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return up
+    ankle = known.frame(last)[0]
+    normals, areas = hull.equations[:, :3], np.array([
+        0.5 * np.linalg.norm(np.cross(points[b] - points[a], points[c] - points[a]))
+        for a, b, c in hull.simplices])
+    faces = [(float(areas[normals @ normal > 0.995].sum()), normal) for normal in normals]
+    # Of the top and the bottom, the one that is further from the ankle.
+    area, down = max(faces, key=lambda face: (round(face[0] / max(areas.sum(), 1e-12), 2), float(
+        np.max((points - ankle) @ face[1]))))
+    shadow = 0.5 * float(np.abs(normals @ down) @ areas)
+    return up if area < FLAT * shadow or -down @ up > 0.99 else -down
+
+
+def _fitting(robot: Robot) -> Robot:
+    """Make weights small enough for all gaits at 1 Hz, all alike so that feet go straight."""
+    low, high, fast = (robot.column(key) for key in ('lower', 'upper', 'velocity'))
+    offset, fraction = robot.column('offset'), 1.0
+    for network in robot.networks:
+        for gait in NETWORKS[network].gaits():
+            gait_plan = plan_gait(unlimited(robot), gait, 1.0, network=network)
+            room = np.stack([offset - low, high - offset, fast])
+            needed = np.stack([-gait_plan.span[0], gait_plan.span[1], gait_plan.speed])
+            fraction = min(fraction, float((USED * room / np.maximum(needed, 1e-9)).min()))
+    return replace(robot, legs={leg: tuple(replace(joint, weights=tuple(
+        round(fraction * weight, 4) for weight in joint.weights))
+        for joint in joints) for leg, joints in robot.legs.items()})
