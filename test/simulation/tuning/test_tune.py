@@ -14,6 +14,7 @@
 
 """The tool tune: what it searches for, writes, refuses and says."""
 
+from argparse import Namespace
 from dataclasses import replace
 import importlib.util
 import re
@@ -223,11 +224,12 @@ def test_designs_nearer_to_the_limits_are_cheaper():
 
 def test_gaits_that_cannot_be_had_are_named_beside_those_that_can(monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, plan, update: None)
-    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait)
-                        if gait == 'jump' else Tuned(gait, None, 1.0, 2.0, Motion(), None, 1.0))
+    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait) if gait == 'jump' else
+                        Tuned(gait, None, 1.0, 2.0, Motion(), Namespace(upright=True, speed=1.0),
+                              1.0))
     robot, found, missing = tuning.tune(GO2, 'go2', ['walk', 'jump'], 5, 0)
     assert [one.gait for one in found] == ['walk'] and missing == ['jump: too fast']
-    assert replace(robot.motions['walk'], efference=None) == Motion()
+    assert replace(robot.motions['walk'], efference=None) == Motion(verdict='good: 1.00 m/s')
     with pytest.raises(SimulationError, match='jump: too fast'):
         tuning.tune(GO2, 'go2', ['jump'], 5, 0)
 
