@@ -21,47 +21,61 @@ With --sensors the faults are those of the sensors of a simulated Go2 that trots
 each row of ``test/support/sensor_faults.py`` with some seeds. A seed draws the noise and the time
 at which the fault begins.
 
-usage: bench_faults.py [--times 20] [--only NAME] [--sensors] [--seeds 5]
+With --gaps something holds up a generator at 1 kHz; the longest gap between two of its messages
+is compared with that of one that is left alone, which is measured before and after each.
+
+usage: bench_faults.py [--times 20] [--only NAME] [--sensors] [--seeds 5] [--gaps]
 """
 
 import argparse
 from collections import Counter
+from contextlib import ExitStack
 import math
+import os
 from pathlib import Path
+import pty
 import subprocess
 import sys
 import tempfile
+import time
 from xml.etree import ElementTree
 
 from common import emit, log, ROOT
-from processes import enter_workspace
+import numpy as np
+from processes import ends_with_us, enter_workspace, HERE, Listener, Process
 
 sys.path.append(str(ROOT / 'test' / 'support'))
 
 #: Attack -> the file of its tests, and their names.
 FAULTS = {
-    'blocked log': ('nodes/test_blocked_log.py',
+    'blocked log': ('ros/test_blocked_log.py',
                     'test_a_generator_moves_on_and_ends_at_the_stand', 'test_a_bridge_sits_down',
                     'test_every_node_ends_though_its_terminal_is_paused'),
-    'ending signal': ('nodes/test_process.py', 'test_a_signal_ends_it_at_the_stand_with_code_0',
+    'ending signal': ('ros/test_process.py', 'test_a_signal_ends_it_at_the_stand_with_code_0',
                       'test_a_signal_while_it_imports_is_one_line'),
-    'stopped clock': ('nodes/test_clock.py',
+    'stopped clock': ('ros/test_clock.py',
                       'test_a_stop_does_not_wait_for_a_clock_that_stands_still',
                       'test_disabled_and_enabled_again_while_the_clock_stands_still'),
-    'clock that jumps': ('nodes/test_clock.py', 'test_a_looped_clock',
+    'clock that jumps': ('ros/test_clock.py', 'test_a_looped_clock',
                          'test_two_publishers_of_different_times',
                          'test_a_stop_between_two_clocks',
                          'test_jitter_of_the_clock_is_not_seen'),
-    'watchdog': ('nodes/test_unitree_live.py',
+    'watchdog': ('ros/bridges/test_unitree_live.py',
                  'test_bridge_and_watchdog_killed_together_leave_the_last_command',
                  'test_another_users_watchdog_is_not_trusted',
                  'test_what_happens_on_a_fault[fed_by_another_user]'),
-    'steering': ('panel/test_panel_lease.py', 'test_two_pages_do_not_steer_at_once',
+    'steering': ('ros/panel/test_panel_lease.py', 'test_two_pages_do_not_steer_at_once',
                  'test_a_link_with_a_delay_does_not_steer',
                  'test_a_page_that_was_frozen_does_not_steer',
                  'test_a_panel_that_was_stopped_publishes_zero_first',
                  'test_stop_works_from_any_page')}
 TARGETS = {'failed': 0, 'skipped': 0}
+#: What holds up a generator: its own threads, see disturbed_generator.py, where its log goes, and
+#: requests of changes.
+KINDS = 'log', 'garbage', 'lock', 'compile'
+DISTURBANCES = 'terminal', 'pipe', 'parameters', *KINDS
+#: Longest gap beyond that of an idle run, ms; time from the start to the first message, s.
+MOST_MORE, SETTLE = 5.0, 5.0
 #: Faults that stop the legs, too: the servos keep the pose of an instant in mid-trot.
 LEGS_STOP = 'stalled'
 SENSOR_TARGETS = {'fell': 0, 'crossed': 0}
@@ -120,14 +134,56 @@ def sensor_table(seeds: int, only: str) -> None:
              if key == 'crossed' or not fault.startswith(LEGS_STOP)))
 
 
+def gap_ms(kind: str, seconds: float) -> float:
+    """Return the longest time between two messages being handed to the middleware, ms."""
+    own, output = pty.openpty() if kind == 'terminal' else os.pipe()
+    words = {'rate': 1000.0, 'robot': 'unitree_go2', 'combined_topic': 'joint_states'}
+    disturbance = 'log' if kind in ('terminal', 'pipe') else kind if kind in KINDS else 'idle'
+    command = [sys.executable, str(HERE / 'disturbed_generator.py'), disturbance, '--ros-args',
+               *(word for name, value in words.items() for word in ('-p', f'{name}:={value}'))]
+    with ExitStack() as running:
+        process = running.enter_context(subprocess.Popen(
+            command, stdout=output, stderr=output, preexec_fn=ends_with_us))
+        running.callback(process.kill)
+        time.sleep(SETTLE)
+        if kind == 'terminal':
+            os.write(own, b'\x13')  # Ctrl-S; a pipe that nobody reads fills by itself
+        elif kind == 'parameters':
+            running.enter_context(Process([sys.executable, str(HERE / 'flood.py')]))
+        listener = running.enter_context(Listener(seconds))
+        record, _ = listener.record()
+    os.close(own)
+    os.close(output)
+    source = record['source'][int(record['source'].size > 500) * 500:]
+    return float(np.diff(source).max()) * 1e-6
+
+
+def gap_table(seconds: float, only: str) -> None:
+    """Measure the longest gaps."""
+    found = {}
+    for kind in DISTURBANCES:
+        if only in kind:
+            before, gap, after = (gap_ms(one, seconds) for one in ('idle', kind, 'idle'))
+            found[kind] = {'gap_ms': gap, 'idle_ms': [before, after],
+                           'more_ms': gap - max(before, after)}
+            log(f'{kind}: {found[kind]}')
+    emit(benchmark='gaps', seconds=seconds, **found, targets={'more_ms': MOST_MORE},
+         passed=all(one['more_ms'] <= MOST_MORE for one in found.values()))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--times', type=int, default=20, help='repetitions of each test')
     parser.add_argument('--only', default='', help='attacks with this in their names')
     parser.add_argument('--sensors', action='store_true', help='faults of the sensors instead')
     parser.add_argument('--seeds', type=int, default=5, help='of each fault of the sensors')
+    parser.add_argument('--gaps', action='store_true', help='longest gaps between messages')
+    parser.add_argument('--seconds', type=float, default=20.0, help='of each run with --gaps')
     given = parser.parse_args()
     enter_workspace()
+    if given.gaps:
+        gap_table(given.seconds, given.only)
+        return
     if given.sensors:
         sensor_table(given.seeds, given.only)
         return

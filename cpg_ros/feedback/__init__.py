@@ -18,5 +18,5 @@ Arrays have a leading axis of robots, of length 1 for a single robot. Imports ``
 rooms below it; knows nothing of ROS and of no physics engine.
 """
 
-__all__ = ['biped', 'efference_copy', 'estimate', 'feedback', 'gains', 'gait_tables',
-           'input_checks', 'kinematics', 'laws', 'leg_rates', 'tick']
+__all__ = ['biped', 'by_address', 'closed_loop', 'efference_copy', 'estimate', 'feedback',
+           'gains', 'gait_tables', 'input_checks', 'kinematics', 'laws', 'leg_rates', 'tick']

@@ -18,19 +18,10 @@ from collections.abc import Callable
 
 from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.efference_copy import EfferenceCopy
-from cpg_ros.feedback.estimate import loads_of, Odometry, SensorData
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.gains import Gains, Memory
 from cpg_ros.feedback.gait_tables import GaitTables, SLOTS, Timetable
-from cpg_ros.feedback.input_checks import (
-    agreement,
-    IMU,
-    IMU_MEMORY,
-    judge_imu,
-    judge_joints,
-    judge_loads,
-)
 from cpg_ros.feedback.kinematics import Geometry
-from cpg_ros.feedback.leg_rates import RatesCheck
 from cpg_ros.feedback.tick import PlannedMotion, tick
 from cpg_ros.motion.plan import GaitPlan
 import numpy as np
@@ -43,6 +34,7 @@ class Feedback:
         geometry: of the legs.
         gains: of the laws; may be replaced between ticks.
         memory: state and output of the laws.
+        tables: of the gaits that it has learnt.
         angles: the last corrected ones, rad, shape (runs, joints).
 
     """
@@ -53,7 +45,7 @@ class Feedback:
         legs = len(geometry.hips)
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
-        self._legs, self._tables = geometry.arrays, GaitTables.empty(legs)
+        self._legs, self.tables = geometry.arrays, GaitTables.empty(legs)
         self._programs: list[GaitPlan | None] = [None] * SLOTS
         self._learnt = 0
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
@@ -69,7 +61,7 @@ class Feedback:
         if expected is None and plan.motion.efference is not None:
             expected = EfferenceCopy.of(plan.motion.efference)
         slot = self._learnt % SLOTS
-        self._tables.fill(slot, Timetable(plan, self.geometry),
+        self.tables.fill(slot, Timetable(plan, self.geometry),
                           expected or EfferenceCopy.blank(), plan)
         self._programs[slot] = plan
         self._learnt += 1
@@ -106,39 +98,10 @@ class Feedback:
 
         """
         # A plain tuple, which is made faster than a named one.
-        arguments = (self._legs, self._tables, self.gains, self.memory, sensors, planned,
+        arguments = (self._legs, self.tables, self.gains, self.memory, sensors, planned,
                      (dt, fraction * level, level, delay), self.angles)
         if self._tick is None or self._bound is not self.gains:
             self.gains.check()
             self._tick, self._bound = specialised(tick, *arguments), self.gains
         self._tick(*arguments)
         return self.angles
-
-
-# Make every kernel of the feedback ready, compiling those not yet on disk.
-
-def warm_up_judges(legs: int, joints: int) -> None:
-    """Run the kernels that judge messages once; legs and joints are their numbers."""
-    sensors, some, load = SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(legs)
-    places = np.arange(joints)
-    # As they come in messages: not to be written to.
-    message = np.frombuffer(bytes(8 * max(IMU, joints)))
-    judge_imu(message, 0.1, True, np.zeros(4), np.zeros(IMU_MEMORY), sensors.rpy[0],
-              sensors.angular_velocity[0], sensors.acceleration[0])
-    judge_joints(message, message, places, some, some, some, some, some)
-    judge_loads(message, places[:legs], 1.0, 0.1, np.zeros(1), load)
-
-
-def warm_up(geometry: Geometry, joints: int) -> None:
-    """Run each kernel once, on the types that a generator uses; joints is their number."""
-    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
-    warm_up_judges(legs, joints)
-    sensors, some, load = SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(legs)
-    one = np.zeros(1)
-    RatesCheck(geometry).verdict(sensors, 0.002)
-    loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
-    agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
-    planned = PlannedMotion(some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),
-                            np.zeros((1, 2)), one.copy(), one.copy())
-    feedback.advance(sensors, planned, 0.002, 0.0)
-    Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)

@@ -14,6 +14,7 @@
 
 """Tables of the gaits that the feedback corrects, in arrays that are filled once."""
 
+import ctypes
 import itertools
 from typing import NamedTuple
 
@@ -103,6 +104,8 @@ class GaitTables(NamedTuple):
         turn: rad/s of yaw for each unit by which right strides exceed left ones, the same.
         sides: -1/2 of left legs and 1/2 of right ones, shape (legs,); 0 before a gait that can
             be steered is known.
+        copied: whether the robot file has an efference copy of the gait, shape (SLOTS,).
+        keys: addresses of the gaits as the core has them, shape (SLOTS,).
 
     """
 
@@ -117,6 +120,8 @@ class GaitTables(NamedTuple):
     at: np.ndarray
     turn: np.ndarray
     sides: np.ndarray
+    copied: np.ndarray
+    keys: np.ndarray
 
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
@@ -125,7 +130,8 @@ class GaitTables(NamedTuple):
                    np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
                    np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
-                   np.ones((SLOTS, ROWS)), np.zeros(legs))
+                   np.ones((SLOTS, ROWS)), np.zeros(legs), np.zeros(SLOTS, dtype=bool),
+                   np.zeros(SLOTS, dtype=np.int64))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
@@ -141,6 +147,8 @@ class GaitTables(NamedTuple):
         self.turns[slot] = not timetable.hops
         self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
         self.expected[slot] = _filled(expected.table, SPEEDS, 'an efference copy')
+        self.copied[slot] = plan.motion.efference is not None
+        self.keys[slot] = ctypes.addressof(plan.core.struct)
         steering = plan.motion.steering
         self.steered[slot] = steering is not None
         if steering is not None:

@@ -22,7 +22,7 @@ import math
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.strides import smoothstep
+import numpy as np
 
 # Monitoring of the feedback's inputs: whether each is valid, or since when it is not.
 
@@ -41,116 +41,143 @@ AGE_MEMORY, IN_TIME = 0.1, 0.9
 FADE, GOOD = 0.15, 0.3
 
 
+#: Numbers of a monitor, times in s: when the last valid message came, when numbers last
+#: differed, when any message came, the stamp of the last valid one, when its age was last looked
+#: at, that age, since when the input is out, whether it is late, what is wrong with the last
+#: message, how old its stamp is, and the largest age.
+BELIEVED, CHANGED, CAME, MEASURED, USED, AGE, SINCE, IS_LATE, WRONG, LAG, LATEST = range(11)
+
+
+@jit
+def note(monitor, now, stamp, same, verdict, patience):
+    """Record a message.
+
+    Args:
+        monitor: numbers of an input, see above.
+        now: s.
+        stamp: of the message, the same clock's, s; NaN if it has none.
+        same: whether its numbers are those of the last one.
+        verdict: what is wrong with them, an index into VERDICTS.
+        patience: for how long the same numbers may come again, s.
+
+    """
+    monitor[CAME] = now
+    if not same:
+        monitor[CHANGED] = now
+    elif verdict == 0 and now > monitor[CHANGED] + patience:
+        verdict = REPEATED
+    if not math.isnan(stamp) and not abs(now - stamp) <= DELAYED:
+        monitor[LAG], verdict = now - stamp, MISSTAMPED
+    monitor[WRONG] = verdict
+    if verdict == 0:
+        monitor[BELIEVED], monitor[MEASURED] = now, stamp
+
+
+@jit
+def is_out(monitor, now):
+    """Update the age of what is used now, s; tell whether the input is out."""
+    stale, late = now - monitor[BELIEVED] > STALE, False
+    if stale:
+        # What comes after a gap is as old as it is, whatever was before.
+        monitor[AGE], monitor[IS_LATE] = math.nan, 0.0
+    elif not math.isnan(monitor[MEASURED]):
+        age = max(now - monitor[MEASURED], 0.0)
+        if math.isnan(monitor[AGE]):
+            monitor[AGE] = age
+        else:
+            monitor[AGE] += min((now - monitor[USED]) / AGE_MEMORY, 1.0) * (age - monitor[AGE])
+        monitor[USED] = now
+        late = monitor[AGE] > monitor[LATEST] * (IN_TIME if monitor[IS_LATE] else 1.0)
+        monitor[IS_LATE] = late
+    if not (late or stale):
+        monitor[SINCE] = math.nan
+    elif math.isnan(monitor[SINCE]):
+        monitor[SINCE] = now
+    return late or stale
+
+
 class InputMonitor:
     """Monitors the age of one input and the faults of its messages.
 
     Attributes:
         name: of the input.
-        believed: when its last valid message came, s; -inf before the first one.
-        since: when it went out, s; NaN while it is in.
-        age: of its newest measurement when it is used, by its stamp, low-passed, s; NaN where
-            messages have no stamps, and before the first one.
+        numbers: see BELIEVED and what follows it.
+        other: what is wrong with messages that no check could read.
 
     """
 
-    def __init__(self, name: str, latest: float = math.inf) -> None:
+    def __init__(self, name: str, latest: float = math.inf, numbers: np.ndarray | None = None
+                 ) -> None:
         """Monitor an input of which measurements count up to an age in s."""
-        self.name, self._latest = name, latest
+        self.name, self._latest, self.other = name, latest, ''
+        self.numbers = np.empty(LATEST + 1) if numbers is None else numbers
         self.restart()
 
     def restart(self) -> None:
         """Forget all messages."""
-        self.believed, self.since = -math.inf, math.nan
-        self._changed, self._content, self._wrong = -math.inf, b'', ''
-        self._came = self._measured = -math.inf
-        self._used = self.age = math.nan
-        self._late = False
+        self.numbers[:] = math.nan
+        self.numbers[[BELIEVED, CHANGED, CAME]] = -math.inf
+        self.numbers[[IS_LATE, WRONG, LAG]], self.numbers[LATEST] = 0.0, self._latest
+
+    @property
+    def believed(self) -> float:
+        """When the last valid message came, s; -inf before the first one."""
+        return float(self.numbers[BELIEVED])
+
+    @property
+    def since(self) -> float:
+        """When it went out, s; NaN while it is in."""
+        return float(self.numbers[SINCE])
+
+    @property
+    def age(self) -> float:
+        """Age of the newest measurement when it is used, by its stamp, low-passed, s, or NaN."""
+        return float(self.numbers[AGE])
 
     @property
     def refused(self) -> bool:
         """Whether messages have come, none of them valid."""
-        return self.believed == -math.inf and bool(self._wrong)
-
-    def gap(self, now: float) -> float:
-        """Time since the last valid message, s, at most 1."""
-        return min(now - self.believed, 1.0)
-
-    def interval(self, now: float) -> float:
-        """Time since the last message, valid or not, s, at most 1."""
-        return min(now - self._came, 1.0)
-
-    def note(self, now: float, stamp: float | None, content: bytes, wrong: str = '',
-             patience: float = 0.0) -> None:
-        """Record a new message.
-
-        Args:
-            now: s.
-            stamp: of the message, the same clock's, s; None if it has none.
-            content: its numbers as bytes.
-            wrong: what is wrong with them, '' for nothing.
-            patience: for how long the same numbers may come again, s.
-
-        """
-        self._came = now
-        if content != self._content:
-            self._content, self._changed = content, now
-        elif now > self._changed + patience:
-            wrong = wrong or 'the same numbers again and again'
-        if stamp is not None and not abs(now - stamp) <= DELAYED:
-            late = now - stamp
-            wrong = (f'stamps {late:.2f} s old' if late > 0.0 else
-                     f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
-        self._wrong = wrong
-        if not wrong:
-            self.believed = now
-            self._measured = -math.inf if stamp is None else stamp
-
-    def _is_late(self, now: float) -> bool:
-        """Update the low-passed age of the measurements, s; tell whether it is too large."""
-        if self._measured == -math.inf:
-            return False
-        age = max(now - self._measured, 0.0)
-        if math.isnan(self.age):
-            self.age = age
-        else:
-            self.age += min((now - self._used) / AGE_MEMORY, 1.0) * (age - self.age)
-        self._used = now
-        self._late = self.age > self._latest * (IN_TIME if self._late else 1.0)
-        return self._late
+        return self.believed == -math.inf and bool(self.numbers[WRONG])
 
     def fault(self, now: float) -> str:
         """Say why the input is out, or ''."""
-        stale = now - self.believed > STALE
-        late = not stale and self._is_late(now)
-        if stale:
-            # What comes after a gap is as old as it is, whatever was before.
-            self.age, self._late = math.nan, False
-        if not (late or stale):
-            self.since = math.nan
+        is_out(self.numbers, now)
+        return self.reason
+
+    @property
+    def reason(self) -> str:
+        """Why it was out when this was last judged, or ''."""
+        wrong, late = int(self.numbers[WRONG]), self.numbers[LAG]
+        if math.isnan(self.numbers[SINCE]):
             return ''
-        if math.isnan(self.since):
-            self.since = now
-        if not stale:
+        if self.numbers[IS_LATE]:
             return (f'the measurement is {1e3 * self.age:.0f} ms old when it is used, more than '
                     f'feedback.max_delay, {1e3 * self._latest:.0f} ms')
-        return self._wrong or ('no message yet' if self.believed == -math.inf else 'no messages')
+        if wrong == MISSTAMPED:
+            return (f'stamps {late:.2f} s old' if late > 0.0 else
+                    f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
+        if wrong == UNREADABLE:
+            return self.other
+        return VERDICTS[wrong] or ('no message yet' if self.believed == -math.inf else
+                                   'no messages')
 
 
-class Fade:
-    """The share of the feedback: smoothly to 0 where an input is out, and back."""
+@jit
+def fade(way, good, valid, dt):
+    """Return how far the feedback is faded in, and for how long inputs are valid, dt s later.
 
-    def __init__(self) -> None:
-        self._way, self._good = 0.0, 0.0
+    Args:
+        way: 0 to 1, of which the smooth step is the fraction of the feedback.
+        good: for how long all inputs have been valid, s.
+        valid: whether they are.
+        dt: s.
 
-    def advance(self, good: bool, dt: float) -> float:
-        """Return the share dt in s later; good if all inputs are valid."""
-        self._good = self._good + dt if good else 0.0
-        if self._good >= GOOD or (good and self._way >= 1.0):
-            self._way = min(1.0, self._way + dt / FADE)
-        else:
-            # Also where a good message comes between bad ones.
-            self._way = max(0.0, self._way - dt / FADE)
-        return smoothstep(self._way)
+    """
+    good = good + dt if valid else 0.0
+    if good >= GOOD or (valid and way >= 1.0):
+        return min(1.0, way + dt / FADE), good
+    # Also where a good message comes between bad ones.
+    return max(0.0, way - dt / FADE), good
 
 
 #: VERDICTS: faults of a message, by the number that the checks return; 0 is none.
@@ -161,7 +188,11 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
             'a joint far beyond its limits', 'an impossible speed of a joint',
             'impossible loads on the feet',
             'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
-            'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed')
+            'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed',
+            'the same numbers again and again', '', '')
+#: Numbers of the last ones: REPEATED: the same values; MISSTAMPED: a stamp far from now;
+#: UNREADABLE: another layout.
+REPEATED, MISSTAMPED, UNREADABLE = 11, 12, 13
 #: UNIT: largest difference of a quaternion's length from 1; FASTEST: largest angular velocity,
 #: rad/s; HARDEST: largest acceleration, m/s^2, and TELLING: time constant of its low-pass, s.
 UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05

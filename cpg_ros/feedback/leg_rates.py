@@ -19,11 +19,9 @@ show how the base turns about every axis but the line from one foot to the other
 mounted turned about the vertical contradicts nothing but this.
 """
 
-from collections.abc import Callable
-
-from cpg_ros.dynamics.integration.compilation import jit, jit_entry, specialised
-from cpg_ros.feedback.estimate import SensorData, TOUCH, velocity_by_leg
-from cpg_ros.feedback.kinematics import foot_of, Geometry
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.estimate import TOUCH, velocity_by_leg
+from cpg_ros.feedback.kinematics import foot_of
 import numpy as np
 
 #: MOUNTS: ways of mounting the IMU, each as its x and y axis in the base's frame: as it should be,
@@ -110,27 +108,6 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
     return int(memory[count + 1])
 
 
-class RatesCheck:
-    """Comparison of the angular velocity of one robot's IMU with the motion of its legs."""
-
-    def __init__(self, geometry: Geometry) -> None:
-        self._legs, self._memory = geometry.arrays, np.zeros(RATES_MEMORY)
-        self._scratch = np.zeros((len(geometry.hips), 6)), np.zeros((4, 3))
-        self._kernel: Callable | None = None
-
-    def restart(self) -> None:
-        """Forget what was measured."""
-        self._memory[:] = 0.0
-
-    def verdict(self, sensors: SensorData, dt: float) -> str:
-        """Return how the IMU is mounted wrong, after a further measurement; '' if it is right.
-
-        Args:
-            sensors: of one run.
-            dt: since the last time, s.
-
-        """
-        arguments = self._legs, sensors, dt, self._memory, *self._scratch
-        if self._kernel is None:
-            self._kernel = specialised(compare_rates, *arguments)
-        return MOUNTED[self._kernel(*arguments)]
+def rates_memory(legs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return memory and scratch of compare_rates."""
+    return np.zeros(RATES_MEMORY), np.zeros((legs, 6)), np.zeros((4, 3))

@@ -75,7 +75,8 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
     'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
     'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_lead_in': (_POINTER, _REAL),
-    'cpg_take': (_POINTER,), 'cpg_track_look': (_POINTER, _REAL),
+    'cpg_take': (_POINTER,), 'cpg_report': (_POINTER,) * 3,
+    'cpg_track_look': (_POINTER, _REAL),
     'cpg_track_advance': (_POINTER, _REAL), 'cpg_track_reseed': (_POINTER, _REAL),
     'cpg_steer': (_POINTER, _REAL),
     'cpg_confine': (ctypes.c_int, *[_POINTER] * 3, _REAL, *[_POINTER] * 3)}

@@ -49,6 +49,7 @@ class Machine(NamedTuple):
         resume: function that resumes after a stall.
         plan: function that computes the wanted angles, which may then be corrected.
         follow: function that moves the joints to the wanted angles within their limits.
+        report: function that fills numbers and gaits, see Pattern.report.
         what: address of the core's struct, first argument of all functions; the second argument
             is a time in s, a double.
         asked: address of a 32-bit integer that is not 0 if the next tick needs Python.
@@ -60,6 +61,7 @@ class Machine(NamedTuple):
     resume: int | None
     plan: int | None
     follow: int | None
+    report: int | None
     what: int
     asked: int
     position: int
@@ -394,15 +396,32 @@ class Pattern:
     @property
     def machine(self) -> Machine | None:
         """Addresses by which compiled code advances the pattern, None if a tick needs Python."""
-        if self._drift or self.correct or type(self).advance is not Pattern.advance:
+        if self._drift or type(self).advance is not Pattern.advance:
             return None
         addresses: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (
             self._core.cpg_advance, self._core.cpg_resume, self._core.cpg_plan,
-            self._core.cpg_follow)]
+            self._core.cpg_follow, self._core.cpg_report)]
         addresses += [self._address, ctypes.addressof(self._asked)]
         addresses += [self._address + getattr(Core, name).offset
                       for name in ('position', 'velocity', 'legs', 'state')]
         return Machine(*addresses)
+
+    @property
+    def planned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Angles before and after a correction, rad, (joints,), and the clock's factor, (1,)."""
+        return self._wanted, self._goal, np.ndarray(
+            1, float, memoryview(self._struct).cast('B'), Core.frequency_scale.offset)
+
+    def report(self, numbers: np.ndarray, gaits: np.ndarray) -> None:
+        """Fill what a correction goes by.
+
+        Args:
+            numbers: level, phase of the first leg, share of the gait that is entered, strides per
+                second (Hz), whether the gait changes, shape (5,).
+            gaits: addresses of GaitPlan.core of the gait left and of the entered one, (2,).
+
+        """
+        self._core.cpg_report(self._address, numbers.ctypes.data, gaits.ctypes.data)
 
     # -- the tick --------------------------------------------------------------------------
 

@@ -24,7 +24,7 @@ from cpg_ros.feedback.laws.stiffen import LAW
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import LARGEST
 from cpg_ros.ros.generator_io import COMMAND_TOPICS, joint_state
-from cpg_ros.ros.node.message_block import indices, MessageBlock
+from cpg_ros.ros.node.message_block import indices, MessageBlock, Template
 from cpg_ros.ros.node.polled import PolledSubscription
 import numpy as np
 from rclpy.node import Node
@@ -43,18 +43,30 @@ LARGEST_SCALE = LAW.gains['stiffen_kp'].high
 
 
 class KpScalePublisher:
-    """Publishes the factor when it changes, and repeats it while it is not 1."""
+    """Publishes the factor when it changes, and repeats it while it is not 1.
+
+    Attributes:
+        block: the message.
+
+    """
 
     def __init__(self, node: Node) -> None:
-        self._publisher = node.create_publisher(Float64, KP_SCALE_TOPIC, 1)
-        self._message, self._elapsed = Float64(data=1.0), 0.0
+        message = Float64()
+        self.block = MessageBlock(node, [1], [(KP_SCALE_TOPIC, Template(
+            message, numbers=[(message, 'data', np.arange(1))]))])
+        self._last, self._elapsed = 1.0, 0.0
 
     def publish(self, dt: float, scale: float) -> None:
         """Publish the factor if it is time; dt since the last call, s."""
         self._elapsed += dt
-        if scale != self._message.data or (scale != 1.0 and self._elapsed >= REPEAT):
-            self._message.data, self._elapsed = scale, 0.0
-            self._publisher.publish(self._message)
+        if scale != self._last or (scale != 1.0 and self._elapsed >= REPEAT):
+            self._last, self._elapsed = scale, 0.0
+            self.block.publish(0, (np.array([scale]),))
+
+    def output(self, scale: np.ndarray, rate: float) -> int:
+        """Return MessageBlock.output of a factor, shape (1,), at a rate of ticks, Hz."""
+        self._from = np.array([scale.ctypes.data], dtype=np.uint64)
+        return self.block.output((self._from.ctypes.data,), round(rate * REPEAT), quiet=True)
 
 
 class KpScaleSubscription:

@@ -15,6 +15,7 @@
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
 from collections.abc import Callable
+import ctypes
 from functools import partial
 import sys
 import time
@@ -317,6 +318,7 @@ class Generator(StartedNode):
             self._announce()
         if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
+        if any(p.name in (ENABLED, f'{PREFIX}virtual_stiffness') for p in parameters):
             self.ticker.attend()
 
     def _announce(self) -> None:
@@ -497,17 +499,24 @@ class Generator(StartedNode):
 
         What the pattern is asked for is taken there; what else there is calls ``Ticker.attend``.
         """
-        pattern, ticker = self.pattern, self.ticker
+        pattern, ticker, feedback = self.pattern, self.ticker, self._feedback
         machine = pattern.machine
-        if self._feedback.loop is not None or ticker.paused or machine is None:
+        if ticker.paused or machine is None:
             return None
-        outputs, cells = self._outputs.block, self._cells.block
         loop = native.Loop(**{name: getattr(machine, name)
                               for name in ('asked', 'advance', 'resume', 'what')})
-        loop.outputs[:] = (outputs.output((machine.position, machine.velocity, machine.phases), 1),
-                           cells.output((machine.state,), max(1, round(ticker.rate / FASTEST))))
+        outputs, cells = self._outputs.block, self._cells.block
+        found = [outputs.output((machine.position, machine.velocity, machine.phases), 1),
+                 cells.output((machine.state,), max(1, round(ticker.rate / FASTEST)))]
+        if feedback.loop is not None:
+            correction = feedback.machine(machine)
+            if correction is None:
+                return None
+            loop.correct = ctypes.addressof(correction)
+            found.append(feedback.output(ticker.rate))
+        loop.outputs[:len(found)] = found
         self._sent = pattern.position
-        with outputs.held(), cells.held():
+        with outputs.held(), cells.held(), feedback.held():
             return run(loop, deadline, period)
 
     def _restart(self) -> None:
@@ -534,6 +543,10 @@ class Generator(StartedNode):
             self.ticker.start()
         else:
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
+
+    def look(self) -> None:
+        """Let ticks outside the interpreter know what motion is wanted."""
+        self._feedback.renew()
 
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.

@@ -19,6 +19,7 @@ from cpg_ros.feedback.input_checks import (
     InputMonitor,
     judge_joints,
     LATE,
+    note,
     STALE,
     VERDICTS,
 )
@@ -31,7 +32,7 @@ FASTEST = np.array([20.0, 10.0])
 @pytest.fixture
 def monitor():
     monitor = InputMonitor('imu')
-    monitor.note(1.0, 1.0, b'first')
+    note(monitor.numbers, 1.0, 1.0, False, 0, 0.0)
     assert not monitor.fault(1.0)
     return monitor
 
@@ -40,16 +41,16 @@ def monitor():
     (-1.5 * DELAYED, 'stamps 0.15 s old'), (1.5 * DELAYED, 'stamps 0.15 s ahead')])
 def test_stamps_far_from_now_are_named(monitor, off, why):
     now = 1.0 + 1.1 * STALE
-    monitor.note(now, now + off, b'second')
+    note(monitor.numbers, now, now + off, False, 0, 0.0)
     assert why in monitor.fault(now)
-    monitor.note(now, now + off / 2.0, b'third')
+    note(monitor.numbers, now, now + off / 2.0, False, 0, 0.0)
     assert not monitor.fault(now)
 
 
 def test_the_same_numbers_are_believed_for_as_long_as_allowed(monitor):
-    monitor.note(1.2, 1.2, b'first', patience=0.3)
+    note(monitor.numbers, 1.2, 1.2, True, 0, 0.3)
     assert not monitor.fault(1.2)
-    monitor.note(1.4, 1.4, b'first', patience=0.3)
+    note(monitor.numbers, 1.4, 1.4, True, 0, 0.3)
     assert monitor.fault(1.4) == 'the same numbers again and again'
 
 
@@ -76,9 +77,9 @@ def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
 
 def late_monitor(delay, now):
     monitor = InputMonitor('imu', latest=LATE)
-    for k in range(100):
+    for _ in range(100):
         now += 0.005
-        monitor.note(now, now - delay, b'%d' % k)
+        note(monitor.numbers, now, now - delay, False, 0, 0.0)
         monitor.fault(now)
     return monitor, now
 
@@ -94,5 +95,5 @@ def test_measurements_that_are_old_when_they_are_used_are_out(delay, late):
 def test_the_age_before_a_gap_does_not_count_after_it():
     monitor, now = late_monitor(0.02, 1.0)
     assert monitor.fault(now + 1.0) == 'no messages' and np.isnan(monitor.age)
-    monitor.note(now + 1.0, now + 1.0, b'again')
+    note(monitor.numbers, now + 1.0, now + 1.0, False, 0, 0.0)
     assert not monitor.fault(now + 1.0) and monitor.age == 0.0

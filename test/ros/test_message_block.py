@@ -16,12 +16,9 @@
 
 from contextlib import nullcontext
 import ctypes
-import subprocess
-import sys
 from types import SimpleNamespace
 
 from builtin_interfaces.msg import Duration, Time
-from c_export import needs_gcc
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.generator_io import Outputs
 from cpg_ros.ros.node import native
@@ -40,7 +37,6 @@ from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiAr
 from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-LIBRARY = native.library
 ROBOTS = [load_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
 SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'uint16': 2, 'int32': 4, 'uint32': 4, 'double': 8}
 
@@ -59,7 +55,7 @@ class Graph:
 
     """
 
-    def __init__(self, monkeypatch, in_c):
+    def __init__(self, monkeypatch):
         self.sent, self.kinds, self.refused = {}, {}, None
         self._topics = []
         send = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_size_t,
@@ -68,7 +64,6 @@ class Graph:
         self._functions = {'rcl_publish_serialized_message': send, 'rcutils_reset_error': forget}
         monkeypatch.setattr(native, 'address', lambda name: ctypes.cast(
             self._functions[name], ctypes.c_void_p).value)
-        monkeypatch.setattr(native, 'library', LIBRARY if in_c else lambda: None)
 
     def _send(self, publisher, message, _):
         if publisher - 1 == self.refused:
@@ -89,11 +84,11 @@ class Graph:
                                publish=lambda raw: self.sent.update({topic: raw}))
 
 
-@pytest.fixture(scope='module', params=['python', pytest.param('c', marks=needs_gcc)])
-def graph(request):
-    """Return what makes a graph, of which messages are published by Python or by C."""
+@pytest.fixture(scope='module')
+def graph():
+    """Return what makes a graph."""
     with pytest.MonkeyPatch.context() as patch:
-        yield lambda: Graph(patch, request.param == 'c')
+        yield lambda: Graph(patch)
 
 
 def written(message, at=0):
@@ -240,9 +235,8 @@ def test_what_is_not_found_in_the_bytes_is_refused(graph):
         MessageBlock(graph(), [1], [('a', twice)])
 
 
-@needs_gcc
 def test_what_the_middleware_refuses_is_published_by_rclpy(monkeypatch):
-    graph = Graph(monkeypatch, in_c=True)
+    graph = Graph(monkeypatch)
     messages = [Float64MultiArray() for _ in range(3)]
     block = MessageBlock(graph, [1], [
         (topic, Template(message, numbers=[(message, 'data', np.arange(1))]))
@@ -253,12 +247,10 @@ def test_what_the_middleware_refuses_is_published_by_rclpy(monkeypatch):
             for topic, raw in graph.sent.items()} == {'a': [2.5], 'b': [2.5], 'c': [2.5]}
 
 
-def test_without_a_compiler_a_line_says_so(monkeypatch, tmp_path):
+def test_without_a_compiler_a_generator_ends_in_one_line(monkeypatch, start, tmp_path):
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path))
     monkeypatch.setenv('CC', 'missing-cc')
-    found = subprocess.run(
-        [sys.executable, '-P', '-c', 'from cpg_ros.ros.node.native import library\n'
-         'print(library(), library())'], capture_output=True, text=True, check=True)
-    assert found.stdout == 'None None\n'
-    assert found.stderr == ('ticks are slower, and less regular: the C compiler that CC names, '
-                            "'missing-cc', is not installed\n")
+    process = start('-p', 'kernel:=c', watch=False)
+    assert process.wait() == 1
+    (line,) = process.log.splitlines()
+    assert line.endswith("the C compiler that CC names, 'missing-cc', is not installed")

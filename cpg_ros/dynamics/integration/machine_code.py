@@ -22,11 +22,12 @@ from typing import Any
 from cpg_ros.common.cache_folder import writing
 from cpg_ros.networks import equations
 from numba import config, njit, prange, typeof
-from numba.core import event
+from numba.core import event, types
 from numba.core.caching import FunctionCache
+from numba.core.ccallback import CFunc
 
-__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'on_compile', 'prange',
-           'renamed', 'specialised']
+__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'machine_function',
+           'on_compile', 'prange', 'renamed', 'specialised']
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
@@ -104,6 +105,22 @@ def renamed(function, key: str):
     """
     function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
     return function
+
+
+def machine_function(function, arguments: tuple) -> Any:
+    """Compile a function of a pointer to arguments like these for C; it has its ``address``."""
+    folder = equations.folder()
+    numba: Any = config
+    kind = (types.CPointer(typeof(arguments)),), types.int64
+    compiled: Any = CFunc(function, kind, {}, OPTIONS)
+    if folder is not None:
+        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
+        try:
+            compiled._cache = _Disk(function)
+        finally:
+            numba.CACHE_DIR = others
+    compiled.compile()
+    return compiled
 
 
 class _Notice(event.Listener):

@@ -15,30 +15,40 @@
 """The feedback loop: from the topics of the robot's sensors to the pattern, at every tick."""
 
 from collections.abc import Callable
+import ctypes
 import math
+from typing import Any
 
+from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
-from cpg_ros.feedback.estimate import Odometry, TOUCH
+from cpg_ros.feedback.closed_loop import (
+    close,
+    CLOSED,
+    CONTRARY,
+    DIES_OUT,
+    FRACTION,
+    Instant,
+    MOUNT,
+    NOW,
+    SPENT,
+    STATE,
+    WANTED,
+)
+from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.gait_tables import POINTS, SLOTS, Timetable
-from cpg_ros.feedback.input_checks import agreement, Fade
+from cpg_ros.feedback.gains import Memory
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.laws.virtual_stiffness import targets
-from cpg_ros.feedback.leg_rates import RatesCheck
+from cpg_ros.feedback.leg_rates import MOUNTED, rates_memory
 from cpg_ros.feedback.tick import PlannedMotion
-from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.pattern import Machine, Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.ros.feedback.sensor_input import SensorInput
+from cpg_ros.ros.node import native
 import numpy as np
 
-#: FURTHEST: largest difference between wanted and measured heading, rad.
-FURTHEST = 0.5
-#: DIES_OUT: time at a share of 0 after which all displacements have decayed, s.
-DIES_OUT = 0.3
-#: AGREES: least mean share of legs whose contacts agree with the gait.
-AGREES = 0.5
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
 
@@ -49,26 +59,26 @@ class SensorLoop:
     Call ``sense`` from the thread of the ticks; all other methods are for any thread.
 
     Attributes:
-        wanted: whether the feedback is enabled.
-        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
-        waiting: whether an input has never arrived.
+        inputs: the robot's sensors.
 
     """
 
     def __init__(self, inputs: SensorInput, motion: Motion) -> None:
-        self._inputs, self._motion = inputs, motion
-        self.wanted, self.waiting, self.faults = False, True, ''
+        self.inputs, self._motion = inputs, motion
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
 
+    def renew(self) -> None:
+        """Take over the wanted motion."""
+
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
-        return self._inputs.ages(now)
+        return self.inputs.ages(now)
 
     def latencies(self) -> dict[str, float]:
         """Return name -> age of its measurements when they are used, low-passed, s."""
-        return self._inputs.latencies()
+        return self.inputs.latencies()
 
     def targets(self, position: np.ndarray) -> np.ndarray:
         """Return the angles to send for target angles, rad, shape (joints,)."""
@@ -79,9 +89,7 @@ class FeedbackLoop(SensorLoop):
     """Corrects a pattern by the robot's sensors, as long as they are plausible.
 
     Attributes:
-        feedback: its laws, whose gains may be replaced.
-        fraction: of all corrections, 0 to 1.
-        kp_scale: factor of the servos' proportional gain.
+        feedback: its laws, whose gains may be replaced, see ``bind``.
         odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
 
     """
@@ -98,133 +106,176 @@ class FeedbackLoop(SensorLoop):
 
         """
         super().__init__(inputs, motion)
-        self._pattern, self._geometry = pattern, geometry
+        self._state = np.zeros(STATE)
+        self._pattern, legs = pattern, len(pattern.robot.legs)
+        self._wanted, self._goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
-        self._rates = RatesCheck(geometry)
-        self._known: list[tuple[GaitPlan, Timetable]] = []
-        self._least = TOUCH * geometry.weight
-        self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
+        self._instant = Instant(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), scale,
+                                np.zeros(legs))
+        self._planned = PlannedMotion(self._wanted[None], np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
                                       np.zeros((1, 2)), np.zeros(1), np.zeros(1))
-        self._trim = np.zeros(len(pattern.robot.legs))
+        self._legs, self._rates = geometry.arrays, rates_memory(legs)
         self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
         self.odometry: Odometry | None = None
+        # It loads numba.
+        from cpg_ros.feedback import by_address
+        self._by_address = by_address
+        self._kernel: Any = None
+        self._memories: list[Any] = []
+        self._correction = self._corrects()
         self.restart()
         self.learn(pattern.plan)
+        self.bind()
+        self._machine = by_address.compiled(self._arguments)
+
+    def _corrects(self) -> native.Correction:
+        """Return how ``tick.c`` corrects, but for what the pattern and the compiler tell."""
+        memory, inputs, instant = self.feedback.memory, self.inputs.structs, self._instant
+        self._blank = Memory.empty(1, len(instant.trim))
+        self._resets = (native.Copy * len(memory))(*[
+            native.Copy(part.ctypes.data, blank.ctypes.data, part.nbytes)
+            for part, blank in zip(memory, self._blank, strict=True)])
+        return native.Correction(
+            take=native.address('rcl_take_serialized_message'),
+            forget=native.address('rcutils_reset_error'), numbers=instant.numbers.ctypes.data,
+            gaits=instant.gaits.ctypes.data, inputs=ctypes.addressof(inputs), count=len(inputs),
+            resets=ctypes.addressof(self._resets), parts=len(memory))
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the feedback is enabled."""
+        return self._state[WANTED] > 0.0
+
+    @wanted.setter
+    def wanted(self, wanted: bool) -> None:
+        self._state[WANTED] = wanted
+
+    @property
+    def fraction(self) -> float:
+        """Fraction of all corrections, 0 to 1."""
+        return float(self._state[FRACTION])
+
+    @property
+    def kp_scale(self) -> float:
+        """Factor of the servos' proportional gain."""
+        return float(self.feedback.memory.kp_scale[0])
+
+    def bind(self) -> None:
+        """Use the feedback's gains from the next tick on.
+
+        Raises:
+            InputError: one is outside its limits.
+
+        """
+        feedback = self.feedback
+        feedback.gains.check()
+        self._arguments = (self._legs, feedback.tables, feedback.gains, feedback.memory,
+                           self.inputs.senses, self.inputs.sensor_data, self._planned,
+                           self._rates, self._instant, self._state, self._goal[None])
+        # A tick under way may still read those before.
+        self._memories = [*self._memories[-1:], self._by_address.memory_of(self._arguments)]
+        self._correction.arguments = ctypes.addressof(self._memories[-1])
+        self._bound = feedback.gains
+        if self._kernel is None:
+            self._kernel = specialised(close, *self._arguments)
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
-        self._fade, self.fraction, self._spent = Fade(), 0.0, math.inf
-        self._dt, self._agrees = 0.0, 1.0
+        wanted = self.wanted
+        self._state[:] = 0.0
+        self._state[[WANTED, SPENT]] = wanted, math.inf
         self.feedback.reset()
-        self._inputs.restart()
-        self._rates.restart()
+        self.inputs.restart()
+        self._rates[0][:] = 0.0
         if self.odometry is not None:
             self.odometry.restart()
-        self._release()
+        self._pattern.correct, self._instant.scale[0], self._instant.trim[:] = None, 1.0, 0.0
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
-        if not any(known is plan for known, _ in self._known):
-            self.feedback.learn(plan)
-            self._known = [*self._known, (plan, Timetable(plan, self._geometry))][-SLOTS:]
+        self.feedback.slot(plan)
 
     @property
     def delay(self) -> float:
         """Age of the measured angles when they are used, low-passed, s; inf if not known."""
-        age = self._inputs.joints.age
+        age = self.inputs.joints.age
         return math.inf if math.isnan(age) else age
 
-    def sense(self, dt: float, now: float) -> None:
-        """Read the sensors and correct the coming tick by them; dt and now in s."""
-        inputs, pattern = self._inputs, self._pattern
-        if not self.wanted and self._spent > DIES_OUT:
-            if pattern.correct is not None:
-                self._release()
-            return
-        self._dt = dt
-        inputs.update(now, pattern.level > 0.0)
-        self._judge(now)
-        self.fraction = self._fade.advance(self.wanted and not self.faults, dt)
-        self._spent = 0.0 if self.fraction else self._spent + dt
-        if self._spent > DIES_OUT and self.faults:
-            # Nothing is fed back: measurements from before the gap mean nothing after it.
-            if pattern.correct is not None:
-                self.feedback.reset()
-                self._release()
-            if self.odometry is not None:
-                self.odometry.lose(dt)
-        else:
-            pattern.correct = self._correct
+    @property
+    def waiting(self) -> bool:
+        """Whether an input has never arrived."""
+        return self.inputs.faults(0.0, judge=False)[1]
 
-    def _judge(self, now: float) -> None:
-        """Determine the faults that interrupt the feedback."""
-        inputs = self._inputs
-        found, self.waiting = inputs.faults(now)
-        if not found and (mounted := self._rates.verdict(inputs.sensor_data, self._dt)):
+    @property
+    def faults(self) -> str:
+        """What interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active."""
+        inputs, plan = self.inputs, self._pattern.plan
+        found, _ = inputs.faults(self._instant.numbers[NOW], judge=False)
+        if mounted := MOUNTED[int(self._state[MOUNT])]:
             found.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
                          f'legs on the ground: it seems to be mounted {mounted} '
                          '(feedback.imu_mount)')
-        pattern = self._pattern
-        plan = pattern.plan
         if plan.motion.efference is None:
             found.append(f"the robot file has no efference copy of the gait '{plan.name}'")
-        times = next((times for known, times in self._known if known is plan), None)
-        if found or times is None or pattern.level < 1.0 or pattern.in_transition:
-            self._agrees = 1.0
-        else:
-            row = int(pattern.phases[0] * POINTS) % POINTS
-            self._agrees = agreement(inputs.sensor_data.foot_forces[0], self._least,
-                                     times.swinging[row],
-                                     min(self._dt * plan.frequency, 1.0), self._agrees)
-            if self._agrees < AGREES:
-                found.append(f'{inputs.feet}: the contacts do not go with the gait')
-        self.faults = '; '.join(found)
+        if self._state[CONTRARY]:
+            found.append(f'{inputs.feet}: the contacts do not go with the gait')
+        return '; '.join(found)
+
+    def sense(self, dt: float, now: float) -> None:
+        """Read the sensors and correct the coming tick by them; dt and now in s."""
+        pattern, instant = self._pattern, self._instant
+        if not self.wanted and self._state[SPENT] > DIES_OUT and not self._state[CLOSED]:
+            pattern.correct = None
+            return
+        if pattern.drive is not None:
+            pattern.drive.trim = instant.trim
+        self.inputs.read()
+        instant.numbers[:2] = dt, now
+        self.renew()
+        pattern.correct = self._correct
+
+    def renew(self) -> None:
+        """Take over the wanted motion."""
+        self._instant.wish[:] = self._motion()
 
     def _correct(self, angles: np.ndarray) -> np.ndarray:
-        pattern, feedback, inputs = self._pattern, self.feedback, self._inputs
-        planned, heading = self._planned, self._planned.heading
-        planned.angles[0] = angles
-        old, new, planned.mix[0] = pattern.fading
-        planned.gaits[0] = feedback.slot(old), feedback.slot(new)
-        planned.phase[0] = pattern.phases[0]
-        forward, left, turn = self._motion()
-        planned.velocity[0], planned.turn[0] = (forward, left), turn
-        yaw = float(inputs.sensor_data.rpy[0, 2])
-        if self.fraction and pattern.level:
-            # Without a wanted turn the heading is kept; with one it advances.
-            ahead = (heading[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
-            heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
-        else:
-            heading[0] = yaw
-        memory = feedback.memory
-        found = feedback.advance(inputs.sensor_data, planned, self._dt, self.fraction,
-                                 pattern.level,
-                                 self.delay)
-        pattern.frequency_scale = float(memory.frequency_scale[0])
-        self.kp_scale = float(memory.kp_scale[0])
+        """Return corrected angles, rad, (joints,), of those that are planned."""
+        if self._bound is not self.feedback.gains:
+            self.bind()
+        self._pattern.report(self._instant.numbers[2:], self._instant.gaits)
+        done = self._kernel(*self._arguments)
+        if done == 2:
+            self.feedback.reset()
         if self.odometry is not None:
-            self.odometry.advance(inputs.sensor_data, memory.velocity[0], memory.contact[0],
-                                  self._dt)
-        if pattern.drive is not None:
-            self._trim[:] = memory.stride[0]
-            pattern.drive.trim = self._trim
-        return found[0]
+            memory, dt = self.feedback.memory, float(self._instant.numbers[0])
+            if done == 1:
+                self.odometry.advance(self.inputs.sensor_data, memory.velocity[0],
+                                      memory.contact[0], dt)
+            else:
+                self.odometry.lose(dt)
+        return self._goal
 
     def targets(self, position: np.ndarray) -> np.ndarray:
         """Do as the base class does, with targets moved where the virtual stiffness acts."""
         feedback, stiff = self.feedback, self.feedback.memory.stiff
         if not (stiff[0] and feedback.gains.virtual_stiffness):
             return position
-        return targets(position, self._inputs.sensor_data.joint_positions, stiff, feedback.gains,
+        return targets(position, self.inputs.sensor_data.joint_positions, stiff, feedback.gains,
                        self._limits)[0]
 
-    def _release(self) -> None:
-        """Run the pattern without corrections."""
-        self.feedback.memory.stiff[0] = False
-        self._pattern.correct, self._pattern.frequency_scale, self.kp_scale = None, 1.0, 1.0
+    def machine(self, pattern: Machine) -> native.Correction | None:
+        """Return how machine code corrects a pattern's ticks, None where one needs Python."""
+        if self.odometry is not None or self.feedback.gains.virtual_stiffness:
+            return None
+        if self._bound is not self.feedback.gains:
+            self.bind()
         if self._pattern.drive is not None:
-            self._pattern.drive.trim = None
+            self._pattern.drive.trim = self._instant.trim
+        correction = self._correction
+        correction.close, correction.report = self._machine.address, pattern.report
+        correction.plan, correction.follow = pattern.plan, pattern.follow
+        return self._correction
 
 
 # The balance of a biped: from the topics of its sensors to its feedback, at every tick.
@@ -234,6 +285,9 @@ class BalanceLoop(SensorLoop):
 
     Attributes:
         feedback: its laws, whose gains may be replaced.
+        wanted: whether the feedback is enabled.
+        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
+        waiting: whether an input has never arrived.
 
     """
 
@@ -250,6 +304,7 @@ class BalanceLoop(SensorLoop):
 
         """
         super().__init__(inputs, motion)
+        self.wanted, self.waiting, self.faults = False, True, ''
         self._pattern, robot = pattern, pattern.robot
         self.feedback = BipedFeedback(robot, plan=pattern.plan)
         self._balanced = False
@@ -270,7 +325,7 @@ class BalanceLoop(SensorLoop):
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
         self._pattern.release()
-        self._inputs.restart()
+        self.inputs.restart()
 
     @property
     def state(self) -> str:
@@ -299,7 +354,7 @@ class BalanceLoop(SensorLoop):
 
     def sense(self, _: float, now: float) -> None:
         """Read the sensors for the coming tick; now in s."""
-        pattern, inputs = self._pattern, self._inputs
+        pattern, inputs = self._pattern, self.inputs
         if not self.wanted:
             pattern.balance = None
             return

@@ -14,7 +14,8 @@
 
 """Switches the feedback of a generator on and off, as its parameters say."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any, cast
 
@@ -22,22 +23,23 @@ from cpg_ros.dynamics.integration.compilation import COMPILED
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
+from cpg_ros.feedback.closed_loop import CONTACTS
 from cpg_ros.feedback.estimate import Odometry, SCALE
-from cpg_ros.feedback.feedback import warm_up
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS, robot_gains
 from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
 from cpg_ros.motion.body_file import GAIT_SPEEDS
-from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.pattern import Machine, Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.ros.command_topics import HeldPublisher, KpScalePublisher
 from cpg_ros.ros.feedback.loop import BalanceLoop, FeedbackLoop, Motion
 from cpg_ros.ros.feedback.odometry import OdometryPublisher
-from cpg_ros.ros.feedback.sensor_input import CONTACTS, SensorInput
+from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.ros.kernels import announced, BALANCE, compile_apart, FEEDBACK
+from cpg_ros.ros.node import native
 from cpg_ros.ros.node.node_base import StartError
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 import numpy as np
@@ -250,6 +252,8 @@ class FeedbackSwitch:
 
     def _make(self) -> Any:
         """Return the loop, its kernels compiled."""
+        # It loads numba.
+        from cpg_ros.feedback.by_address import warm_up
         robot, pattern = self._pattern.robot, self._pattern
         geometry = geometry_of(robot)
         if self._started:
@@ -283,6 +287,7 @@ class FeedbackSwitch:
 
     def _set_gains(self) -> None:
         self.loop.feedback.gains = gains(self._value)
+        self.loop.bind()
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
@@ -293,9 +298,32 @@ class FeedbackSwitch:
         """Correct the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
-            if self.loop.fraction > 0.0 and not self._delays_logged:
-                self._delays_logged = True
-                self._log_delays()
+
+    def renew(self) -> None:
+        """Tell ticks outside the interpreter what is wanted; log the delays once they matter."""
+        if self.loop is None:
+            return
+        self.loop.renew()
+        if self.loop.fraction > 0.0 and not self._delays_logged:
+            self._delays_logged = True
+            self._log_delays()
+
+    def machine(self, pattern: Machine) -> native.Correction | None:
+        """Return how machine code corrects a pattern, None where ticks need Python."""
+        return self.loop.machine(pattern)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Let machine code take the sensors' messages meanwhile, if any."""
+        if self.loop is None:
+            yield
+        else:
+            with self.loop.inputs.held(), self._kp_scale.block.held():
+                yield
+
+    def output(self, rate: float) -> int:
+        """Return the output of kp_scale for ticks outside the interpreter, rate in Hz."""
+        return self._kp_scale.output(self.loop.feedback.memory.kp_scale, rate)
 
     def _log_delays(self) -> None:
         delays = [f'{name} {1e3 * delay:.1f} ms' for name, delay in self.loop.latencies().items()]

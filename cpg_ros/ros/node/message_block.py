@@ -193,13 +193,11 @@ class MessageBlock:
                 qos_overriding_options=OVERRIDABLE)
             self._publishers.append((publisher, part))
             self.topics.append(publisher.topic_name)
-        self._native, self._output = self._native_block(), native.Output()
+        self._native = self._native_block()
+        self._output = native.Output(first=1.0)
 
-    def _native_block(self) -> tuple[Any, native.SerializedMessages] | None:
-        """Return what fills and publishes outside the interpreter, and its argument, if any."""
-        library = native.library()
-        if library is None:
-            return None
+    def _native_block(self) -> native.SerializedMessages:
+        """Return what ``tick.c`` fills and publishes."""
         start = at = self._block.ctypes.data
         self._handles = [publisher.handle for publisher, _ in self._publishers]
         # Kept as long as the struct that points there.
@@ -208,7 +206,8 @@ class MessageBlock:
         for message, (_, part) in zip(self._messages, self._publishers, strict=True):
             message.buffer, message.length, message.capacity = at, len(part), len(part)
             at += -(-len(part) // WORD) * WORD
-        return library.publish, native.SerializedMessages(
+        self._library = native.library()
+        return native.SerializedMessages(
             native.address('rcl_publish_serialized_message'),
             native.address('rcutils_reset_error'), self._pointers.ctypes.data,
             ctypes.addressof(self._messages), start, self._words.ctypes.data,
@@ -226,16 +225,8 @@ class MessageBlock:
         """
         for part, given in zip(self._parts, values, strict=True):
             part[:] = given
-        sent = 0
-        if self._native is not None:
-            publish, block = self._native
-            with self.held():
-                sent = publish(ctypes.byref(block), stamp, duration)
-        else:
-            words = self._words
-            words[0], words[1] = divmod(stamp, 1_000_000_000)
-            words[2], words[3] = divmod(duration, 1_000_000_000)
-            self._block[self._places] = words[self._sources]
+        with self.held():
+            sent = self._library.publish(ctypes.byref(self._native), stamp, duration)
         # rclpy raises the error of what the middleware refused.
         for publisher, message in self._publishers[sent:]:
             publisher.publish(bytes(message))
@@ -251,18 +242,18 @@ class MessageBlock:
             for handle in self._handles:
                 handle.__exit__(None, None, None)
 
-    def output(self, places: Sequence[int], every: int) -> int:
+    def output(self, places: Sequence[int], every: int, quiet: bool = False) -> int:
         """Return the address of what ``tick.c`` needs to publish the messages.
 
         Args:
             places: addresses of pointers to the numbers of each part.
             every: so many ticks.
+            quiet: publish as the first number changes, and else only while it is not 1.
 
         """
-        assert self._native is not None
         self._from = np.array(places, dtype=np.uint64)
         self._sizes = np.array([len(part) for part in self._parts], dtype=np.int64)
         self._output = native.Output(
-            ctypes.addressof(self._native[1]), self._from.ctypes.data, self._sizes.ctypes.data,
-            len(places), every, self._output.since)
+            ctypes.addressof(self._native), self._from.ctypes.data, self._sizes.ctypes.data,
+            len(places), every, self._output.since, quiet, self._output.first)
         return ctypes.addressof(self._output)

@@ -20,15 +20,14 @@ Calls into the library let other threads of Python run.
 import ctypes
 from functools import cache
 import hashlib
-import logging
 from pathlib import Path
 import platform
+from typing import Any
 
-from cpg_ros.common.c_library import load, NoCompiler
+from cpg_ros.common.c_library import load
 from cpg_ros.common.cache_folder import cache_folder
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-_LOGGER = logging.getLogger(__name__)
 _SOURCE = Path(__file__).with_name('tick.c')
 
 
@@ -58,7 +57,32 @@ class Output(ctypes.Structure):
     """The struct ``output`` of ``tick.c``: a block, and where the numbers of its parts are."""
 
     _fields_ = (*((name, ctypes.c_void_p) for name in ('to', 'from', 'sizes')),
-                *((name, ctypes.c_int64) for name in ('parts', 'every', 'since')))
+                *((name, ctypes.c_int64) for name in ('parts', 'every', 'since', 'quiet')),
+                ('first', ctypes.c_double))
+
+
+class Input(ctypes.Structure):
+    """The struct ``input`` of ``tick.c``."""
+
+    _fields_ = (('subscription', ctypes.c_void_p), ('message', Serialized),
+                *((name, ctypes.c_void_p) for name in (
+                    'known', 'same', 'place', 'values', 'stamp', 'news')),
+                *((name, ctypes.c_int64) for name in ('ranges', 'count', 'depth', 'length')),
+                ('stamped', ctypes.c_int32), ('unread', ctypes.c_int32))
+
+
+class Copy(ctypes.Structure):
+    """The struct ``copy`` of ``tick.c``."""
+
+    _fields_ = ('to', ctypes.c_void_p), ('from', ctypes.c_void_p), ('size', ctypes.c_int64)
+
+
+class Correction(ctypes.Structure):
+    """The struct ``correction`` of ``tick.c``."""
+
+    _fields_ = (*((name, ctypes.c_void_p) for name in (
+        'close', 'arguments', 'report', 'plan', 'follow', 'take', 'forget', 'numbers', 'gaits',
+        'inputs', 'resets')), ('count', ctypes.c_int64), ('parts', ctypes.c_int64))
 
 
 class Loop(ctypes.Structure):
@@ -67,25 +91,41 @@ class Loop(ctypes.Structure):
     _fields_ = (*((name, ctypes.c_void_p) for name in (
         'count', 'asked', 'advance', 'resume', 'what')),
                 *((name, ctypes.c_int64) for name in ('deadline', 'period', 'stall')),
-                ('outputs', 2 * ctypes.c_void_p))
+                ('correct', ctypes.c_void_p), ('outputs', 3 * ctypes.c_void_p))
 
 
 @cache
-def library() -> ctypes.CDLL | None:
-    """Return the library; None, and a warning, where it cannot be compiled or loaded."""
+def library() -> ctypes.CDLL:
+    """Return the library.
+
+    Raises:
+        NoCompiler: it has not been compiled yet, and cannot be.
+
+    """
     text = _SOURCE.read_text()
     key = hashlib.sha256(f'{platform.machine()}{text}'.encode()).hexdigest()[:14]
-    try:
-        found = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text},
-                     _SOURCE.name)
-    except NoCompiler as error:
-        _LOGGER.warning('ticks are slower, and less regular: %s', error)
-        return None
+    found = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text}, _SOURCE.name)
     whole = ctypes.c_int64
     found.publish.argtypes, found.publish.restype = (ctypes.c_void_p, whole, whole), whole
     found.run.argtypes, found.run.restype = (ctypes.c_void_p,), whole
     found.wait_until.argtypes, found.wait_until.restype = (whole,), whole
+    found.sense.argtypes, found.tick.argtypes = (ctypes.c_void_p,), (ctypes.c_void_p, whole)
+    found.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
     return found
+
+
+@cache
+def _allocator() -> Any:
+    """Return the middleware's allocator of memory, as Serialized has it."""
+    default = ctypes.CDLL(rclpy_implementation.__file__).rcutils_get_default_allocator
+    default.restype = type('Allocator', (ctypes.Structure,), {
+        '_fields_': [('functions', 5 * ctypes.c_void_p)]})
+    return default().functions
+
+
+def empty_message() -> Serialized:
+    """Return a serialised message that the middleware enlarges as it needs to."""
+    return Serialized(allocator=_allocator())
 
 
 def address(function: str) -> int | None:

@@ -287,6 +287,9 @@ class StartedNode(Node):
     def begin(self) -> None:
         """Start the thread."""
 
+    def look(self) -> None:
+        """Do what is to be done 50 times a second, in the main thread."""
+
     def finish(self) -> None:
         """End the thread."""
 
@@ -415,7 +418,7 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     node.parameter_service.thread.start()
     # A bare wait() can miss a signal that another thread received, and a stop must not wait.
     while not signals and not node.stop.wait(0.02):
-        pass
+        node.look()
     node.stop.set()
     node.parameter_service.end()
     node.finish()

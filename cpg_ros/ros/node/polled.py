@@ -67,6 +67,7 @@ class PolledSubscription:
 
     Attributes:
         topic: its resolved name.
+        depth: most messages that can wait.
 
     """
 
@@ -89,7 +90,7 @@ class PolledSubscription:
             raw=raw, qos_overriding_options=OVERRIDABLE if overridable else None)
         self.topic: str = self._subscription.topic_name
         self._kind, self._raw = kind, raw
-        self._depth: int = self._subscription.qos_profile.depth
+        self.depth: int = self._subscription.qos_profile.depth
 
     def receive(self) -> Iterator[tuple[Any, int]]:
         """Take what has arrived: each message, and its time of arrival, ns of system time."""
@@ -103,11 +104,16 @@ class PolledSubscription:
         newest, handle = None, self._subscription.handle
         with handle:
             # No more than these can wait.
-            for _ in range(self._depth):
+            for _ in range(self.depth):
                 if (found := handle.take_message(self._kind, self._raw)) is None:
                     break
                 newest = found[0]
         return newest
+
+    @property
+    def handle(self) -> Any:
+        """What keeps the subscription, and has its ``pointer``, while it is entered."""
+        return self._subscription.handle
 
     def close(self) -> None:
         """End the subscription."""

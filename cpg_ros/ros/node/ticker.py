@@ -173,13 +173,6 @@ def system_offset() -> int:
     return offset
 
 
-def _wait_until(deadline: int) -> int:
-    """Wait until a deadline by the steady clock, ns; return the time since it, ns."""
-    if (left := deadline - time.monotonic_ns()) > 0:
-        time.sleep(left * 1e-9)
-    return time.monotonic_ns() - deadline
-
-
 class TickThread(threading.Thread):
     """A thread of ticks that counts them, and reports the exception that ends it.
 
@@ -270,6 +263,7 @@ class Ticker(TickThread):
 
         """
         super().__init__('ticker', rate, failed)
+        self._library = native.library()
         self.jumps = 0
         self.stopping = self.paused = False
         self._clock: Any = node.get_clock()
@@ -310,16 +304,14 @@ class Ticker(TickThread):
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
                     going: Callable[[], bool] | None = None) -> None:
         """Tick by the steady clock, while ``going`` if given; deadline and its ``stamp`` in ns."""
-        ending, library, count = self._ending, native.library(), self.count
-        wait_until = _wait_until if library is None else library.wait_until
+        ending, count = self._ending, self.count
         while not ending.is_set() and (going is None or going()):
             period = self._period()
             count.wanted = 0
-            left = (self._steadily(self._run_outside, deadline, period)
-                    if library and going is None else None)
+            left = self._steadily(self._run_outside, deadline, period) if going is None else None
             if left is None:
                 deadline += period
-                behind = wait_until(deadline)
+                behind = self._library.wait_until(deadline)
             else:
                 deadline, behind = left
             count.worst = max(count.worst, behind)
@@ -334,11 +326,9 @@ class Ticker(TickThread):
 
     def _run_outside(self, loop: native.Loop, deadline: int, period: int) -> tuple[int, int]:
         """Tick outside the interpreter; return the next deadline, and the time since it, ns."""
-        library = native.library()
-        assert library is not None
         loop.count, loop.stall = ctypes.addressof(self.count), STALL * period
         loop.deadline, loop.period = deadline, period
-        behind = library.run(ctypes.byref(loop))
+        behind = self._library.run(ctypes.byref(loop))
         return loop.deadline, behind
 
     def attend(self) -> None:

@@ -14,9 +14,11 @@
 
 """The feedback behind its topics: messages that are wrong in mid-walk, as bytes, on a body."""
 
+import ctypes
 import importlib.util
 import math
 
+from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_checks import FADE, GOOD, STALE
 from cpg_ros.feedback.kinematics import geometry_of
@@ -25,6 +27,7 @@ from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.ros.feedback import sensor_input
 from cpg_ros.ros.feedback.loop import FeedbackLoop
 from cpg_ros.ros.feedback.sensor_input import SensorInput
+from cpg_ros.ros.node import native
 from depth import in_depth
 from geometry_msgs.msg import WrenchStamped
 from go2 import DT, GO2, program
@@ -100,8 +103,14 @@ class Robot:
                                  lambda: (made.own_speed, 0.0, 0.0))
         self.loop.wanted = True
         self.late, self.lag = {topic: [] for topic in Wire.wires}, lag
-        self.frozen = {}
+        self.frozen, self.wires = {}, dict(Wire.wires)
         self.stamp = 0
+
+    def sense(self, dt, now):
+        self.loop.sense(dt, now)
+
+    def advance(self, dt):
+        self.pattern.advance(dt)
 
     def messages(self):
         body = self.body
@@ -138,8 +147,8 @@ class Robot:
             elif bad == 'delayed':
                 data = self.late[name][-1 - round(0.2 / DT)]
             wire.data = None if bad == 'dead' else data
-        self.loop.sense(DT, 1e-9 * self.stamp)
-        self.pattern.advance(DT)
+        self.sense(DT, 1e-9 * self.stamp)
+        self.advance(DT)
         self.body.command(self.loop.targets(self.pattern.position)[GO2.places])
         self.body.step()
 
@@ -211,13 +220,13 @@ def test_feet_are_felt_by_their_own_sensors_or_by_the_motors(monkeypatch, contac
     felt, true = [], []
     for _ in range(round(2.0 / DT)):
         robot.tick()
-        felt.append(robot.loop._inputs.sensor_data.foot_forces[0].copy())
+        felt.append(robot.loop.inputs.sensor_data.foot_forces[0].copy())
         true.append(robot.body.feet.copy())
     assert not robot.loop.faults and robot.loop.fraction == 1.0 and not robot.body.fallen
     felt, true = np.array(felt[500:]), np.array(true[500:])
     # On the whole the legs bear the weight; efforts that move a leg pass for loads.
     assert felt.sum(axis=1).mean() == pytest.approx(true.sum(axis=1).mean(), rel=0.1)
-    least = robot.loop._least
+    least = TOUCH * geometry_of(GO2).weight
     agree = ((felt > least) == (true > least)).mean()
     assert agree > (0.97 if contacts == 'wrenches' else 0.55)
 
@@ -265,6 +274,61 @@ def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatc
     assert robot.loop.delay == pytest.approx(lag * DT, abs=DT)
     assert not any(acted[:round(2.5 / DT)])
     assert 0.0 < sum(acted) * DT <= gains.stiffen_longest if lag == 0 else not any(acted)
+
+
+class InC(Robot):
+    """The same robot, whose ticks are those of ``tick.c``."""
+
+    def __init__(self, monkeypatch):
+        take = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_size_t, ctypes.POINTER(native.Serialized),
+                                ctypes.c_void_p, ctypes.c_void_p)(self.take)
+        forget = ctypes.CFUNCTYPE(None)(lambda: None)
+        self.kept = {'rcl_take_serialized_message': take, 'rcutils_reset_error': forget}
+        monkeypatch.setattr(native, 'address', lambda name: ctypes.cast(
+            self.kept[name], ctypes.c_void_p).value)
+        super().__init__(monkeypatch)
+        monkeypatch.undo()
+        machine = self.pattern.machine
+        self.native = native.Loop(advance=machine.advance, resume=machine.resume,
+                                  what=machine.what, period=round(1e9 * DT))
+        self.correction = self.loop.machine(machine)
+        self.native.correct = ctypes.addressof(self.correction)
+        for k, struct in enumerate(self.loop.inputs.structs):
+            struct.subscription, struct.depth = k + 1, 1
+        self.pythons = 0
+
+    def take(self, number, message, *_):
+        data = list(self.wires.values())[number - 1].newest()
+        if data is None:
+            return 401
+        self.kept[number] = data
+        message[0].buffer = ctypes.cast(ctypes.c_char_p(data), ctypes.c_void_p).value
+        message[0].length = len(data)
+        return 0
+
+    def sense(self, _, now):
+        self.loop.renew()
+        if not native.library().sense(ctypes.byref(self.correction)):
+            self.pythons += 1
+            self.loop.inputs.read()
+
+    def advance(self, _):
+        native.library().tick(ctypes.byref(self.native), self.stamp)
+
+
+@pytest.mark.parametrize(('topic', 'how'), [('imu', 'dead'), *in_depth(
+    *((topic, how) for topic in TOPICS for how in ('dead', 'frozen', 'nan', 'delayed')))])
+def test_ticks_outside_the_interpreter_correct_as_those_in_it_do(topic, how):
+    found = []
+    for kind in (Robot, InC):
+        with pytest.MonkeyPatch.context() as patch:
+            robot = kind(patch)
+            found.append((*robot.walk(topic, how), robot.named))
+    for one, other in zip(found[0][:3], found[1][:3], strict=True):
+        assert np.abs(one - other).max() < 1e-6
+    assert found[0][3] == found[1][3]
+    # Layouts of messages are learnt in Python.
+    assert robot.pythons == 1
 
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):

@@ -152,6 +152,22 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
     c->state = newest->net.now;
 }
 
+/* What a correction goes by: level, phase of the first leg, share of the gait that is entered,
+ * strides per second, whether the gait changes; and the gait that is left, and the entered one. */
+void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
+{
+    const cpg_track *newest = c->track[c->tracks - 1];
+    const uint8_t fades = c->tracks > 1;
+    cpg_real rate;
+    numbers[0] = c->ramp.level;
+    numbers[1] = newest->legs[0];
+    numbers[2] = fades ? smoothstep(newest->progress, &rate) : 0.0;
+    numbers[3] = c->frequency;
+    numbers[4] = fades || newest->settling > 0.0;
+    gaits[0] = (int64_t)(intptr_t)c->track[c->tracks - 1 - fades]->gait;
+    gaits[1] = (int64_t)(intptr_t)newest->gait;
+}
+
 void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_plan(c, dt);

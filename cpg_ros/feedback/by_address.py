@@ -1,0 +1,88 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The closed loop for callers that are not Python: its address, and arguments in memory.
+
+It loads numba, and so is loaded only where feedback is switched on.
+"""
+
+import ctypes
+from typing import Any
+
+from cpg_ros.dynamics.integration.machine_code import machine_function
+from cpg_ros.feedback.closed_loop import close, Instant, STATE, warm_up_senses
+from cpg_ros.feedback.estimate import Odometry
+from cpg_ros.feedback.feedback import Feedback
+from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.leg_rates import rates_memory
+from cpg_ros.feedback.tick import PlannedMotion
+from numba.extending import intrinsic
+import numpy as np
+
+
+def _load(_, pointer):
+    """Return what is at a pointer, as memory_of lays it out."""
+    def code(target, builder, signature, arguments):
+        kind = target.get_value_type(pointer.dtype).as_pointer()
+        return builder.load(builder.bitcast(arguments[0], kind))
+    return pointer.dtype(pointer), code
+
+
+_loaded: Any = intrinsic(_load)
+
+
+def _close(arguments):
+    return close(*_loaded(arguments))
+
+
+def compiled(arguments: tuple) -> Any:
+    """Compile ``close`` as a function of C, ``int64_t f(const void *)``, at its ``address``.
+
+    Args:
+        arguments: of close.
+
+    """
+    return machine_function(_close, arguments)
+
+
+def memory_of(value: Any) -> Any:
+    """Return an array, a number or a tuple of such as that function takes it.
+
+    Arrays are not kept: the memory has their addresses.
+    """
+    if isinstance(value, np.ndarray):
+        words = 0, 0, value.size, value.itemsize, value.ctypes.data, *value.shape, *value.strides
+        return (ctypes.c_int64 * len(words))(*words)
+    if isinstance(value, tuple):
+        parts = [memory_of(part) for part in value]
+        kind = type('Memory', (ctypes.Structure,), {'_fields_': [
+            (f'part{k}', type(part)) for k, part in enumerate(parts)]})
+        return kind(*parts)
+    kinds = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
+    return kinds[type(value)](value)
+
+
+def warm_up(geometry: Geometry, joints: int) -> None:
+    """Run each kernel once, on the types that a generator uses; joints is their number."""
+    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
+    senses, sensors = warm_up_senses(legs, joints)
+    some, one = np.zeros((1, joints)), np.zeros(1)
+    planned = PlannedMotion(some, one, np.zeros((1, 2), dtype=np.int64), one.copy(),
+                            np.zeros((1, 2)), one.copy(), one.copy())
+    instant = Instant(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), one, np.zeros(legs))
+    arguments = (geometry.arrays, feedback.tables, feedback.gains, feedback.memory, senses,
+                 sensors, planned, rates_memory(legs), instant, np.zeros(STATE), some.copy())
+    close(*arguments)
+    compiled(arguments)
+    Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)

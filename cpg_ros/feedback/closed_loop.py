@@ -1,0 +1,295 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One tick of the closed loop, compiled: from numbers of messages to corrected angles."""
+
+import math
+from typing import NamedTuple
+
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.feedback.estimate import loads_of, SensorData, TOUCH
+from cpg_ros.feedback.gait_tables import POINTS
+from cpg_ros.feedback.input_checks import (
+    AGE,
+    agreement,
+    BELIEVED,
+    CAME,
+    fade,
+    IMU,
+    IMU_MEMORY,
+    is_out,
+    judge_imu,
+    judge_joints,
+    judge_loads,
+    LATEST,
+    note,
+)
+from cpg_ros.feedback.kinematics import LegArrays
+from cpg_ros.feedback.leg_rates import compare_rates
+from cpg_ros.feedback.tick import tick
+import numpy as np
+
+#: FURTHEST: largest difference between wanted and measured heading, rad.
+FURTHEST = 0.5
+#: DIES_OUT: time at a share of 0 after which all displacements have decayed, s.
+DIES_OUT = 0.3
+#: AGREES: least mean share of legs whose contacts agree with the gait.
+AGREES = 0.5
+#: FLIGHT: longest time for which all feet may be unloaded, s.
+FLIGHT = 0.3
+#: Sources of the loads on the feet.
+FOOT_CONTACTS, WRENCHES, EFFORTS = CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
+#: Number of values that are read. JOINT: of each joint; FORCE: of a Wrench.
+JOINT, FORCE = 3, 3
+
+
+class Senses(NamedTuple):
+    """The numbers of the newest messages, and what they are checked by.
+
+    Inputs are the IMU, the joints and, unless those show them, the contacts: of all feet, or of
+    each.
+
+    Attributes:
+        monitors: see input_checks.BELIEVED, shape (inputs, LATEST + 1).
+        news: 1 for a new message with the same numbers, 2 for one with others, else 0, (inputs,).
+        stamps: of the messages, s, NaN without, (inputs,).
+        unreadable: verdict on messages of a layout that cannot be used, else 0, (inputs,).
+        imu: as in the message, shape (IMU,).
+        joints: positions, velocities and efforts, shape (JOINT, joints).
+        feet: loads, shape (1, legs), or forces, shape (legs, FORCE).
+        counts: measured joints, and which of CONTACTS it is, shape (2,).
+        places: 0, 1, 2 and so on.
+        mount: orientation of the IMU in the base's frame, x y z w.
+        limits: of the joints, lowest, highest, fastest, shape (3, joints).
+        weight: of the robot, N, shape (1,).
+        memory: of judge_imu.
+        heavy: of judge_loads, shape (legs, 1).
+        loads: scratch, shape (legs,).
+
+    """
+
+    monitors: np.ndarray
+    news: np.ndarray
+    stamps: np.ndarray
+    unreadable: np.ndarray
+    imu: np.ndarray
+    joints: np.ndarray
+    feet: np.ndarray
+    counts: np.ndarray
+    places: np.ndarray
+    mount: np.ndarray
+    limits: np.ndarray
+    weight: np.ndarray
+    memory: np.ndarray
+    heavy: np.ndarray
+    loads: np.ndarray
+
+    @classmethod
+    def empty(cls, legs: int, limits: np.ndarray, mount: np.ndarray, weight: float, contacts: str
+              ) -> 'Senses':
+        """Return that of a robot before its first messages."""
+        kind, joints = CONTACTS.index(contacts), limits.shape[1]
+        inputs = 2 + (1, legs, 0)[kind]
+        never, whole = np.full(max(IMU, JOINT * joints), math.nan), np.int64
+        return cls(np.zeros((inputs, LATEST + 1)), np.zeros(inputs, whole), np.zeros(inputs),
+                   np.zeros(inputs, whole), never[:IMU].copy(),
+                   never[:JOINT * joints].reshape(JOINT, joints).copy(),
+                   np.full((legs, FORCE) if kind == 1 else (1, legs), math.nan),
+                   np.array([joints, kind]), np.arange(joints), mount, limits, np.array([weight]),
+                   np.zeros(IMU_MEMORY), np.zeros((legs, 1)), np.zeros(legs))
+
+
+@jit
+def _judge_feet(senses, sensors, legs, k, gap):
+    """Return the verdict on an input of the feet, and for how long its numbers may repeat, s."""
+    foot, loads, forces = k - 2, senses.feet[0], sensors.foot_forces[0]
+    places, heavy, weight = senses.places, senses.heavy, senses.weight[0]
+    if senses.counts[1] == 1:
+        # Its frame turns with the leg, but the length of the force is the same in every frame.
+        force = senses.feet[foot]
+        load = math.sqrt(force[0]**2 + force[1]**2 + force[2]**2)
+        senses.loads[foot] = load
+        return (judge_loads(senses.loads[foot:foot + 1], places[:1], weight, gap, heavy[foot],
+                            forces[foot:foot + 1]), 0.0 if load else FLIGHT)
+    if senses.counts[1] == 2:
+        angles, rpy = sensors.joint_positions[0], sensors.rpy[0]
+        loads_of(legs.rows, legs.columns, angles, senses.joints[2], rpy[0], rpy[1], senses.loads)
+        return (judge_loads(senses.loads, places[:len(forces)], weight, gap, heavy[0], forces),
+                0.0)
+    unloaded = True
+    for load in loads:
+        unloaded = unloaded and load == 0.0
+    return (judge_loads(loads, places[:len(forces)], weight, gap, heavy[0], forces),
+            FLIGHT if unloaded else 0.0)
+
+
+@jit_entry
+def take_in(senses, sensors, legs, now, moving):
+    """Check the messages that have come, and fill sensors with what is plausible.
+
+    Args:
+        senses: Senses.
+        sensors: SensorData of one run.
+        legs: LegArrays; without rows where efforts are not the contacts.
+        now: s, on the clock of the messages' stamps.
+        moving: whether the robot should move, so that no measurement may stay the same.
+
+    """
+    for k in range(len(senses.news)):
+        if senses.news[k] == 0:
+            continue
+        monitor, patience = senses.monitors[k], 0.0 if moving else math.inf
+        verdict, gap = senses.unreadable[k], min(now - monitor[BELIEVED], 1.0)
+        if verdict == 0 and k == 0:
+            # Means go on while messages are refused.
+            verdict = judge_imu(senses.imu, min(now - monitor[CAME], 1.0), moving, senses.mount,
+                                senses.memory, sensors.rpy[0], sensors.angular_velocity[0],
+                                sensors.acceleration[0])
+        elif verdict == 0 and k == 1:
+            limits = senses.limits
+            verdict = judge_joints(senses.joints[0], senses.joints[1],
+                                   senses.places[:senses.counts[0]], limits[0], limits[1],
+                                   limits[2], sensors.joint_positions[0],
+                                   sensors.joint_velocities[0])
+            if verdict == 0 and senses.counts[1] == 2:
+                verdict, _ = _judge_feet(senses, sensors, legs, k, gap)
+        elif verdict == 0:
+            verdict, rests = _judge_feet(senses, sensors, legs, k, gap)
+            patience = max(patience, rests)
+        note(monitor, now, senses.stamps[k], senses.news[k] == 1, verdict, patience)
+        senses.news[k] = 0
+
+
+#: Numbers of a loop's state: whether feedback is wanted; for how long its fraction has been 0, s;
+#: that fraction; see fade (2); how well contacts agree with the gait; how many inputs are out; how
+#: the IMU seems to be mounted, an index into leg_rates.MOUNTED; whether contacts do not agree;
+#: whether anything is fed back; and how many numbers these are.
+(WANTED, SPENT, FRACTION, WAY, GOOD_FOR, AGREEMENT, OUT, MOUNT, CONTRARY, CLOSED,
+ STATE) = range(11)
+#: Of the instant: length of the tick, s; time, s; level; phase; share of the gait that is entered;
+#: stride frequency, Hz; whether the gait changes.
+DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES = range(7)
+
+
+class Instant(NamedTuple):
+    """What the pattern does now, what is commanded, and what the pattern gets.
+
+    Attributes:
+        numbers: see DT and what follows it.
+        gaits: keys of the gait that is left and of that which is entered, shape (2,).
+        wish: speeds forward and to the left, m/s, and yaw rate, rad/s.
+        scale: factor of the stride frequency, shape (1,); filled.
+        trim: added to the strides, shape (legs,); filled.
+
+    """
+
+    numbers: np.ndarray
+    gaits: np.ndarray
+    wish: np.ndarray
+    scale: np.ndarray
+    trim: np.ndarray
+
+
+@jit
+def _slot(tables, key):
+    for k in range(len(tables.keys)):
+        if tables.keys[k] == key:
+            return k
+    return -1
+
+
+@jit
+def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
+    """Find out what interrupts the feedback; tell whether anything does."""
+    numbers, out = instant.numbers, 0
+    dt = numbers[DT]
+    for k in range(len(senses.monitors)):
+        out += is_out(senses.monitors[k], numbers[NOW])
+    state[OUT], state[MOUNT], state[CONTRARY] = out, 0.0, 0.0
+    if out == 0:
+        state[MOUNT] = compare_rates(legs, sensors, dt, rates[0], rates[1], rates[2])
+    wrong = out > 0 or state[MOUNT] > 0.0 or not tables.copied[slot]
+    if wrong or numbers[LEVEL] < 1.0 or numbers[CHANGES] > 0.0:
+        state[AGREEMENT] = 1.0
+        return wrong
+    row = int(numbers[PHASE] * POINTS) % POINTS
+    state[AGREEMENT] = agreement(sensors.foot_forces[0], TOUCH * legs.weight,
+                                 tables.swinging[slot, row], min(dt * numbers[FREQUENCY], 1.0),
+                                 state[AGREEMENT])
+    state[CONTRARY] = state[AGREEMENT] < AGREES
+    return state[CONTRARY] > 0.0
+
+
+@jit_entry
+def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant, state, out):
+    """Correct a tick's planned angles by what is measured.
+
+    Args:
+        legs: LegArrays of the robot.
+        tables: GaitTables of its gaits.
+        gains: Gains of the laws.
+        memory: Memory of one run, changed in place.
+        senses: Senses.
+        sensors: SensorData of one run, filled.
+        planned: PlannedMotion, of which angles are given.
+        rates: memory and scratch of compare_rates.
+        instant: Instant.
+        state: see WANTED and what follows it.
+        out: angles, rad, shape (1, joints); filled.
+
+    Returns:
+        0 for no correction, 1 for one, and 2 for none from now on, so that memory is to be reset.
+
+    """
+    numbers, trim = instant.numbers, instant.trim
+    dt, level = numbers[DT], numbers[LEVEL]
+    wanted, wrong = state[WANTED] > 0.0, False
+    if wanted or state[SPENT] <= DIES_OUT:
+        take_in(senses, sensors, legs, numbers[NOW], level > 0.0)
+        old, new = _slot(tables, instant.gaits[0]), _slot(tables, instant.gaits[1])
+        new = max(new, 0)
+        old = new if old < 0 else old
+        wrong = _judge(legs, tables, senses, sensors, rates, instant, new, state)
+        state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], wanted and not wrong, dt)
+        state[FRACTION] = state[WAY]**2 * (3.0 - 2.0 * state[WAY])
+        state[SPENT] = 0.0 if state[FRACTION] > 0.0 else state[SPENT] + dt
+    if state[SPENT] > DIES_OUT and (wrong or not wanted):
+        # Nothing is fed back: measurements from before the gap mean nothing after it.
+        closed, state[CLOSED], memory.stiff[0] = state[CLOSED] > 0.0, 0.0, False
+        memory.kp_scale[0], instant.scale[0], trim[:], out[0] = 1.0, 1.0, 0.0, planned.angles[0]
+        return 2 if closed and wrong else 0
+    planned.gaits[0, 0], planned.gaits[0, 1], planned.mix[0] = old, new, numbers[MIX]
+    planned.phase[0], turn, heading = numbers[PHASE], instant.wish[2], planned.heading
+    planned.velocity[0, 0], planned.velocity[0, 1] = instant.wish[0], instant.wish[1]
+    planned.turn[0], yaw = turn, sensors.rpy[0, 2]
+    if state[FRACTION] > 0.0 and level > 0.0:
+        # Without a wanted turn the heading is kept; with one it advances.
+        ahead = (heading[0] + turn * dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
+        heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
+    else:
+        heading[0] = yaw
+    age = senses.monitors[1, AGE]
+    tick(legs, tables, gains, memory, sensors, planned,
+         (dt, state[FRACTION] * level, level, math.inf if math.isnan(age) else age), out)
+    instant.scale[0], trim[:], state[CLOSED] = memory.frequency_scale[0], memory.stride[0], 1.0
+    return 1
+
+
+def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:
+    """Run what judges messages once; legs and joints are their numbers; return what it took."""
+    senses, sensors = (Senses.empty(legs, np.zeros((3, joints)), np.zeros(4), 1.0, FOOT_CONTACTS),
+                       SensorData.zeros(1, legs, joints))
+    nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)
+    take_in(senses, sensors, nothing, 0.0, False)
+    return senses, sensors
