@@ -128,7 +128,7 @@ def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch
     handles = [Line2D([], [], color=_colour(analysis, gait), label=gait.replace('_', ' '))
                for gait in dict.fromkeys([*colours(type(analysis.network)), *sorted(shown)])
                if gait in shown]
-    # Of the text's colour, which differs on a dark page.
+    # Use the text's colour, which differs on a dark page.
     plain = matplotlib.rcParams['text.color']
     handles += [Line2D([], [], color=plain, linestyle=style, label=label)
                 for style, label in STYLES]

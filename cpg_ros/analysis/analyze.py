@@ -147,7 +147,7 @@ def _analyze(args: Namespace) -> int:
         answer['phase_response'] = response.as_dict()
         text += ['', response.text()]
     if args.basin is not None:
-        # What it needs takes a while to load.
+        # Import here, as it takes long to load.
         from cpg_ros.analysis import basin
         basins = basin.basins(analysis, args.basin, args.seed or 0)
         answer['basins'] = basin.as_dict(basins)

@@ -191,7 +191,7 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
         wave = int(orbit.waves[cell - 1])
         on = orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) > orbit.levels[wave, 0, 0]
     else:
-        # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
+        # Compare with a margin: at a peak on the grid, rounding decides the sign of the slope.
         on = signal(orbit, cell, theta, 1) < -1e-9
     return stances(theta, on)
 

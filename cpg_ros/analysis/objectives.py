@@ -330,7 +330,7 @@ def _proven(score: Score, cycle: LimitCycle, gait: str) -> Score:
     orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
     if orbit is None or extra_symmetry(orbit) or abs(orbit.period / cycle.period
                                                      - 1.0) > SAME_PERIOD:
-        # What is near the gait but not on it has no right to the estimate.
+        # The estimate does not apply to a set that is near the gait but has no orbit on it.
         return replace(score, stability=max(1.0, score.stability))
     return replace(score, stability=multipliers(orbit).leading, exact=True,
                    state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)

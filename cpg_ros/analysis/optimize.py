@@ -98,7 +98,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
             limits(0.5 * RESOLUTION, 300.0)
         elif 'multiplier' in name:
             scale('log')
-            # Whole decades, so that there are some to label.
+            # Show whole decades, so that there are ticks to label.
             limits(10.0**np.floor(np.log10(0.999 * values[name].min())), 3.0)
     axes.set_xlabel(x)
     axes.set_ylabel(y)
@@ -147,7 +147,7 @@ def draw_front(path: Path, front: Front) -> None:
     if front.best.orbit.waves.max():
         difference = 'difference in shape of the waveforms [1]'
         values[difference] = np.array([score.difference for score in front.tried])
-        # Elsewhere the gait's two waveforms are not there to be compared.
+        # Without an exact orbit there are no two waveforms to compare.
         values[difference][~exact] = np.nan
         panels.append((difference, multiplier))
     else:

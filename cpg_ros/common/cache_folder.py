@@ -216,7 +216,7 @@ def _use(folder: Path) -> None:
             lock = (folder / _LOCK).open('ab')
         except FileNotFoundError:
             continue    # Removed in between.
-        # Where locks are not supported, nothing is removed either.
+        # On file systems without locks nothing is removed.
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_SH)
         with contextlib.suppress(FileNotFoundError):
@@ -231,7 +231,7 @@ def _remove_unused(folder: Path) -> None:
     """Remove all folders but the last used ones and those that a process has locked."""
     locks = sorted(folder.glob(f'*/{_LOCK}'), key=_last_used)
     for path in locks[:-KEPT]:
-        # Those that are in use, or whose users cannot be known.
+        # Folders stay that are in use, or whose users cannot be determined.
         with contextlib.suppress(OSError), path.open('rb') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # At once, or a process that starts now would find half of it.

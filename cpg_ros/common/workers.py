@@ -126,7 +126,7 @@ class _Worker(SpawnProcess):
     """A worker process that leaves Ctrl-C to its parent, also while it starts."""
 
     def start(self) -> None:
-        # What a thread blocks is blocked in the processes that it starts.
+        # Signals that a thread blocks are blocked in the processes that it starts, too.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:
             super().start()

@@ -87,7 +87,7 @@ def parsed(text: str) -> Any:
     """
     try:
         return yaml.load(text, Loader=_UniqueKeys)
-    # What PyYAML lets pass of values that their tags do not fit: '!!int x', '2020-13-01'.
+    # PyYAML raises these for values that do not fit their tags: '!!int x', '2020-13-01'.
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise yaml.YAMLError(f'a value cannot be used: {type(error).__name__}: {error}') from error
 

@@ -71,7 +71,7 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
             ordinates.insert(at, side * lowest.fun)
     signs = np.sign(ordinates)
     signs[signs == 0.0] = 1.0
-    # Not a number where there is no value, whose product differs from -1.
+    # Signs are NaN where the function has no value; their products differ from -1.
     crossed = np.flatnonzero(signs[:-1] * signs[1:] == -1.0)
     return [root for k in crossed for root in _roots(function, *places[k:k + 2])]
 
@@ -430,7 +430,7 @@ def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
     """Return the fold that lies up to about a step before a point; None if it cannot be found."""
     rate = rate_along(after)
     try:
-        # Where the fold is the point itself, to rounding, it may also be found after it.
+        # If the fold is the point itself, rounding may put it after the point.
         last = 0.0 if rate(0.0) * after.rate > 0.0 else 0.1 * step
         if rate(last) * after.rate <= 0.0:
             return None
@@ -440,7 +440,7 @@ def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
                     rate, -reach * step, last, xtol=1e-9 * step, rtol=1e-12))
                 return resolve_point(fold.curve, fold.z, fold.tangent)
     except NoOrbit:
-        # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
+        # Near a crossing of curves, as where symmetry is gained, Newton's method may fail.
         return None
     return None
 

@@ -221,7 +221,7 @@ class Branch(ShortRepr):
             if left.value == value:
                 points.append(left.orbit)
             elif (left.value - value) * (right.value - value) < 0.0:
-                # From the end that is nearer to a fold, where the value is yet to pick up.
+                # Start from the end nearer to a fold, from which the value's rate grows.
                 located = (arclength.next_crossing(left.place, 1.0, value)
                            if abs(left.place.rate) < abs(right.place.rate) else
                            arclength.next_crossing(right.place, -1.0, value))

@@ -71,7 +71,8 @@ class Quotient(Field[Network]):
     def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates, (..., variables), and their Jacobian, if all cells move together."""
         equations = self._equations
-        # Of one state these are numbers, with which equations take a third of the time.
+        # For a single state these are plain numbers, with which equations take a third of the
+        # time.
         variables = np.moveaxis(states, -1, 0)
         rates, slopes = equations.slopes(
             [variables[argument.variable] for argument in equations.arguments], self._p)

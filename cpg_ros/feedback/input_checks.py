@@ -239,7 +239,7 @@ def _contradicts(up, turning, memory):
         # A driver may repeat an orientation, or its last message.
         return memory[19] > 0.0
     dt, memory[20] = memory[20], 0.0
-    # What stands still in the world turns the other way in the base's frame.
+    # A vector that is constant in the world turns the opposite way in the base's frame.
     turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
               up[0] * turning[1] - up[1] * turning[0])
     known, parted, moved, leap = memory[17] > 0.0 and dt < GAP, 0.0, 0.0, 0.0

@@ -129,7 +129,7 @@ def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
         hips[k], frames[k] = leg.hip, leg_axes(leg.yaw, leg.roll)
         thighs[k], calf, foot = (np.array(link) @ frames[k]
                                  for link in (leg.thigh, leg.calf, leg.foot))
-        # What the links themselves are off sideways belongs to the leg's plane.
+        # The sideways offsets of the links are part of the offset of the leg's plane.
         thighs[k, 1] += calf[1] + foot[1]
         uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (calf, foot))
         bends[k] = bend_of(uppers[k], lowers[k], turns[k, 2] * offsets[own[-1]])

@@ -100,7 +100,7 @@ def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
 
 @cache
 def _made(family: type[Any], legs: int) -> type[Any]:
-    # Where legs have parameters of their own, they are not those of the family's legs.
+    # A network with parameters for each leg must not inherit those of the family's legs.
     bases = family.__bases__ if 'fields' in family.fitted(legs) else (family,)
     return for_legs(legs)(type(f'{family.__name__}{legs}', bases, {
         '__module__': family.__module__, '__doc__': family.__doc__, 'family': family,

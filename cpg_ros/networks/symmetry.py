@@ -407,6 +407,6 @@ def homomorphisms(group: Group, names: Iterable[str], variables: int = 2, odd: b
     for turns in product(*(range(order) for order in orders.values())):
         shifts = {name: Fraction(turn, order)
                   for (name, order), turn in zip(orders.items(), turns, strict=True)}
-        # Where generators are not independent, some shifts contradict one another.
+        # If generators are not independent, some of their shifts contradict each other.
         with suppress(InputError):
             yield Symmetry.of(group, shifts, variables, odd)

@@ -67,7 +67,8 @@ class BagRecorder:
         except UnknownType as error:
             self.passed_over[topic] = str(error)
             return False
-        # What every publisher offers: a reliable subscription matches no best-effort publisher.
+        # Request what every publisher offers: best-effort publishers match no reliable
+        # subscription.
         offered = [one.qos_profile for one in self._node.get_publishers_info_by_topic(topic)]
         latched = offered and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL
                                   for one in offered)

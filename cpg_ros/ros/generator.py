@@ -467,7 +467,7 @@ class Generator(StartedNode):
 
     def _commanded(self) -> np.ndarray | None:
         """Return the angles that joints should be at, rad, or None while there are none."""
-        # What balances a biped sends torques as angles, q + tau / kp.
+        # The balance of a biped sends torques as angles, q + tau / kp.
         torques = isinstance(self.pattern, BalancedPattern) and self.pattern.balancing
         if self.ticker.waiting or self._sent is None or torques:
             return None

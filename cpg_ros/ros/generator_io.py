@@ -232,7 +232,7 @@ class CmdVel:
         self._up = False
         self._log = node.get_logger()
         self._stamped = node.get_parameter('stamped_cmd_vel').value
-        # What is published under another type: it does not arrive.
+        # Text on publishers of another type, whose messages do not arrive.
         self._misfit = ''
         node.create_subscription(
             TwistStamped if self._stamped else Twist, 'cmd_vel',

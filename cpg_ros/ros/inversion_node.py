@@ -73,7 +73,7 @@ SPECS = {
     'kp': Spec(0.0, 'proportional gain of the joint controllers [N m/rad], to fit the commands, '
                'position + (effort + kd velocity) / kp; 0 fits the measured positions', 0.0, 1e5),
     'kd': Spec(0.0, 'damping gain of the joint controllers [N m s/rad]', 0.0, 1e4),
-    # Whoever reaches the graph may start a fit, but not choose which files it writes.
+    # Read-only: other nodes on the graph may start a fit, but not choose which files it writes.
     'out': Spec('', 'parameter file to write; empty for none', read_only=True),
     'report': Spec('', 'HTML report to write; empty for none', read_only=True),
     'apply_to': Spec('', 'generator whose parameters are set after a fit, such as /cpg_generator; '

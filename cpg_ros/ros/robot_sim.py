@@ -99,7 +99,7 @@ class Measurements:
 
     def publish(self, stamp: int) -> None:
         """Publish the state of the body; stamp in ns."""
-        # What feedback needs comes first.
+        # Publish the feedback's inputs first.
         arrived = self._sensors.measure(stamp)
         if arrived is not None:
             self._imu.publish(arrived[0], arrived[1:])

@@ -111,7 +111,7 @@ class BatchPhysics:
         most = self.body.model.actuator_forcerange[:count, 1]
         left = most * np.clip(1.0 - np.abs(speeds) / no_load, 0.0, 1.0)
         torque = kp * (wanted - angles) - kd * speeds
-        # What slows a joint down is not short of voltage. At standstill the model's limit holds.
+        # Voltage limits torques that drive the motion; at standstill the model's limit holds.
         short = ((torque * speeds > 0.0) & (np.abs(torque) > left)
                  & (np.abs(speeds) > SLOW * no_load))
         return np.where(short, angles + (np.sign(torque) * left + kd * speeds) / kp, wanted)

@@ -98,7 +98,7 @@ def heights(terrain: Terrain) -> np.ndarray:
     rng = np.random.default_rng(terrain.seed)
     found = {'height_field': _rough, 'boxes': _boxes, 'waves': _waves,
              'course': _course}[terrain.kind](terrain, x, y, rng)
-    # None of it where the robot stands at the start.
+    # Keep the ground flat where the robot starts.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
     return found * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
 
@@ -198,6 +198,6 @@ def lay(model: Any, terrain: Terrain) -> None:
 
 def set_friction(model: Any, friction: float) -> None:
     """Limit the friction of everything to this, and give the ground exactly this."""
-    # Of two geoms in contact the larger friction counts.
+    # MuJoCo uses the larger friction of two geoms in contact, so lower both.
     ground, sliding = model.geom_bodyid == 0, model.geom_friction[:, 0]
     sliding[:] = np.where(ground, friction, np.minimum(sliding, friction))

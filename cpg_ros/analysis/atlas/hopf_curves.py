@@ -539,7 +539,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
 
             for zero in curve.zeros(test, small):
                 block, root = curve.at(zero)[1][which], complex(others(zero)[rank])
-                # Of a pair in two conjugate classes that with positive imaginary part counts.
+                # Of a pair in two conjugate classes, only the root with Im > 0 counts.
                 if root.imag > -REAL * zero[2] or block.real:
                     _enter(crossings, _crossing(curve, gait, zero, block, root), curve.chart)
     return crossings

@@ -92,7 +92,7 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
             if all(complexes) and gaps[0] * gaps[1] <= 0.0 and gaps[0] != gaps[1]:
                 yield here + gaps[0] / (gaps[0] - gaps[1]) * (there - here), n, orbit
         if complexes == [True, False]:
-            # Where it has met on the real axis the curve is no torus's any more.
+            # The pair has met on the real axis: the curve of torus points ends.
             yield here, 1 if right.real > 0.0 else 2, orbit
             return
     if along and abs(along[-1][1].imag) > REAL:

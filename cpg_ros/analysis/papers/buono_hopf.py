@@ -75,7 +75,7 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
         return stand_sample(along.at(network, value)).largest(f'L_{j}{k}')
 
     there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
-    # Of the two senses of a wave the one whose critical eigenvalue turns forward.
+    # Of the two senses of a wave, take the one whose critical eigenvalue turns forward.
     blocks = stand_sample(there).blocks
     root, mode = min(((root, (way, k)) for way in {j, -j % 4}
                       for root in blocks[f'L_{way}{k}'].roots(2) if root.imag > 0.0),
@@ -289,7 +289,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
     split = blocks(network, equilibrium(network))
     if max(block.leading.real for block in split if block.gait == gait) > EQUAL:
         overlooked.append('the critical pair is the rightmost of its class')
-    # Where beta = alpha all real blocks have the discriminant of the critical one.
+    # For beta = alpha all real blocks have the discriminant of the critical one.
     if mirror < 0 and any(block.real and block.leading.imag == 0.0 for block in split):
         overlooked.append('the real blocks have complex eigenvalues')
     return TheoremVerdict(gait, tuple(unmet), condition, met, tuple(overlooked))

@@ -43,7 +43,7 @@ def synchronisation() -> Iterator[ReproducedRow]:
     for gait, preset in Phase.presets().items():
         if gait == Phase.unnamed:
             continue
-        # By the angles of the oscillators themselves.
+        # Read the phases from the angles of the oscillators.
         state = solve_preset(preset)(np.zeros(()))
         yield cite.phases(f'phases that the {gait} settles in, as phi_ij has them',
                           ' '.join(f'{lead:.9f}' for lead in preset.network.leads),

@@ -375,7 +375,7 @@ class Variational:
             The factor, and the disturbance at the unknowns, shape (n components,).
 
         """
-        # Of a pair the real part, which is enough for a guess.
+        # For a complex pair, the real part is enough as a guess.
         values = mode(self._orbit, part, multiplier)(self._times / self._orbit.period)
         return multiplier, (values * self._wave(multiplier, -1.0)).ravel()
 

@@ -311,7 +311,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
         try:
             return beside(network, near)
         except NoOrbit:
-            # Not near enough.
+            # The known orbit is not near enough: solve from the onset.
             pass
     reason = 'no orbit was found'
     try:

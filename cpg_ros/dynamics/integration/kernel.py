@@ -242,7 +242,7 @@ def _compiled(numba, network):
     return restart, steps_of
 
 
-# What the entry points below use, which ``numba_kernels`` puts in place of these.
+# Names that the entry points below use; ``numba_kernels`` replaces them.
 prange: Any = range
 _restart: Any = None
 _steps: Any = None

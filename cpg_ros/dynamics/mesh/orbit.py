@@ -199,7 +199,7 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     if ends.max() <= RESOLVED:
         return None
     needed = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
-    # Not a number where the solution is not finite.
+    # `needed` is NaN if the solution is not finite.
     if not max(fewest, needed) <= MOST_INTERVALS:
         raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
     return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(needed)))

@@ -481,7 +481,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         try:
             return beside(network, near)
         except NoOrbit:
-            # Not near enough.
+            # The known orbit is not near enough: solve in another way.
             pass
     start = near(np.array(0.0))
     if near.symmetry != symmetry and near.symmetry.h == symmetry.h:

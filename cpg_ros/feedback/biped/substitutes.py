@@ -132,7 +132,7 @@ class Substitutes:
         rpy[2] = memory.heading[0]
         turning = -self._soles[leg, 3:]
         sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
-        # Of a body that topples about the middle of the sole.
+        # Velocity of a body that topples about the middle of the sole.
         center, sole = memory.center[0], memory.pose.soles[leg]
         topples = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
         topples[2] = GRAVITY

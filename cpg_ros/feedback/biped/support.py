@@ -63,7 +63,8 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
     if total > 0.0:
         pull = (1.0 - math.exp(-dt * min(total, 1.0) / max(gains.velocity_time, 1e-4))) / total
         for k in range(3):
-            # Where a sole stands, the base moves against it.
+            # A sole that stands is still in the world: the base moves opposite to its relative
+            # velocity.
             velocity[k] -= pull * (first * (soles[0, k] + velocity[k])
                                    + second * (soles[1, k] + velocity[k]))
 
@@ -118,7 +119,7 @@ class Arms:
         self.positions = self.rest.copy()
         self._swings = np.array([links[name].swing for name in self.names])
         self._cells = np.array([max(links[name].cell - 1, 0) for name in self.names], dtype=int)
-        # Of each joint's cell in the network's state.
+        # Index of each joint's cell in the network's state.
         self._places = self._cells
         self.swing = bool(self._swings.any())
         self._level, self._waves = 0.0, np.zeros(len(self.names))

@@ -50,7 +50,7 @@ def update(before, stumbling, gains, dt):
     """
     faded = before * math.exp(-dt / gains.clearance_memory)
     if stumbling == 0.0:
-        # Nor is 0 divided by a rise of 0.
+        # This also avoids 0 / 0 for a rise of 0.
         return faded
     return min(faded + stumbling * dt / gains.clearance_rise, 1.0)
 

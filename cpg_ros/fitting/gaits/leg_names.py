@@ -211,7 +211,7 @@ def _refuse_two(joints: Sequence[str]) -> None:
         if place and not set(words[:place]) & set(JOINTS):
             robots.setdefault(tuple(words[:place]), {})[tuple(words[place:])] = name
     for first, own in robots.items():
-        # Of a single joint a leg the word before may tell which joint it is.
+        # With a single joint a leg, the word before may name the joint.
         roles = {tuple(word for word in rest if word not in _read(rest)[2]) for rest in own}
         other = next((one for key, one in robots.items() if key != first
                       and set(one) == set(own)), None)

@@ -294,7 +294,7 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             notes.append(f'{leg} has no joint named like one of {base}: its phase is that of '
                          f'{most[1]} against {most[0]}, half a cycle off if their senses differ')
             vague.append(leg)
-        # What is hardly below a whole cycle is none.
+        # A phase that rounds to a whole cycle is 0.
         phases[leg] = round((phases[base] + ahead) % 1.0, 9) % 1.0
     if opposite:
         notes.append(f'taken to count angles in the opposite sense of {next(iter(legs))}: '
@@ -311,7 +311,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
     power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
     least = TELLING**2 * max(power.values())
     senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
-    # Those whose sense is known come first: the others have to agree with them.
+    # Pairs whose sense is known come first: the other pairs have to agree with them.
     pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
                                             -power[pair]))
     sense_known = bool(senses[pairs[0]])
@@ -324,7 +324,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             sense = sense or 1.0
             total = np.zeros_like(terms)
         elif not sense:
-            # As agrees with those that move more.
+            # Choose the sense that agrees with the pairs that move more.
             turn = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
             sense = 1.0 if np.sum(terms * turn).real >= 0.0 else -1.0
         if sense < 0.0:
@@ -342,7 +342,7 @@ def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
     """Tell whether the gait with all shifts turned round is another one of the network's."""
     turned = {name: -shift % 1 for name, shift in symmetry.shifts}
     others = [_symmetry(network, other) for other in network.gaits() if other != gait]
-    # Of another group it has names of its own for what shifts: by the phases, then.
+    # A gait of another group has other names of elements: compare the phases instead.
     return any(dict(other.shifts) == turned if other.group == symmetry.group
                else np.allclose(other.phases, -symmetry.phases % 1.0) for other in others)
 

@@ -203,7 +203,7 @@ class _Violations:
     def __init__(self, coefficients: np.ndarray, group: Group) -> None:
         self.coefficients, self.elements = coefficients, group.elements
         self._n = np.arange(len(coefficients))
-        # Of a real series: every coefficient but the mean counts twice.
+        # In a real series every coefficient but the mean counts twice.
         self._weights = np.where(self._n > 0, 2.0, 1.0)[:, None]
         self._power = np.sum(2.0 * np.abs(coefficients[1:]) ** 2)
         self._known: dict[tuple[str, Fraction], float] = {}
@@ -290,7 +290,7 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     violations, noise = _Violations(cycle, group), _noise(whole, t.size)
     alone = tolerance
     tolerance = min(float(np.hypot(alone, LARGER * noise)), max(MOST, alone))
-    # Out of all homomorphisms, so that what is found is a group and its shifts are consistent.
+    # Search all homomorphisms, so that the result is a group with consistent shifts.
     found = max((one for one in symmetries(group) if violations.of(one) <= tolerance),
                 key=lambda one: (len(one.h), -violations.of(one)))
     apart = {name: violations.of(gait) for name, gait in gaits.items()}

@@ -156,7 +156,7 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     # Joint by joint: all at once take several times the memory.
     columns = (y - y.mean(axis=0)).T
     squares = _summed(sum(column * column for column in columns))
-    # What rounding leaves of a constant is no motion.
+    # Rounding errors of a constant signal are not motion.
     least = 1e-12 * squares[-1] / n + 1e-300
     lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
     variances: dict[int, np.ndarray] = {}

@@ -114,7 +114,7 @@ def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
             wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
         here[wild] = np.nan
         spikes += int(np.count_nonzero(wild))
-    # Of spikes alone nothing is left.
+    # A joint of spikes alone has no samples left.
     enough = np.isfinite(x).sum(axis=0) >= SAMPLES
     names = [name for name, good in zip(listed, enough, strict=True) if good]
     lost = [name for name in listed if name not in names]
@@ -301,7 +301,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     inside = index_range(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
-    # Of the rough stretch, strides that differ at its ends were left out.
+    # Strides that differ were left out at the ends of the rough stretch.
     names, usable, full = with_angles(names, usable, x, source, notes)
     x = x[:, full]
     try:

@@ -275,7 +275,7 @@ class Optimum(ShortRepr):
         try:
             return self._profile(k, QUANTILE * error, side, self.values)
         except NoOrbit:
-            # Not even the way back is found: the quadratic has to do, and bounds nothing.
+            # No orbit was found on the way: use the quadratic, and do not call it a bound.
             end = float(self.values[k]) + side * QUANTILE * error
             return min(max(end, self.free[k].low), self.free[k].high), False
 

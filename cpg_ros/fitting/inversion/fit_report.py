@@ -146,7 +146,7 @@ def phases(found: RecordingFit) -> Figure:
             (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
                                'markerfacecolor': 'none', 'label': found.fit.gait})]
         for value, style in marks:
-            # What is near the seam stands on both sides of it.
+            # Draw a phase near the seam on both sides of it.
             places = [] if value is None else [
                 at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)
                 if -SEAM <= at <= 1.0 + SEAM]

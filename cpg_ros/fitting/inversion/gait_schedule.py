@@ -184,7 +184,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
         origin = part.start - recording.start
         change = phase_change(part, legs, stride)
         if change is not None:
-            # What changes, and one stride on either side, is of neither gait.
+            # The change, and one stride on either side, belong to neither gait.
             remains += _longer((begin, origin + change - 1.0 / stride.frequency),
                                (origin + change + 1.0 / stride.frequency, end))
             continue

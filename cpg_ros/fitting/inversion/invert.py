@@ -384,7 +384,7 @@ def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.n
 def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
     """Look for other least costs, if that at the values is not the whole story."""
     optimum = _optimum(problem, values)
-    # Where the model is off, no minimum of its cost is distinguished by that.
+    # If the model itself is wrong, its cost does not tell minima apart.
     if optimum.model.size > 0.0 or all(optimum.regular(k) for k in range(len(problem.free))):
         return []
     found = []

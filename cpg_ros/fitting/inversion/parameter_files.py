@@ -180,7 +180,7 @@ def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[
     if robot is None:
         return wanted
     motion = robot.motion(fit.gait, fit.gait)
-    # What was fitted without a duty has legs stand for as long as they do by themselves.
+    # In a fit without a duty, legs stand for as long as their cells make them.
     own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
            else motion.stance[1])
     duty = fit.duty or (0.0 if motion.duty is None else float(own))

@@ -170,7 +170,7 @@ class Results:
         for name, text in files.items():
             write_atomically(self.folder / FITTED / name, text)
         if not files:
-            # Of contents that it no longer has.
+            # Remove files that the new result no longer has.
             for ending in ('.yaml', '_robot.yaml'):
                 (self.folder / FITTED / f'{self.name(recording)}{ending}').unlink(missing_ok=True)
         kept = {'file': printable(str(recording)), 'settings': self.settings, **row,

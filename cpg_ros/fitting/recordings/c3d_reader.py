@@ -177,7 +177,7 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
         raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
     wanted = matching(joints, angles, str(source))
     places = points.points[:, [points.names.index(name) for name in wanted]]
-    # Where a model had no value, some write zeros.
+    # Some programs write zeros where a model had no value.
     first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
     silent = [name for k, name in enumerate(wanted) if not np.isfinite(first[:, k]).any()]
     if silent and (joints or len(silent) == len(wanted)):

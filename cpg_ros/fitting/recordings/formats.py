@@ -100,7 +100,7 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     if format_name and format_name not in FORMATS:
         raise InputError(f'no format {format_name!r} of recordings; there are '
                          f'{abbreviate(list(FORMATS))}')
-    # What cannot be opened its reader reports.
+    # A file that cannot be opened is reported by its reader.
     with suppress(OSError), path.open('rb') if path.is_file() else BytesIO() as file:
         refuse_stand_in(path, file.read(64))
     args = FORMATS[format_name] if format_name else format_of(path)

@@ -106,7 +106,7 @@ def _needed(packed: zipfile.ZipFile, name: str) -> int:
         read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
                 else np.lib.format.read_array_header_2_0)
         shape, _, kind = read(member)
-    # Whole numbers of Python: a product of sizes may be beyond those of numpy.
+    # Use Python's integers: a product of sizes may overflow numpy's.
     return max(packed.getinfo(name).file_size, math.prod(shape) * max(8, kind.itemsize))
 
 

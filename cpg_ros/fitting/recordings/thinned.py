@@ -123,7 +123,8 @@ class Thinned:
         self.step, self.count, self.rate = 0, 0, 0.0
         self._coming: list[tuple[np.ndarray, np.ndarray]] = []
         self._size, self._next = 0, LONG
-        # Of the grid so far. Arrays that grow in place: pieces to be joined would take twice that.
+        # The grid so far, in arrays that grow in place: joining pieces would take twice the
+        # memory.
         self._stamps, self._values = array('q'), array('d')
 
     def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
@@ -142,7 +143,7 @@ class Thinned:
         stamps, values = self._joined()
         if not self.step:
             self.step, self.rate = _step_for(stamps, values)
-            # Where there is none now, there may be one later: joints may stand first.
+            # Without a step now, there may be one later: joints may stand at first.
             self._next = LONG if self.step else 2 * self._next
         last = 0
         if self.step:
@@ -240,7 +241,7 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
     count = np.add.reduceat(there, first, dtype=float)
     own = ((stamps - numbers * step) / step)[:, None]
     with np.errstate(invalid='ignore'):
-        # Where nothing is there, 0 / 0 is nan.
+        # Points without samples become NaN by 0 / 0.
         mean = np.add.reduceat(np.where(there, values, 0.0), first) / count
         off = np.add.reduceat(there * own, first) / count
     rise = np.diff(mean, axis=0) / (1.0 + np.diff(off, axis=0))

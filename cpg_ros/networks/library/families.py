@@ -154,7 +154,7 @@ def symmetry_of(phases: tuple[Fraction, ...], variables: int = 2, each: int = 1)
     steps: dict[str, Permutation] = {'side': (1, 0, 3, 2), 'girdle': (2, 3, 0, 1)}
     shifts = {'side': phases[1], 'girdle': phases[2]} if legs == 4 else {}
     if legs != 4 or different > 2:
-        # From each leg to one whose phase is the next.
+        # Map each leg to a leg with the next phase.
         waiting = {phase: [leg for leg in range(legs) if phases[leg] == phase] for phase in phases}
         order = [waiting[Fraction(n % different, different)].pop(0) for n in range(legs)]
         after = dict(zip(order, order[1:] + order[:1], strict=True))

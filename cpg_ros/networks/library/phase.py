@@ -97,7 +97,7 @@ class PhaseOscillators(Network):
         return {
             'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
             'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
-            # Of the cell n places further round: offset_j where i + n is j.
+            # Offset of the cell n places further: offset_j with j = i + n.
             'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
             'ranges': {**cls.own_ranges, **{
                 f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which the leg {leg} is ahead')

@@ -210,7 +210,7 @@ class BridgeNode(StartedNode):
                   'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4,
                   'tracking_error': math.inf if self.dry else value('tracking_error'),
                   'tracking_time': value('tracking_time')}
-        # Of what some robots do not measure, their bridges have no parameter.
+        # Bridges of robots without such a measurement lack the parameter.
         if 'tilt' in self.specs:
             common['tilt'] = math.radians(value('tilt'))
         if 'hottest' in self.specs:
@@ -399,7 +399,7 @@ class BridgeNode(StartedNode):
     def _start_watchdog(self, wait: Wait) -> None:
         if self.watchdog is not None and (refusal := self.watchdog.start()):
             raise StartRefused(refusal)
-        # So that the robot knows its publisher, too, before it is needed.
+        # Let the robot discover this publisher before it is needed.
         wait(DISCOVERY)
 
     def _rise(self, wait: Wait) -> None:
@@ -425,7 +425,8 @@ class BridgeNode(StartedNode):
         state = self.supervisor.state
         message = ('it sits down, then damps' if state in ACTIVE else
                    'the start is cancelled' if self._start is not None else f'it is {state.value}')
-        # Not in the loop's thread: a start that is asked for after this must not be cancelled.
+        # Cancel here, not in the loop's thread, which might cancel a start that is requested
+        # later.
         self._cancel_start('~/stop')
         self._requests.append(lambda now: self.supervisor.sit(now, '~/stop'))
         response.success, response.message = True, message

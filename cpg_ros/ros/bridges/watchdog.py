@@ -72,7 +72,7 @@ def spared() -> bool:
 
 def receive(line: socket.socket, monitor: TickMonitor) -> bool:
     """Read all messages of a connection; return whether it is still open."""
-    # Of those waiting, the last one counts: late ticks do not show that the bridge lives.
+    # Only the last waiting message counts: late ticks do not prove that the bridge lives.
     while not monitor.ended:
         try:
             message = line.recv(1024)

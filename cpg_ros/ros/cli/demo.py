@@ -373,7 +373,7 @@ def demonstrate(args: Namespace) -> int:
     finally:
         try_shutdown()
         if name:
-            # Where nothing came of it, nothing is left of it.
+            # Remove the folder if it is empty.
             with suppress(OSError):
                 args.out.rmdir()
     # One that was still starting, and was ended by our signal, did not fail.

@@ -78,7 +78,7 @@ class Operator(Node):
         self.time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
     def _gait(self, message: String) -> None:
-        # Whoever chooses a gait on the page, or by a parameter, ends the tour.
+        # A gait that is chosen on the page, or by a parameter, ends the tour.
         self._heard = True
         self.taken_over |= message.data != self._wanted
 
@@ -162,7 +162,7 @@ class Interruption:
             signal.signal(signal_number, self._note)
 
     def _note(self, *_: object) -> None:
-        # Whoever presses Ctrl-C again wants the film to be cut short.
+        # A second Ctrl-C cuts the film short.
         for node in self.nodes if self._noted else ():
             node.terminate()
         self._noted = True

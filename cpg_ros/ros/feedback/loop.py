@@ -369,7 +369,7 @@ class BalanceLoop(SensorLoop):
         sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]
         pattern.refused = any(monitor.refused for monitor in inputs.monitors)
         ages = [now - monitor.believed for monitor in inputs.monitors]
-        # Of several feet the oldest counts; where efforts are the contacts, there are none.
+        # The oldest of the feet's inputs counts; with efforts as contacts, that of the joints.
         pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
         pattern.sensors = None if self.waiting else sensors
         pattern.wish = self._motion()

@@ -202,7 +202,7 @@ class StrictParameterService(ParameterService):
     """
 
     def __init__(self, node: Node) -> None:
-        # Not rclpy's own: its services are in the group of all that must not wait for them.
+        # Replaces rclpy's own services, which share a callback group that must not wait for them.
         self._node_weak_ref = weakref.ref(node)
         self._group = ReentrantCallbackGroup()
         for kind in (srv.DescribeParameters, srv.GetParameters, srv.GetParameterTypes,

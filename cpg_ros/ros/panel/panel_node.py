@@ -421,7 +421,7 @@ class Panel(StartedNode):
         self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/'
                                + ' with ?token=WORD' * bool(self._token))
         if self._token and sys.stderr.isatty():
-            # Not by the log, which is kept in files; and a terminal may be stopped.
+            # Print, as the log is kept in files; in a thread, as a terminal may be stopped.
             asyncio.get_running_loop().run_in_executor(None, functools.partial(
                 print, f'http://{shown}:{port}/?token={self._token}', file=sys.stderr))
         if not is_loopback(host):

@@ -620,7 +620,7 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
         if not ends or leg in shape.feet:
             continue
         end = max(ends)
-        # What is fixed to the last joint's link is the foot.
+        # A link that is fixed to the last joint's link is the foot.
         position = shape.links[end].position * 0.0
         tips = [link for link in shape.links if link.parent == end and not link.joint]
         if tips:
@@ -634,7 +634,7 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
 def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
     if robot is None:
         legs, name = info.legs, info.robot or 'a robot'
-        # Of legs that are called as those of the shipped networks: lh rh lf rf, left right.
+        # Corners of the body for legs named as in the shipped networks: lh rh lf rf, left right.
         quarters = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
                   for leg in legs}
     else:

@@ -175,7 +175,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
 def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -> WalkRecording:
     received = np.array([at for at, _ in found['imu']], dtype=float)
     stamps = np.array([_stamp(message) for _, message in found['imu']])
-    # Whoever played a bag faster or slower has stamps that tell the true time.
+    # If the bag was played faster or slower, only the stamps tell the true time.
     first = stamps[0]
     times, keep = np.unique(1e-9 * (stamps - first), return_index=True)
     messages = [found['imu'][k][1] for k in keep]

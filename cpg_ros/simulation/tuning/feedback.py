@@ -363,7 +363,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
         SimulationError: CMA-ES is missing, or the model cannot be used.
 
     """
-    # Where it is missing, that is said before anything is simulated.
+    # Report a missing library before anything is simulated.
     cma_es()
     trials = [FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits]
     costs = [float(np.median(trial.loop.run(trial.calm(), WALKED).cost)) for trial in trials]

@@ -195,7 +195,7 @@ class Tuner:
             say(f'the centre of mass is {100.0 * abs(self.ahead):.1f} cm '
                 f'{"ahead of" if self.ahead > 0.0 else "behind"} the middle of the feet in the '
                 'stand: gaits move the feet below it')
-        # Of a push the same speed.
+        # Scale the pushes to the same change of the Froude number.
         heavy = body.mass / MASS * math.sqrt(self.scale)
         self.scenarios = tuple(replace(one, pushes=tuple(
             (when, heavy * forward, heavy * left) for when, forward, left in one.pushes))
@@ -402,7 +402,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     motions, found, missing = dict(robot.motions), [], []
     for gait in gaits:
         tuned = [next(results) for _ in range(seeds)]
-        # Of equal prices that of the first seed.
+        # Of equal prices, the first seed's counts.
         best = min(tuned, key=lambda one: math.inf if isinstance(one, NoDesign) else one.price)
         if isinstance(best, NoDesign):
             missing.append(str(best))

@@ -1,10 +1,5 @@
 
-/* SHIFTING, 1/s: joint speed allowed in ramps and fades, per rad from the stand to the gait's
- * mean.
- * SHORT_OF: share of the speed bound up to which the clock lets joints go.
- * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
- * FADES: whether two gaits can fade into each other. */
-/* SHIFTING, 1/s: joint speed allowed in ramps and fades, per rad from the stand to the gait's
+/* SHIFTING: joint speed allowed in ramps and fades, 1/s, per rad from the stand to the gait's
  * mean.
  * SHORT_OF: share of the speed bound up to which the clock lets joints go.
  * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
