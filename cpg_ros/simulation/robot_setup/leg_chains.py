@@ -82,7 +82,7 @@ def legs_in(known: RobotDescription, faces_x: bool = False,
         raise LegsError(
             f'the robot faces {ways} of the {known.format}, by '
             f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
-            f'forward (REP 103): --forward {FACING[fitting[0]]} makes a URDF that is turned, '
+            f'forward (REP 103): --forward={FACING[fitting[0]]} makes a URDF that is turned, '
             '--forward x takes x for forward')
     return _cleaned(known, found[fitting[0]])
 

@@ -15,6 +15,7 @@
 """Legs are found in the body: by chains, positions and axes; names only break ties."""
 
 from pathlib import Path
+import re
 
 from cpg_ros.feedback.kinematics import forward, geometry_of
 from cpg_ros.fitting.gaits.leg_names import LegsError
@@ -143,7 +144,7 @@ def test_legs_of_any_names_are_told_by_their_places(names):
 
 def test_a_robot_that_faces_backward_is_refused_with_the_remedy():
     urdf = quadruped(places={leg: (-x, -y) for leg, (x, y) in QUADRUPED.items()})
-    with pytest.raises(LegsError, match=r'faces -x .* names .* --forward -x makes.*--forward x'):
+    with pytest.raises(LegsError, match=r'faces -x .* names .* --forward=-x makes.*--forward x'):
         legs_of(urdf)
     assert legs_of(urdf, True)['lf'][0] == 'rear_right_hip'
 
@@ -158,7 +159,7 @@ def test_names_on_the_wrong_side_are_refused_and_can_be_overruled():
 
 def test_a_robot_that_faces_y_is_refused_with_the_remedy():
     places = {leg: (-y, x) for leg, (x, y) in QUADRUPED.items()}
-    with pytest.raises(LegsError, match=r'faces y .* axes .*--forward y makes'):
+    with pytest.raises(LegsError, match=r'faces y .* axes .*--forward=y makes'):
         legs_of(quadruped(places=places, crosswise=True))
 
 
@@ -198,12 +199,18 @@ def test_a_foot_that_is_a_mesh_is_where_the_mesh_ends(tmp_path):
     assert foot == pytest.approx([0.0, 0.0, -0.39]) and radius == 0.0
 
 
-def test_a_robot_that_faces_y_is_made_with_a_urdf_that_is_turned(tmp_path):
-    """What is written is the same robot, whose left foreleg is the one with that name."""
-    places = {leg: (-y, x) for leg, (x, y) in QUADRUPED.items()}
-    (tmp_path / 'my.urdf').write_text(quadruped(places=places, crosswise=True))
-    out = tmp_path / 'my.yaml'
-    assert main(['--urdf', str(tmp_path / 'my.urdf'), '--make', str(out), '--forward', 'y']) == 0
+@pytest.mark.parametrize(('facing', 'turn'), [('y', 1j), ('-x', -1), ('-y', -1j)])
+def test_a_robot_that_faces_elsewhere_is_made_with_a_urdf_that_is_turned(
+        tmp_path, capsys, facing, turn):
+    """By the option that the refusal names: the left foreleg is the one with that name."""
+    at = {leg: complex(x, y) * turn for leg, (x, y) in QUADRUPED.items()}
+    (tmp_path / 'my.urdf').write_text(quadruped(
+        places={leg: (place.real, place.imag) for leg, place in at.items()},
+        crosswise=facing != '-x'))
+    out, command = tmp_path / 'my.yaml', ['--urdf', str(tmp_path / 'my.urdf'), '--make']
+    assert main([*command, str(out)]) == 2
+    (option,) = re.findall(r'--forward=\S+', capsys.readouterr().err)
+    assert option == f'--forward={facing}' and main([*command, str(out), option]) == 0
     turned = tmp_path / 'my_facing_x.urdf'
     robot = load_robot(str(out))
     assert {leg: joints[0].name for leg, joints in robot.legs.items()} == {
