@@ -100,7 +100,7 @@ def random_states(orbit: Orbit, count: int, seed: int) -> np.ndarray:
 
 def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
           done: Callable[[int], None] = lambda count: None) -> Basin:
-    """Run a network from random states and count what returns to a gait.
+    """Run a network from random states; return the shares that end on a gait and elsewhere.
 
     Args:
         orbit: of the gait.
@@ -131,7 +131,7 @@ def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
 
 
 def end_of(run: Trajectory, orbit: Orbit) -> str:
-    """Name what a simulation of an orbit's network does in the end, as Basin has it.
+    """Return the name of the end of a simulation of an orbit's network; see Basin.
 
     Args:
         run: of many cycles.

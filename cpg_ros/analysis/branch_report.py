@@ -37,7 +37,7 @@ BEYOND = {'torus': 'a torus', 'period doubling': 'a gait of two strides',
 
 @dataclass(frozen=True)
 class StabilityLoss:
-    """A point beyond which a gait does not attract any more, and what its normal form says.
+    """A point beyond which a gait no longer attracts, and its normal form.
 
     Attributes:
         gait: name.
@@ -87,7 +87,7 @@ class JudgedBranch:
 
 
 def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
-    """Follow the gaits of an analysis, and judge what is met on the way."""
+    """Follow the gaits of an analysis, and judge where they lose stability."""
     judged = [JudgedBranch(gait, branch) for gait, branch in _branches(analysis)]
     done = 0
     with progress_bar('stability along the branches',

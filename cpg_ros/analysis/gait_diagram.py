@@ -150,7 +150,7 @@ COLOURS = ('#2b6cb0', '#c05621', '#2f855a')
 
 
 def rows(network: type[Network]) -> list[tuple[str, int, str]]:
-    """Return what is drawn, from the top: a leg or a muscle, its cell from 1, and its colour."""
+    """Return the rows from the top: name of leg or muscle, its cell from 1, and its colour."""
     legs, girdles = next(iter(network.legs.values())), network.girdles
     if network.muscles:
         names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
@@ -162,7 +162,7 @@ def rows(network: type[Network]) -> list[tuple[str, int, str]]:
 
 
 def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
-    """Return what drives a leg: its cell over its range, smoothed as joints see it, from -1 to 1.
+    """Return the signal that drives a leg, its cell as the joints see it, from -1 to 1.
 
     Args:
         orbit: the gait.

@@ -215,7 +215,7 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
              seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
              fixed: Mapping[str, float] | None = None, progress: bool = True,
              islands: int = 1, executor: Executor | None = None) -> Front:
-    """Look for weights that give a network a gait.
+    """Search for weights that give a network a gait, by NSGA-II on islands.
 
     Args:
         network_name: as search_space takes it.
@@ -276,7 +276,7 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
 
 
 def _closeness(best: Score) -> str:
-    """Say how close a set comes to its gait without being on it."""
+    """Return a text on how close a set comes to its gait without being on it."""
     if best.errors.max() > LARGEST:
         return f'the best has phase errors of up to {best.errors.max():.1f} degrees'
     if best.shortfall > 0.0:

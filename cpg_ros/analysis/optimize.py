@@ -105,7 +105,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
 
 
 def _signals(axes: Axes, front: Front) -> None:
-    """Draw what every cell does over two cycles of the exact orbit, one row each."""
+    """Draw the waveform of every cell over two cycles of the exact orbit, one row each."""
     orbit = front.best.orbit
     points = 512
     once = orbit_signals(orbit, points)[:, :orbit.network.cells]
@@ -233,7 +233,7 @@ def _parser() -> Parser:
 
 
 def table(front: Front) -> str:
-    """Say what was chosen, in lines of a name, a value and a unit."""
+    """Return the chosen set as lines of a name, a value and a unit."""
     best, space = front.best, front.space
     parameters = best.preset.network.as_dict()
     rows = []

@@ -54,7 +54,7 @@ class PhaseReport(ShortRepr):
         return cls(responses, missing)
 
     def text(self) -> str:
-        """Return a table of the largest advances and delays, and what follows from the curves."""
+        """Return tables of the largest advances and delays, of locking ranges and diffusion."""
         rows: list[tuple[str, ...]] = [('gait', 'cells', 'input to', 'advance', 'at', 'delay',
                                         'at', 'locking')]
         theta = np.arange(FINE) / FINE

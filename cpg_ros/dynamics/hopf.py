@@ -340,12 +340,12 @@ class HopfPoint(ShortRepr):
 
 
 def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Solve for what a push moves; where there is none, a singular matrix does not matter."""
+    """Solve for the response to a push; without one, a singular matrix does not matter."""
     return np.linalg.solve(matrix, push) if push.any() else np.zeros_like(push)
 
 
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:
-    """Return where a primary gait is born as the delay grows; None if at no delay, or without one.
+    """Return the Hopf point from which a primary gait emerges as the delay grows, or None.
 
     It is the smallest delay at which a pair of roots of the gait's class moves to the right.
 
@@ -509,7 +509,7 @@ def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
 
 
 def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:
-    """Add the last places before and the first ones after those where nothing exists."""
+    """Add the last places before gaps of the equilibrium, and the first ones after them."""
     whole = grid[:1]
     for left, right in pairwise(grid):
         if exists(left) != exists(right):

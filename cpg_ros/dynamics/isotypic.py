@@ -60,7 +60,7 @@ def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def _halves(part: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
-    """Part a subspace, orthonormal columns, into those that an involution keeps and turns."""
+    """Split a subspace, orthonormal columns, into the parts that an involution keeps and flips."""
     columns = []
     for sign in (1.0, -1.0):
         vectors, sizes, _ = np.linalg.svd(0.5 * (part + sign * image @ part), full_matrices=False)
@@ -81,7 +81,7 @@ class Expansion:
     """
 
     def __init__(self, network: Network, state: np.ndarray) -> None:
-        """Take the parameters and the state of every cell."""
+        """Expand about a state of every cell at these parameters."""
         self.network, self.state = network, state
         self._equations = equations_of(type(network))
         self._x = [state[argument.variable] for argument in self._equations.arguments]

@@ -178,7 +178,7 @@ class Orbit(ShortRepr, ABC):
 
 
 def check_values(network: Network, gait: str) -> None:
-    """Check what every solver needs.
+    """Check the input of every solver.
 
     Raises:
         InputError: a parameter is not finite, or the delay not positive.
@@ -215,7 +215,7 @@ def extra_symmetry(orbit: Orbit) -> str:
 
 
 def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
-    """Name what a cycle has beyond a symmetry, or '' if it has nothing.
+    """Return the name of a symmetry that a cycle has in addition to another one, or ''.
 
     Args:
         symmetry: that it has.
@@ -235,7 +235,7 @@ def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
 
 @lru_cache(maxsize=64)
 def _beyond(symmetry: Symmetry, points: int) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """List what a cycle could have beyond a symmetry.
+    """Return the symmetries that a cycle could have in addition to another one.
 
     Returns:
         What it is; by how many of a cycle's points it shifts; and whose signal each cell has,

@@ -228,7 +228,7 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
 
 def find_orbit(network: Network, gait: str, random: int = RANDOM,
                longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
-    """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
+    """Yield the cycles with the gait's symmetry on which the network settles in its class.
 
     Args:
         network: parameters.

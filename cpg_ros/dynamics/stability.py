@@ -201,7 +201,7 @@ def _assessed(orbits: CoexistingOrbits) -> GaitAssessment:
 
 
 def nearest_threshold(network: Network) -> str:
-    """Name what would have to change for a gait, of a network with a delay that has none.
+    """Return a text on the nearest threshold of a gait, for a network with a delay without one.
 
     The critical delay that is nearest above the delay; where no delay has one, what the network
     says has to be larger.

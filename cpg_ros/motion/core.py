@@ -216,7 +216,7 @@ class CTrack:
 
 def look(gait: CGait, components: int, now: np.ndarray, strides: float, clocks: np.ndarray,
          angle: np.ndarray, rise: np.ndarray, legs: np.ndarray) -> float:
-    """Read joints and legs off a state so many strides after the last; return how far it is off.
+    """Read joints and legs off a state some strides after the last; return its distance.
 
     Args:
         gait: the gait.

@@ -50,14 +50,14 @@ _PRINTER = _Printer({'fully_qualified_modules': False, 'allow_unknown_functions'
 
 
 def expressions(equations: EquationTexts) -> tuple[list[Any], list[Any]]:
-    """Return the equations as sympy has them, and their symbols in the order of ``names``."""
+    """Return the equations as sympy expressions, and their symbols in the order of ``names``."""
     symbols = {name: sympy.Symbol(name, real=True) for name in equations.names}
     return ([sympy.sympify(text, locals=symbols) for text in equations.texts],
             list(symbols.values()))
 
 
 def _function(name: str, symbols: Sequence[Any], parts: Sequence[Sequence[Any]]) -> str:
-    """Write a function that returns expressions, what they share worked out once."""
+    """Return code of a function that returns expressions; common parts are computed once."""
     shared, reduced = sympy.cse([one for part in parts for one in part],
                                 sympy.numbered_symbols('s'))
     lines = [f'def {name}({", ".join(map(str, symbols))}):']
@@ -99,7 +99,7 @@ def first(equations: EquationTexts) -> str:
 
 
 def _smooth(part: Any) -> Any:
-    """Leave out what derivatives have at a kink alone: they are those beside it."""
+    """Drop terms that differ from 0 at a kink alone: derivatives are those beside it."""
     return part.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
 
 

@@ -88,7 +88,7 @@ def places(legs: int) -> dict[str, Any]:
 
 
 def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
-    """Return a network's like for another number of legs.
+    """Return the network of the same family for another number of legs.
 
     Raises:
         InputError: the network takes no such number.

@@ -161,7 +161,7 @@ class Network(NetworkDefinition):
         return None
 
     def obstacle(self, gait: str) -> str:
-        """Say what in the parameters rules a gait out, where that is known beforehand, or ''."""
+        """Return why the parameters rule a gait out, if that is known beforehand, or ''."""
         return ''
 
     def broken(self, symmetry: Symmetry) -> str:

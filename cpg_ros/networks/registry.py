@@ -254,7 +254,7 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
 
 
 def reference(name: str) -> str:
-    """Return what find_network finds a network by in another process: its name or its file."""
+    """Return the name or file by which find_network finds a network in another process."""
     return str(NETWORKS.files.get(NETWORKS[name], name))
 
 
@@ -268,7 +268,7 @@ def numbered(legs: int) -> tuple[type[Network], ...]:
 
 
 def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]:
-    """Return a network's like for as many legs, if it takes so many, or else itself."""
+    """Return a network for as many legs, if its family takes that number, or else itself."""
     try:
         return with_legs(network, len(legs))
     except InputError:
@@ -283,7 +283,7 @@ def _numbered(family: str, legs: int) -> type[Network]:
 
 
 def _usable(source: str, load: Callable[[], Entry]) -> Entry:
-    """Run code of others, and say in one line what goes wrong in it."""
+    """Run code of others; raise NetworkError with one line on its failure."""
     try:
         return load()
     except Exception as error:

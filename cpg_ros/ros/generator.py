@@ -355,7 +355,7 @@ class Generator(StartedNode):
 
     @property
     def _leads(self) -> bool:
-        """Whether it must know where the joints are before it moves them."""
+        """Whether the joints' present angles must be known before the first motion."""
         return self._value('command') != 'none' and not self._value('assume_stand')
 
     def _find_pose(self) -> tuple[str, np.ndarray | None]:
@@ -408,7 +408,7 @@ class Generator(StartedNode):
 
     @property
     def _awaited(self) -> str:
-        """What publishing waits for."""
+        """Text on the condition that publishing waits for."""
         if self._search is not None and self._measured is not None:
             return f'the measured pose on {self._measured.topic}'
         return '~/enable' if self._lifecycle is None else 'configure'

@@ -137,7 +137,7 @@ def exclusive(command: str) -> Spec:
 
 @dataclass(frozen=True)
 class GaitSettings:
-    """What a plan is made from; hashable, so that each plan is made once."""
+    """Settings that determine a plan; hashable, so that each plan is made once."""
 
     gait: str
     network: Network

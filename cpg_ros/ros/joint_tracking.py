@@ -33,7 +33,7 @@ AGAIN = 3.0
 
 
 class TrackingLimits(NamedTuple):
-    """What a TrackingMonitor needs of a robot's settings: names, rad and s."""
+    """Settings of a robot that a TrackingMonitor needs: names, rad and s."""
 
     names: tuple[str, ...]
     tracking_error: float

@@ -58,7 +58,7 @@ class Measurements:
 
     def __init__(self, node: Node, body: Body, sensors: SimulatedSensors, frame: str,
                  delay: float = 0.0) -> None:
-        """Publish the motion of a body, and what its sensors measure.
+        """Publish the motion of a body and the measurements of its sensors.
 
         Args:
             node: that publishes.

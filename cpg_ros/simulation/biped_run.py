@@ -40,7 +40,7 @@ SETTLING = 3.0
 
 @dataclass(eq=False, repr=False)
 class BipedOutcome(ShortRepr):
-    """How a biped's run went.
+    """Results of a biped's run.
 
     Attributes:
         fell: when it fell, s, infinite if it did not.
@@ -104,7 +104,7 @@ class BipedRun:
         self._behind = np.zeros(len(robot.order), dtype=bool)
 
     def measure(self, before: np.ndarray) -> SensorData:
-        """Return what is true now; before is the base's motion a step ago, shape (1, 6)."""
+        """Return the true sensor data; before is the base's motion a step ago, shape (1, 6)."""
         body, senses = self.body, self.senses
         senses.joint_positions[0] = body.data.qpos[self._angles]
         senses.joint_velocities[0] = body.data.qvel[self._speeds]

@@ -69,7 +69,7 @@ class BatchPhysics:
         mujoco.mj_getState(body.model, body.data, self.start, full)
 
     def controls(self, runs: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return what drives bodies, all zero, and views of two parts of it.
+        """Return the control inputs of bodies, all zero, and views of two parts of them.
 
         Returns:
             For ``rollout``, shape (runs, steps, numbers); the joints' targets, rad, shape (runs,
@@ -145,7 +145,7 @@ TOGETHER = 12
 
 def targets(plan: GaitPlan, duration: float, timestep: float,
             strides: Sequence[float] = (), pace: float = 1.0, ramp: float = 1.0) -> np.ndarray:
-    """Work out the angles that a generator publishes from the stand on.
+    """Return the angles that a generator publishes from the stand on.
 
     Args:
         plan: the gait.

@@ -124,15 +124,15 @@ class Body:
                    for plane in planes for geom in own)
 
     def command(self, angles: np.ndarray) -> None:
-        """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
+        """Set the target angles of the joints, rad, shape (joints,)."""
         self._control[:] = angles
 
     def hold(self, angles: np.ndarray) -> None:
-        """Let joints of no leg be driven to these angles, rad, in the order of ``robot.held``."""
+        """Set the target angles of joints of no leg, rad, in the order of ``robot.held``."""
         self.data.ctrl[len(self.stand):] = angles
 
     def scale_kp(self, scale: float) -> None:
-        """Let the joints have their proportional gain times this."""
+        """Scale the proportional gains of the joints by a factor."""
         if scale != self._kp_scale:
             self._kp_scale = scale
             self.model.actuator_gainprm[:, 0] = scale * self._kp
@@ -165,7 +165,7 @@ class Body:
 
     @property
     def mass(self) -> float:
-        """Of all of it, kg."""
+        """Mass of the robot, kg."""
         return float(self.model.body_mass.sum())
 
     @property
@@ -243,7 +243,7 @@ class Body:
 
     @property
     def axes(self) -> np.ndarray:
-        """What turns vectors of the base's frame into those of the world's, shape (3, 3)."""
+        """Rotation from the base's frame to the world's, shape (3, 3)."""
         engine().mju_quat2Mat(self._turn, self.quaternion)
         return self._turn.reshape(3, 3)
 
@@ -296,7 +296,7 @@ class Anatomy:
         self.bodies, self.soles = model.geom_bodyid[self.feet], np.array(soles)
 
     def places(self, data: Any) -> np.ndarray:
-        """Where the soles are in a ``mujoco.MjData``, m, shape (legs, 3)."""
+        """Return the places of the soles in a ``mujoco.MjData``, m, shape (legs, 3)."""
         turn = data.xmat[self.bodies].reshape(-1, 3, 3)
         return data.xpos[self.bodies] + (turn @ self.soles[:, :, None])[:, :, 0]
 

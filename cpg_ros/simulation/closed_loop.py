@@ -101,7 +101,7 @@ class Patterns:
         return min(pattern.level for pattern in self._patterns)
 
     def plan(self) -> None:
-        """Advance by one time step and fill what is planned."""
+        """Advance by one time step and fill the planned motion."""
         planned, feedback = self.planned, self._feedback
         self._time += self._dt
         while self._events and self._events[-1][0] <= self._time:
@@ -161,7 +161,7 @@ class ClosedLoopBatch(BatchPhysics):
             expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None = None,
             noise: SensorNoise | None = None, goal: float = math.inf,
             keep_senses: bool = False) -> Outcome:
-        """Let bodies walk from the stand.
+        """Simulate bodies that walk off from the stand.
 
         Args:
             scenarios: one a run.

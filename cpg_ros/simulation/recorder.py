@@ -47,7 +47,7 @@ class RunLog:
 
     def __init__(self, body: Body, rate: float, film: Path | None = None,
                  footfalls: Path | None = None, terrain: Terrain | None = None) -> None:
-        """Keep what the files need; one that is None is not made.
+        """Prepare to record for these files; a file that is None is not written.
 
         Args:
             body: looked at.
@@ -93,7 +93,7 @@ class RunLog:
             self._steps.append((now, body.feet.copy(), body.base[:2].copy()))
 
     def write(self, name: str, enough: Callable[[], bool] = lambda: False) -> list[Path]:
-        """Make the files and return them; ``name`` is that of the model.
+        """Write the files and return their paths; ``name`` is the model's.
 
         Raises:
             SimulationError, OSError: one cannot be made.
@@ -222,7 +222,7 @@ class Camera:
         return self._picture[::-1]
 
     def close(self) -> None:
-        """Give back the context; left to the end of the process, drivers complain."""
+        """Release the OpenGL context; some drivers fail if it lasts to the end of the process."""
         self._context.free()
         self._opengl.free()
 
@@ -234,7 +234,7 @@ class Camera:
 
 
 def without_opengl() -> str:
-    """Say why no picture can be drawn, or ''."""
+    """Return why no picture can be drawn, or ''."""
     anything = engine().MjModel.from_xml_string(
         '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>')
     try:
@@ -329,7 +329,7 @@ class _Mp4:
 
 
 def check_film(path: Path) -> None:
-    """Say now what would stop a film from being written later.
+    """Check that a film can be written later.
 
     Raises:
         SimulationError: an unknown ending, no such folder, or no ffmpeg.

@@ -57,7 +57,7 @@ def usual_gains(mass: float, legs: int) -> tuple[float, float]:
 
 
 def set_gains(model: Any, kp: float | None, kd: float | None, legs: int) -> None:
-    """Let the actuators of a ``mujoco.MjModel`` hold angles with these gains.
+    """Set the gains with which the actuators of a ``mujoco.MjModel`` hold angles.
 
     Args:
         model: its actuators are those of joints.
@@ -247,7 +247,7 @@ def _reason(error: Exception) -> str:
 
 
 def _free(spec: Any, path: Path) -> None:
-    """Let the root of a URDF move: the format cannot express whether it does."""
+    """Add a free joint to the root of a URDF, which the format cannot express."""
     roots = spec.worldbody.bodies
     if len(roots) != 1:
         raise SimulationError(f'model {path}: has {len(roots)} roots, not one')
@@ -337,7 +337,7 @@ def _sense(spec: Any, robot: Robot, joints: dict[str, Any], base: Any) -> None:
 
 
 def _depth(body: Any) -> int:
-    """How many bodies there are between a body and the world."""
+    """Return the number of bodies between a body and the world."""
     depth = 0
     while body.parent is not None:
         body, depth = body.parent, depth + 1

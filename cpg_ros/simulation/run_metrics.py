@@ -169,7 +169,7 @@ def _hops(touching: np.ndarray, dt: float) -> int:
 
 
 def _feet(body: Body, parts: Anatomy, places: np.ndarray) -> np.ndarray:
-    """Work out where the feet are, m, shape (places, legs, 3)."""
+    """Return the places of the feet, m, shape (places, legs, 3)."""
     mujoco, data = engine(), engine().MjData(body.model)
     feet = np.empty((len(places), len(parts.soles), 3))
     for row, place in zip(feet, places, strict=True):

@@ -27,7 +27,7 @@ PUSH = 0.1
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a robot meets in a run, flat ground and nothing else unless given.
+    """Commands, ground and disturbances of a run; by default flat ground only.
 
     Attributes:
         friction: between feet and ground.
@@ -69,7 +69,7 @@ def impulse(when: float, forward: float, left: float) -> tuple[float, float, flo
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """How far sensors are from the truth; noise is a standard deviation.
+    """Errors of sensors; noise is a standard deviation.
 
     Attributes:
         delay: of everything that is measured, s.
@@ -94,7 +94,7 @@ class SensorNoise:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcome(ShortRepr):
-    """How runs ended, and their signals after each step; the first axis is the run's.
+    """Results of runs, and their signals after each step; the first axis is that of the runs.
 
     What follows a run's end repeats its last value.
 

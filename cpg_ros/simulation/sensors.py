@@ -74,7 +74,7 @@ class SimulatedSensors:
 
 @jit_entry
 def fill_sensor_data(senses, quaternions, moving, before, dt, velocity):
-    """Fill what the base measures, and its true velocity in its own frame, m/s, (runs, 3).
+    """Fill the measurements of the base, and its true velocity in its own frame, m/s, (runs, 3).
 
     Args:
         senses: SensorData, whose rpy, angular_velocity and acceleration are filled.

@@ -22,7 +22,7 @@ NEAR = 0.05
 
 
 class Approach:
-    """Leads joints from where they stand to what is commanded, each leg in a smooth step.
+    """Leads joints from their present angles to commanded ones, each leg in a smooth step.
 
     So a driver does that is switched on under a running controller: nothing jerks, and a gait
     that is in full swing grows out of the stand. What begins where a leg is, as with a generator
@@ -49,7 +49,7 @@ class Approach:
         self._there = False
 
     def towards(self, commanded: np.ndarray) -> np.ndarray:
-        """Return what the joints should be driven to in this step, rad, shape (joints,)."""
+        """Return the target angles of this step, rad, shape (joints,)."""
         if self._there:
             return commanded
         way, done, steps = commanded - self._start, self._done, self._steps

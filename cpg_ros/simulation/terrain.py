@@ -88,7 +88,7 @@ def grid() -> tuple[np.ndarray, np.ndarray]:
 
 
 def heights(terrain: Terrain) -> np.ndarray:
-    """Work out the ground, m, shape (rows, columns) of the grid.
+    """Return the heights of the ground, m, shape (rows, columns) of the grid.
 
     Raises:
         KeyError: the kind has no heights.

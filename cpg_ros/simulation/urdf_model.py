@@ -36,7 +36,7 @@ FLAT = 1e-6
 
 
 def trouble(path: Path) -> str:
-    """Say why MuJoCo cannot read a mesh, '' if it can."""
+    """Return why MuJoCo cannot read a mesh, '' if it can."""
     if path.suffix.lower() not in ('.stl', '.obj', '.msh'):
         return f'MuJoCo does not read {path.suffix or "files without an ending"}'
     import mujoco
@@ -178,7 +178,7 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
 
 
 def part_touching(spec: Any, stand: Mapping[str, float]) -> None:
-    """Let links never collide with each other that do so with all joints at 0 or in the stand.
+    """Exclude collisions between links that touch with all joints at 0 or in the stand.
 
     Convex hulls of neighbours overlap, and would be pressed apart.
 
@@ -238,7 +238,7 @@ class _Meshes:
 
     @property
     def changes(self) -> list[str]:
-        """What was done, a line for each kind of change, with meshes and their links."""
+        """Changes, one line for each kind, with meshes and their links."""
         return [f'{said}: ' + ', '.join(f'{mesh} ({" ".join(links)})'
                                         for mesh, links in meshes.items())
                 for said, meshes in self._changes.items()]
@@ -316,7 +316,7 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
 
 
 def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) -> bool:
-    """Whether a link has others with mass fixed to it."""
+    """Return whether links with mass are fixed to a link."""
     below = [child.get('link', '') for joint in robot.findall('joint')
              if joint.get('type') == HELD and (parent := joint.find('parent')) is not None
              and parent.get('link') == name and (child := joint.find('child')) is not None]

@@ -61,7 +61,7 @@ class CodimensionTwo(ShortRepr):
         return f'{self.kind} of {of} at {self.values[0]:.7g}, {self.values[1]:.7g}'
 
     def as_dict(self) -> dict[str, Any]:
-        """Return everything in plain types; what does not apply is None."""
+        """Return everything in plain types; fields that do not apply are None."""
         return {'type': self.kind, 'gait': self.gait, 'values': list(self.values),
                 'test': self.test, 'omega': _plain(self.omega), 'other': list(self.other),
                 'other_omega': _plain(self.other_omega)}

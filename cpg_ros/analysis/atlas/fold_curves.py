@@ -127,7 +127,7 @@ def _pair(fold: CurvePoint) -> tuple[float, float]:
 
 
 def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tuple[float, float]:
-    """Return where the rate, with a sign, is least, and what it is there."""
+    """Return the place at which the rate, with a sign, is least, and its value there."""
     extremum = minimize_scalar(lambda step: sign * rate(step), method='bounded',
                                bounds=(-reach, reach), options={'xatol': ALONG})
     return float(extremum.x), float(extremum.fun)
@@ -355,7 +355,7 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, way: fl
 
 
 def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step: float) -> bool:
-    """Whether a fold lies close to the line through the two before it, a step later."""
+    """Tell whether a fold lies close to the extrapolation of the two folds before it."""
     if len(last) < 3:
         return True
     (a, one), (b, two), (c, three) = last

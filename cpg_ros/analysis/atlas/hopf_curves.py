@@ -54,7 +54,7 @@ class HopfCondition:
     """Two real equations in (p1, p2, omega), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, mode: tuple[int, ...]) -> None:
-        """Take the plane and the class whose root crosses."""
+        """Prepare for a plane and the class whose root crosses."""
         self.chart, self.mode = chart, mode
 
     def values(self, fraction: np.ndarray) -> np.ndarray:

@@ -117,7 +117,7 @@ def _table_1(gait: SolvedGait) -> Iterator[ReproducedRow]:
 
 
 def _reversed(gait: SolvedGait) -> ReproducedRow:
-    """Start the walk as Table 1 has it, with the wave run the other way, and see what lasts."""
+    """Compute the gait that develops from Table 1's walk, run the other way."""
     preset = Quadruped.presets()[gait.name]
     start = np.array(preset.start).reshape(2, -1)[:, [0, 1, 6, 7, 4, 5, 2, 3]]
     seen = rhythm(gait.network, start.ravel(), REVERSAL * preset.period, Z4_Z2,
@@ -280,7 +280,7 @@ def solutions() -> list[tuple[Subgroup, Subgroup]]:
 
 
 def dihedral() -> Iterator[ReproducedRow | Picture]:
-    """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
+    """Compute the rows of section 2.3, and its results that the proof of Theorem 3.2 uses."""
     at = Citation(AUTHORS, 'section 2.3')
     classes = {frozenset(conjugate(g, subgroup) for g in D4) for subgroup in all_subgroups(D4)}
     yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))

@@ -131,7 +131,7 @@ def existence() -> Iterator[ReproducedRow | Picture]:
 
 
 def table_12() -> Iterator[ReproducedRow | Picture]:
-    """Table 12: Hopf points to pace, bound and trot, and what branches off."""
+    """Compute Table 12: Hopf points to pace, bound and trot, and the gaits that branch off."""
     at = Citation(AUTHORS, 'Table 12')
     points = {}
     for gait, name, line, (alpha, gamma) in (

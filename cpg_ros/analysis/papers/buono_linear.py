@@ -269,7 +269,7 @@ def tables() -> Iterator[ReproducedRow | Picture]:
 
 
 def coupled_variable() -> Iterator[ReproducedRow | Picture]:
-    """Equation 4.4: what delta multiplies."""
+    """Compute the variable that delta multiplies in equation 4.4."""
     sample = drawn()
     network, at = sample.network, Citation(AUTHORS, 'eq. 4.4')
     theirs = sample.tables.trace(0, 0)

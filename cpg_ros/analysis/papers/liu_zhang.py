@@ -87,7 +87,7 @@ def taylor_terms() -> Iterator[ReproducedRow | Picture]:
 # The normal form as Liu & Zhang (2024) print it, section 2; erratum 1.
 
 def published_normal_form(point: HopfPoint) -> NormalForm:
-    """Return what the printed formulas give at a Hopf point of the delayed network.
+    """Return the normal form by the printed formulas, at a Hopf point of the delayed network.
 
     ``D = 1/(8 (-1 + c e))``, ``k1 = 8 D (-a - b - d + c e)``, ``k2 = -8 tau D (-b + c e - d)``
     with e = exp(i omega tau), whatever the mode.
@@ -107,7 +107,7 @@ HALVES = (0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2)
 
 @dataclass(frozen=True)
 class Example:
-    """A published gait: parameters, and what is printed of it.
+    """A published gait: its parameters and the printed results.
 
     Attributes:
         place: in the paper.

@@ -286,7 +286,7 @@ def predicted() -> Iterator[ReproducedRow | Picture]:
 
 
 def kinds() -> Iterator[ReproducedRow | Picture]:
-    """Section 5: the eleven kinds of rhythm, and what Table 5 calls H and K."""
+    """Compute section 5's eleven kinds of rhythm, and Table 5's H and K."""
     at = Citation(AUTHORS, 'section 5')
     waveforms = [pair.waveforms for pair in admissible_pairs(D2)]
     yield at.number('kinds of rhythm that D2 allows', '11', len(waveforms))

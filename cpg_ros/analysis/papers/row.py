@@ -349,7 +349,7 @@ def disturbed_start(preset: Preset) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """A simulation and what its end was recognised as.
+    """A simulation and the gait recognised at its end.
 
     Attributes:
         run: from the start on.

@@ -229,7 +229,7 @@ class Variation:
 
 
 def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class but the trivial one, and that."""
+    """Return the multipliers within the gait's class, without the trivial one, and that one."""
     roots = variation(orbit)[1]
     trivial = int(np.abs(roots - 1.0).argmin())
     return np.delete(roots, trivial), complex(roots[trivial])

@@ -54,7 +54,7 @@ def _sources(network: type[Network]) -> dict[str, str]:
 
 @cache
 def version() -> str:
-    """Return a word that changes whenever something does that the C is written by."""
+    """Return a digest of everything from which the C is generated."""
     digest = hashlib.sha256(platform.machine().encode())
     for source in sorted(FOLDER.parent.rglob('*.[chp]*')):
         if source.suffix in ('.c', '.h', '.py'):
@@ -112,7 +112,7 @@ def lane_of(network: type[Network], system: System, ring: Ring) -> Lane:
 
 
 def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Ring]]:
-    """Yield each lane by itself; what is done to its history is taken over."""
+    """Yield each lane by itself; changes of its history are copied back."""
     for lane in range(lanes):
         arrays = [array[:, lane::lanes] for array in (ring.x, ring.after, ring.before)]
         own = [array.copy() for array in arrays]

@@ -26,7 +26,7 @@ WIDTH = 98
 
 
 def part(name: str, values: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return a file of ``c``, what stands between @ in it replaced by these values."""
+    """Return a file of ``c`` in which names between @ are replaced by these values."""
     text = (FOLDER / name).read_text()
     for key, value in values.items():
         text = text.replace(f'@{key}@', value)

@@ -42,7 +42,7 @@ _PRINTER = _KernelPrinter({'fully_qualified_modules': False})
 
 
 class LoopProgram:
-    """Loops that work out expressions of arguments that are all heard at one time."""
+    """Loops that compute expressions of arguments of one instant."""
 
     def __init__(self, arguments: Sequence[tuple[Any, Argument]], powers: dict[Any, Any]
                  ) -> None:
@@ -141,7 +141,7 @@ class Writer:
         return str(_PRINTER.doprint(part.xreplace(names)))
 
     def loops(self, results: Sequence[tuple[str, Any]]) -> None:
-        """Write all loops: functions, what is fetched, and results (array name, expression)."""
+        """Return the code of all loops: functions, fetched arrays and results (name, value)."""
         program = self._program
         done: set[Any] = set()
         waiting_f = list(program.functions)
@@ -203,7 +203,7 @@ def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
 
 
 def _split(rates: list[Any], delayed: set[Any], now: set[Any]) -> tuple[list[Any], list[Any]]:
-    """Part rates into what is heard a delay ago and the rest.
+    """Split rates into the terms that depend on the past state, and the rest.
 
     Returns:
         Expressions in delayed arguments, and the rates with symbols (d0 ...) in place of them.
@@ -367,7 +367,7 @@ class FieldSource(NamedTuple):
 
 
 class _Names:
-    """What symbols are called in C, at cell i."""
+    """Names of symbols in C, at cell i."""
 
     def __init__(self, equations: Equations, cells: int, each: bool) -> None:
         self._p: dict[str, str] = {}
@@ -413,7 +413,7 @@ def _loop(lines: list[str]) -> list[str]:
 
 
 def _c_function(part: LoweredPart, names: _Names) -> str:
-    """Write one of the functions: a loop for what other cells hear, and one for all results."""
+    """Return C of a function: a loop for the terms of other cells, and one for all results."""
     waiting, done = list(part.program.functions), set[Any]()
     lines: list[str] = []
     heard = {symbol: what for symbol, what, _ in part.program.fetched}
@@ -438,7 +438,7 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
 
 
 def field_source(equations: Equations, cells: int, each: bool = False) -> FieldSource:
-    """Write the functions of a network of so many cells.
+    """Return C of the functions of a network with a number of cells.
 
     Args:
         equations: of the network.

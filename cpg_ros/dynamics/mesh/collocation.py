@@ -206,7 +206,7 @@ def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> n
 
 
 def chained(steps: np.ndarray) -> np.ndarray:
-    """Return what is reached at the mesh points, from (1, 0) on, shape (n + 1, d, d + k).
+    """Return the propagated columns at the mesh points, from (1, 0), shape (n + 1, d, d + k).
 
     Args:
         steps: of the intervals, ``y -> steps[:, :d] y + steps[:, d:]``, shape (n, d, d + k).

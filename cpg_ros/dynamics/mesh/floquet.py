@@ -145,7 +145,7 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
 
 
 def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class but the trivial one, and that."""
+    """Return the multipliers within the gait's class, without the trivial one, and that one."""
     roots, _, trivial = multipliers(orbit)
     return roots, complex(trivial)
 
@@ -156,7 +156,7 @@ def transverse(orbit: MeshOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
 
 
 def largest_transverse(orbit: MeshOrbit, gain: float = 0.0, exact: float = 0.0) -> float:
-    """Return the modulus of the largest of them, 0 if there is none; always as exact as can be."""
+    """Return the largest modulus of the transverse multipliers, 0 if there is none."""
     return max((float(np.abs(part).max()) for part in transverse(orbit, gain)), default=0.0)
 
 

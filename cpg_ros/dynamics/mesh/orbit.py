@@ -159,7 +159,7 @@ def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bo
 
 def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
             ) -> Solution:
-    """Take a guess at the points of a mesh from a path over the places 0 to 1."""
+    """Return a guess at the points of a mesh from a path over the places 0 to 1."""
     inner = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
     return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 
@@ -276,7 +276,7 @@ class MeshOrbit(Orbit):
 
     @property
     def solution(self) -> Solution:
-        """The same as what Newton's method works on."""
+        """The orbit as the unknowns of Newton's method."""
         ends = np.vstack([self.coefficients[0], self.coefficients[:, -1].sum(axis=0)])
         return Solution(self.mesh, ends, self.stages, self.period / self.symmetry.order)
 

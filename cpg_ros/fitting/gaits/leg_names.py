@@ -98,7 +98,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _moved(words: Sequence[str]) -> Sequence[str]:
-    """Return the words of what a joint moves: torso_to_abduct is no joint of the torso."""
+    """Return the words of the part that a joint moves: torso_to_abduct does not move the torso."""
     return words[words.index('to') + 1:] if 'to' in words else words
 
 

@@ -46,7 +46,7 @@ STRIDES = 3
 
 @dataclass(frozen=True)
 class PhaseScatter:
-    """How well the phase of a leg against the first one is known, and kept.
+    """Scatter and error of a leg's phase against the first leg.
 
     Attributes:
         spread: standard deviation of single strides, cycles; nan if there are too few.

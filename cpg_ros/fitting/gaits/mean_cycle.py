@@ -295,7 +295,7 @@ def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 
 def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
              ) -> tuple[np.ndarray, np.ndarray]:
-    """Return spread and standard error at theta from what one joint's samples leave."""
+    """Return spread and standard error at theta from the residuals of one joint's samples."""
     cycle = np.floor(phases - phases[0]).astype(int)
     key = cycle * bins + (phases % 1.0 * bins).astype(int) % bins
     cycles = int(cycle[-1]) + 1
@@ -453,8 +453,8 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
     best: Trial = (np.inf, 1.0, np.empty(0))
 
     def better(longer: Trial) -> bool:
-        # What it explains must stand out of what is irregular: strides that vary average out
-        # the less, the fewer the cycles they are cut into.
+        # Its gain must exceed the effect of irregular strides, which average out the less, the
+        # fewer the cycles they are cut into.
         return best[0] > (1.0 + longer[1] / best[1]) * longer[0] + NEGLIGIBLE ** 2
 
     for lag in _lags(t, x):

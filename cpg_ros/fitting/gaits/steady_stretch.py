@@ -45,7 +45,7 @@ class RecordingLike(Protocol):
 
     @property
     def source(self) -> str:
-        """What to call it."""
+        """Name of the recording for messages."""
 
 
 class FootLoadsLike(Protocol):
@@ -91,7 +91,7 @@ WIDTHS = (11, 14, 18, 22)
 
 @dataclass(frozen=True)
 class Stretch:
-    """Where signals repeat.
+    """A stretch in which signals repeat.
 
     Attributes:
         begin, end: s.
@@ -113,7 +113,7 @@ class Stretch:
         return (self.end - self.begin) / self.period
 
     def outside(self, begin: float, end: float) -> bool:
-        """Tell whether most of it is not between two times."""
+        """Return whether most of the stretch is outside two times."""
         return min(self.end, end) - max(self.begin, begin) < 0.5 * (self.end - self.begin)
 
 

@@ -155,7 +155,7 @@ class CycleProblem:
         self._held[values[:self._own].tobytes()] = self._solve(values)
 
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
-        """Solve for an orbit, and what joints see of it, from the nearest one solved for.
+        """Solve for an orbit, from the nearest one known, and for the signals of the joints.
 
         Raises:
             NoOrbit: there is none that Newton's method reaches from there.
@@ -224,7 +224,7 @@ class CycleProblem:
     def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray,
                  members: np.ndarray, of_duty: np.ndarray
                  ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return what the gait's duty makes of the phases of a cell, or None if there is none.
+        """Return the phases of a cell retimed by the gait's duty, or None without a duty.
 
         Phases at which joints are read on theta, cycles, and their derivatives as of
         leg_duty.retimed.

@@ -116,7 +116,7 @@ class Spread(ShortRepr):
 
     @property
     def errors(self) -> np.ndarray:
-        """Standard errors, shape (n,), infinite for what is not determined."""
+        """Standard errors, shape (n,); infinite for numbers that are not determined."""
         errors = np.sqrt(np.diag(self.covariance))
         if len(self.blind):
             errors[np.abs(self.blind).max(axis=0) > SHARE] = np.inf
@@ -124,7 +124,7 @@ class Spread(ShortRepr):
 
     @property
     def correlation(self) -> np.ndarray:
-        """Correlations, shape (n, n); not a number for what is not determined."""
+        """Correlations, shape (n, n); NaN for numbers that are not determined."""
         errors = self.errors
         with np.errstate(invalid='ignore', divide='ignore'):
             found = self.covariance / np.outer(errors, errors)
@@ -195,7 +195,7 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Optimum(ShortRepr):
-    """A least cost, and what intervals about it are made from.
+    """A minimum of the cost, and the quantities from which its intervals are computed.
 
     Attributes:
         evaluate: the problem.
@@ -280,7 +280,7 @@ class Optimum(ShortRepr):
             return min(max(end, self.free[k].low), self.free[k].high), False
 
     def regular(self, k: int) -> bool:
-        """Whether the cost rises about number k, as far as its interval goes, as it should."""
+        """Return whether the cost is about quadratic in number k within its interval."""
         error = float(self.spread.errors[k])
         return not np.isfinite(error) or all(self._nearby(k, error, side) is not None
                                              for side in (-1.0, 1.0))

@@ -351,7 +351,7 @@ def _warned(found: RecordingFit) -> str:
 
 
 def _strides(found: RecordingFit) -> list[str]:
-    """Return the sections on the gait and its strides, that of each stride folded."""
+    """Return the sections on the gait and its strides; the table of single strides is folded."""
     legs = stride_report.strides_of(found)
     parts = ['<h2>Gait</h2>', _html_table(stride_report.gait_summary(found, legs)),
              _image(stride_curves(found), 'Angles over the stride'),

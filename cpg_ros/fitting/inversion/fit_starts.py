@@ -43,7 +43,7 @@ LEAST, MOST, APART = 2, 3, 0.03
 
 
 def distinct(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether values of the free numbers, shape (numbers,), are not about the same."""
+    """Return whether two sets of the free numbers, shape (numbers,), are distinct."""
     return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
 
 

@@ -235,7 +235,7 @@ NEAR, LATE, FACTORS = 1.03, (1.03, 1.3, 2.0, 4.0), (0.45, 0.7, 1.4, 2.0, 3.0)
 
 
 class Coordinates:
-    """Free numbers of a fit, and what the trust region moves instead.
+    """Free numbers of a fit, and the coordinates that the trust region moves.
 
     The phase, which comes last, and all numbers but a free delay are their own coordinates. A
     delay with bounds of its own is, too.

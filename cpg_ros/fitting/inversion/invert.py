@@ -257,13 +257,13 @@ def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
 
 
 def _left(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
-    """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
+    """Return the residual RMS of each joint, rad, corrected for the readout's freedom."""
     residual = problem.best_readouts(values).residual
     return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
 
 
 def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisation:
-    """Go down from one start; the first one that has an orbit sets the joints' weights."""
+    """Minimise from one start; the first start with an orbit sets the joints' weights."""
     values = values.copy()
     try:
         problem.begin(values)
@@ -276,7 +276,7 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
 
 
 def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
-    """Weigh the joints by what is left of each, and fit again."""
+    """Weight the joints by their residuals, and fit again."""
     for last in range(WEIGHINGS):
         sizes = np.maximum(problem.joints.stated, _left(problem, values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
@@ -382,7 +382,7 @@ def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.n
 
 
 def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
-    """Look for other least costs, if that at the values is not the whole story."""
+    """Search for other minima along the valley if the cost is not quadratic at the values."""
     optimum = _optimum(problem, values)
     # If the model itself is wrong, its cost does not tell minima apart.
     if optimum.model.size > 0.0 or all(optimum.regular(k) for k in range(len(problem.free))):

@@ -38,7 +38,7 @@ GRID, STEPS = 1024, 4
 
 @dataclass(frozen=True)
 class GaitReadout:
-    """What the generator's readout of a gait has besides the weights of the joints.
+    """The generator's readout of a gait, other than the weights of the joints.
 
     Attributes:
         leading: cell -> the cell that gives its leg's phase, both from 1; other cells lead
@@ -87,7 +87,7 @@ class GaitReadout:
 
 
 class OwnStance(NamedTuple):
-    """When a leg stands by its leading cell, and the derivatives by the network's parameters.
+    """Stance of a leg by its leading cell, and its derivatives by the network's parameters.
 
     Attributes:
         begin: phase of the cell, cycles.

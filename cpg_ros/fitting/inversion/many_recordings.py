@@ -51,7 +51,7 @@ DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
 
 @dataclass(frozen=True)
 class FitSettings:
-    """How recordings are read and fitted: as the options of the executable ``inversion``."""
+    """Settings of reading and fitting: the options of the executable ``inversion``."""
 
     robot: Robot | None = None
     network: str = ''
@@ -94,7 +94,7 @@ def read(path: Path, settings: FitSettings) -> Recording:
 
 
 def invert_recording(task: Task) -> dict[str, Any]:
-    """Invert a recording; the result contains whatever is wrong with it.
+    """Invert a recording; the result contains the reason if that fails.
 
     Returns:
         ``digest``, and nothing else if that is the known one; otherwise the fields of a row of

@@ -46,7 +46,7 @@ DISTINCT = 2.0
 
 @dataclass(frozen=True)
 class NetworkComparison:
-    """How well a network explains a recording.
+    """Errors of a network's fit to a recording.
 
     Attributes:
         network: its name.
@@ -122,7 +122,7 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
 
 
 def _distinct(one: NetworkComparison, least: NetworkComparison) -> bool:
-    """Whether a network's errors are larger than the least ones, beyond their own scatter."""
+    """Return whether a network's errors exceed the least ones by more than their scatter."""
     if one is least:
         return False
     more = np.array([error - least.by_joint[name] for name, error in one.by_joint.items()

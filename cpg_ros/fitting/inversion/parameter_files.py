@@ -40,7 +40,7 @@ IN_PLACE = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
 
 
 def robot_file_of(path: Path) -> Path:
-    """Where the robot file of a parameter file is written."""
+    """Return the path of the robot file of a parameter file."""
     return path.with_name(f'{path.stem}_robot.yaml')
 
 
@@ -93,7 +93,7 @@ def _scaled(motion: Motion, fraction: float) -> Motion:
 
 
 def _within_limits(robot: Robot, found: RecordingFit) -> bool:
-    """Whether the fitted gait keeps to the limits; what else forbids it is check_plan's to say."""
+    """Return whether the fitted gait keeps to the limits; check_plan checks all else."""
     fit = found.fit
     try:
         plan(robot, fit.gait, type(fit.network).presets()[fit.gait], fit.network,
@@ -115,7 +115,7 @@ def _networks(robot: Robot, fitted: str) -> tuple[str, ...]:
 
 
 def fitted_motion(found: RecordingFit, robot: Robot | None) -> Motion:
-    """Return the fitted gait's motion; what was not fitted is that of the robot.
+    """Return the fitted gait's motion; parts that were not fitted are the robot's.
 
     Args:
         found: the fit, as fit_recording returns it.
@@ -200,7 +200,7 @@ def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
 
 
 def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
-    """Plan the gait as the generator does, from what was written for it.
+    """Plan the gait as the generator does, from the written files.
 
     Args:
         tree: as of parameter_tree.

@@ -274,7 +274,7 @@ def by_leg(legs: list[LegStrides]) -> Rows:
 
 
 def gait_summary(found: RecordingFit, legs: list[LegStrides]) -> Rows:
-    """Rows of what a gait laboratory reports: quantity and value, with a head."""
+    """Return the rows of a gait laboratory's report: quantity and value, with a head."""
     periods = np.concatenate([one.periods for one in legs])
     stride, contacts = found.stride, found.stride.contacts
     scatter = f' +- {periods.std(ddof=1):.3f}' if len(periods) >= FEWEST else ''
@@ -360,7 +360,7 @@ def symmetry(legs: list[LegStrides]) -> Rows:
 
 
 def notes(legs: list[LegStrides]) -> list[str]:
-    """Return what the strokes rest on, one line each."""
+    """Return the basis of the strokes, one line each."""
     known = [one.leg for one in legs if not one.why and not one.by_contacts]
     lines = [f'{one.leg}: cannot tell retraction from protraction: {one.why}'
              for one in legs if one.why]

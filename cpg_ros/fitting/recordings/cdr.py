@@ -179,13 +179,13 @@ class _Layout:
         self.value = np.frombuffer(first, np.uint32, words)[self.words] & self.mask
 
     def _array(self, joined: bytes, kind: str, offset: int, width: int) -> np.ndarray:
-        """Return an array of what every message has at an offset; a view, unaligned."""
+        """Return the values of every message at an offset; a view, unaligned."""
         dtype = np.dtype(kind)
         return np.ndarray((len(joined) // self.length, width), dtype, joined, offset,
                           (self.length, dtype.itemsize))
 
     def fits(self, joined: bytes) -> np.ndarray:
-        """Tell which messages of this length have this layout."""
+        """Return which messages of this length have this layout."""
         words = self._array(joined, '=u4', 0, self.length // 4)[:, self.words]
         return ((words & self.mask) == self.value).all(axis=1)
 

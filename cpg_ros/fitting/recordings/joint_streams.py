@@ -71,7 +71,7 @@ class Servo:
 
     @property
     def needs(self) -> str:
-        """What joint states must have besides positions."""
+        """Fields that joint states must have besides positions."""
         return 'velocity and effort' if self.kd else 'effort'
 
     def command(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray
@@ -239,7 +239,7 @@ class Stream:
         self.parts, self._size = [], LONG
 
     def notes(self, headers: bool) -> list[str]:
-        """List what is left out, one line each."""
+        """Return a line for each kind of data that is left out."""
         counts = ((self.mute, 'without positions'),
                   (self.odd, 'with more or fewer positions than names' + self.first_odd),
                   (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
@@ -410,7 +410,7 @@ class LiveRecording:
 
     def recording(self, joints: Sequence[str] = (), some: bool = False,
                   servo: Servo | None = None) -> Recording:
-        """Decode what is kept.
+        """Decode the kept messages.
 
         Args:
             joints: which to take; all of them, if empty.

@@ -58,7 +58,7 @@ class Segment:
 
     @property
     def markers(self) -> tuple[str, ...]:
-        """Those of both ends."""
+        """Markers of both ends."""
         return self.begin + self.end
 
 

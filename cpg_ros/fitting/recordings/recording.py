@@ -134,7 +134,7 @@ class Recording(ShortRepr):
         return replace(self, joints=tuple(names), positions=self.positions[:, columns])
 
     def between(self, begin: float, end: float) -> 'Recording':
-        """Return what was recorded from one time to another, s; its times begin at 0 again.
+        """Return the recording between two times, s; its times begin at 0 again.
 
         Raises:
             RecordingError: fewer than two samples are there.
@@ -366,7 +366,7 @@ def _groups(chunks: Iterable[Chunk], source: str
 
 def _one_table(parts: list[Part], width: int
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
-    """Return times, positions, the number of odd values by joint, and of what came twice."""
+    """Return times, positions, number of odd values by joint, and number of repeated samples."""
     odd, twice = np.zeros(width, int), 0
     for _, columns, positions in parts:
         strange = ~np.isfinite(positions)

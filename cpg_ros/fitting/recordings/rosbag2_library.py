@@ -89,7 +89,7 @@ class Reader:
         self.close()
 
     def open(self) -> None:  # noqa: A003
-        """Read what topics there are.
+        """Read the list of topics.
 
         Raises:
             ReaderError: the bag is damaged.

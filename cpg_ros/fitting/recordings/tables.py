@@ -198,7 +198,7 @@ EMPTY = ',;\t \r\n'
 #: END: last line of the preamble of OpenSim's .mot and .sto files; PREAMBLE: most lines of it.
 END, PREAMBLE = 'endheader', 100
 class _Lines(io.TextIOWrapper):
-    """Text whose lines have a largest length: what has none is no table, and fills the memory.
+    """Text with a limit on the length of lines, without which it would fill the memory.
 
     Attributes:
         path: of the file.
@@ -226,7 +226,7 @@ class _Lines(io.TextIOWrapper):
 
 
 class _Unpacked(gzip.GzipFile):
-    """What is packed in a file, of which no more than a recording has is read."""
+    """The unpacked contents of a file, limited to the size of a recording."""
 
     def __init__(self, file: IO[bytes], path: Path) -> None:
         super().__init__(fileobj=file)

@@ -67,7 +67,7 @@ def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
 
 
 def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
-    """Take away positions that no joint can have; return how many, shape (width,)."""
+    """Replace implausible positions by NaN; return their numbers, shape (width,)."""
     count = np.zeros(width, int)
     for _, columns, positions in parts:
         # Column by column: a long recording is large.
@@ -177,7 +177,7 @@ class Thinned:
 
     @property
     def note(self) -> str:
-        """What was done, in one line, or ''."""
+        """A line on the thinning, or ''."""
         return '' if not self.step else (
             f'{self.count} samples, of {self.rate:.4g} Hz, smoothed to {1e9 / self.step:g} Hz: '
             'the recording is long')

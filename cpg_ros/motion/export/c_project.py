@@ -74,7 +74,7 @@ class CProject:
 
     @property
     def tracks(self) -> int:
-        """Gaits that may fade into one another at a time."""
+        """Most gaits that fade into one another at a time."""
         return min(2, len(self.data.plans))
 
     @property

@@ -159,7 +159,7 @@ def _title(plans: Sequence[GaitPlan]) -> str:
 
 
 def _project(args: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CProject, float]:
-    """Return what to export, and the ticks per second of its test."""
+    """Return the project to export, and the ticks per second of its test."""
     title = _title(plans)
     if args.real == 'fixed':
         rate = args.rate or 50.0

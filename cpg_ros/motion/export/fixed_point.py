@@ -45,7 +45,7 @@ STILL = 1e-6
 
 
 def _halvings(largest: float, bits: int) -> int:
-    """Return how often to halve a number until it has so many bits; negative to double it."""
+    """Return the number of halvings after which a number has some bits; negative to double it."""
     return math.ceil(math.log2(max(largest, 1e-9) / (2**bits - 1)))
 
 
@@ -62,7 +62,7 @@ class FixedData(GaitData):
     """
 
     def __init__(self, plans: Sequence[GaitPlan], rate: float) -> None:
-        """Take gaits whose plans are of one robot and one network, and ticks per second.
+        """Prepare gaits whose plans are of one robot and one network, at some ticks per second.
 
         Raises:
             InputError: a gait takes more than a quarter of a stride in a tick, or a joint turns by

@@ -167,7 +167,7 @@ class GaitData:
     """
 
     def __init__(self, plans: Sequence[GaitPlan], c_format: CFormat) -> None:
-        """Take gaits whose plans are of one robot and one network."""
+        """Prepare gaits whose plans are of one robot and one network."""
         self.plans, self.format = plans, c_format
         self.network, self.robot = plans[0].orbit.network, plans[0].robot
         weights = [plan.readout.joints.weights for plan in plans]

@@ -65,12 +65,12 @@ class Golden(ShortRepr):
 
     @property
     def switches(self) -> int:
-        """How often the gait changes."""
+        """Number of changes of the gait."""
         return len(self.events) - 1
 
 
 def network_states(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
-    """Return a state, and those that a network has every so many steps after it was held there."""
+    """Return a state, and the states every EVERY_STEP steps after the network was held there."""
     network = plan.orbit.network
     states = plan.orbit(np.array(0.0))
     start = states + 0.1 * np.random.default_rng(SEED).uniform(-1.0, 1.0, states.size)
@@ -84,7 +84,7 @@ def network_states(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def schedule(gaits: int, dt: float) -> dict[int, int]:
-    """Return when which gait follows: SWITCHES of them, and the stand at last."""
+    """Return the times and gaits of SWITCHES switches, and of the final stand."""
     times = [RAMP + BETWEEN * n for n in range(SWITCHES + 1)]
     ticks = [round(time / dt) for time in times]
     found = {tick: (n + 1) % gaits for n, tick in enumerate(ticks[:-1])} if gaits > 1 else {}

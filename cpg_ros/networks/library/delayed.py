@@ -97,7 +97,7 @@ class Delayed(Network):
 
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what two rings for this many legs have; InputError for an odd number."""
+        """Return the attributes of two rings for this many legs; InputError for an odd number."""
         return {**ring_places(legs), 'usual_gait': next(iter(ring_gaits(legs)))}
 
     @classmethod
@@ -121,7 +121,7 @@ class Delayed(Network):
         return ring_symmetry(leg_count(type(self)), (j, k), variables=1, odd=True)
 
     def obstacle(self, gait: str) -> str:
-        """Say what in c rules a gait out: its sign, or that no delay makes it oscillate."""
+        """Return why c rules a gait out: its sign, or that no delay makes it oscillate; or ''."""
         j, k = self.modes()[gait]
         if 2 * j % leg_count(type(self)) == 0 and self.c * (-1) ** k >= 0.0:
             sign = 'positive' if k else 'negative'

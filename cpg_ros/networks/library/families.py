@@ -104,7 +104,7 @@ def ring_legs(legs: int) -> dict[str, dict[str, tuple[int, int]]]:
 
 
 def ring_places(legs: int) -> dict[str, Any]:
-    """Return what a network of such rings states for a number of legs: cells, legs, places."""
+    """Return the attributes of a network of such rings for a number of legs."""
     return {'cells': 2 * legs, 'legs': ring_legs(legs), **places(legs)}
 
 
@@ -182,7 +182,7 @@ class LegPairs(Network):
 
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what the network has for this many legs; InputError for an odd number."""
+        """Return the network's attributes for this many legs; InputError for an odd number."""
         names, inputs = leg_names(legs), partners(legs)
         groups = {kind: tuple(f'k_{names[j]}_{names[i]}' for i, j in enumerate(sources))
                   for kind, sources in inputs.items()}

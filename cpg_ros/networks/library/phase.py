@@ -82,7 +82,7 @@ class PhaseOscillators(Network):
 
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what the network has for this many legs; InputError for an odd number."""
+        """Return the network's attributes for this many legs; InputError for an odd number."""
         names = leg_names(legs)
         offsets = tuple(f'offset_{leg}' for leg in names)
         gaits: dict[str, tuple[float, ...]] = {'walk': (0.0, 0.5), 'hop': (0.0, 0.0)}

@@ -87,7 +87,7 @@ class RobotState:
         self.q, self.dq = np.zeros(joints), np.zeros(joints)
 
     def read(self, message: Any) -> bool:
-        """Take a message over; return whether it could be used. Keep the arrays, fill them."""
+        """Copy a message into the arrays; return whether it could be used."""
         raise NotImplementedError
 
     @property

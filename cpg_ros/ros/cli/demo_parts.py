@@ -117,7 +117,7 @@ class Operator(Node):
 
     @property
     def place(self) -> tuple[float, float]:
-        """Where the robot is, x and y in m; the origin until that is known."""
+        """Position of the robot, x and y in m; the origin until it is known."""
         return (0.0, 0.0) if self.pose is None else (self.pose.position.x, self.pose.position.y)
 
     @property
@@ -229,7 +229,7 @@ class DemoRobot:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add what chooses a robot of one's own."""
+    """Add the options that choose a user's own robot."""
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help="with --urdf or --mjcf: "
                         "velocity limit of all joints instead of the file's")
     parser.add_argument('--evaluations', type=int, metavar='N', help='with --urdf or --mjcf: '

@@ -329,7 +329,7 @@ class BalanceLoop(SensorLoop):
 
     @property
     def state(self) -> str:
-        """What it is doing, as text."""
+        """State of the feedback, as text."""
         pattern = self._pattern
         if pattern.balancing:
             return f'coming to a stand: {self.faults}' if self.faults else 'on'

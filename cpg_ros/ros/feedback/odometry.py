@@ -38,7 +38,7 @@ def has_transforms() -> bool:
 
 
 def odometry(topic: str, frames: tuple[str, str], *places: np.ndarray) -> tuple[str, Template]:
-    """Return topic and message; places are those of its numbers in the block.
+    """Return topic and message; places are indices of its numbers in the block.
 
     Args:
         topic: to be published on.

@@ -269,7 +269,7 @@ class SensorInput:
                 if not math.isnan(monitor.age)}
 
     def faults(self, now: float, judge: bool = True) -> tuple[list[str], bool]:
-        """Return what is wrong with inputs, and whether a faulty one has never arrived.
+        """Return the faults of the inputs, and whether a faulty one has never arrived.
 
         Args:
             now: s.

@@ -136,7 +136,7 @@ def biped_gains(value: Callable[[str], Any]) -> BipedGains:
 
 
 def missing_requirements(robot: Robot) -> str:
-    """Return what feedback needs, and this machine or the robot file lacks, or ''."""
+    """Return the requirement of feedback that this machine or the robot file lacks, or ''."""
     if not COMPILED:
         return 'it needs numba, which is not installed'
     if robot.biped is not None:
@@ -333,7 +333,7 @@ class FeedbackSwitch:
             f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
 
     def targets(self, position: np.ndarray) -> np.ndarray:
-        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        """Return the targets to send for wanted angles of the joints, rad, shape (joints,)."""
         return position if self.loop is None else self.loop.targets(position)
 
     def publish(self, dt: float, stamp: int) -> None:
@@ -355,7 +355,7 @@ class FeedbackSwitch:
 
     @property
     def out(self) -> str:
-        """What interrupts feedback that has been active, or ''."""
+        """Reason why active feedback is interrupted, or ''."""
         loop = self.loop
         return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
 
@@ -425,7 +425,7 @@ class BalanceSwitch(FeedbackSwitch):
         self.loop.feedback.set_gains('walk', biped_gains(self._value))
 
     def publish(self, dt: float, stamp: int) -> None:
-        """Publish where joints of no leg go; log what became of the balance."""
+        """Publish the targets of joints of no leg; log changes of the balance."""
         if self.loop is not None and self.loop.feedback.arms.swing:
             if self._held is None:
                 self._held = HeldPublisher(self._node, self._pattern.robot)

@@ -243,7 +243,7 @@ class MessageBlock:
                 handle.__exit__(None, None, None)
 
     def output(self, places: Sequence[int], every: int, quiet: bool = False) -> int:
-        """Return the address of what ``tick.c`` needs to publish the messages.
+        """Return the address of the struct by which ``tick.c`` publishes the messages.
 
         Args:
             places: addresses of pointers to the numbers of each part.

@@ -121,7 +121,7 @@ def as_list(parameter: Parameter, default: list) -> Parameter:
 
 
 def kind_of(default: Any) -> str:
-    """Return what a parameter with a default must be, for messages."""
+    """Return the name of a parameter's type by its default, for messages."""
     if isinstance(default, list):
         return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
     return KINDS[type(default)]
@@ -177,7 +177,7 @@ def _refused(reason: str) -> SetParametersResult:
 
 
 class _Change:
-    """Parameters that are set together or not at all, and what takes the result."""
+    """Parameters that are set together or not at all, and the receiver of the result."""
 
     def __init__(self, parameters: list[Parameter],
                  answer: Callable[[SetParametersResult], None]) -> None:

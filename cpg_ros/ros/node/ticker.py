@@ -52,7 +52,7 @@ class NoSuchCore(CpgError):
 
 @dataclass(frozen=True)
 class RealTime:
-    """What is requested of the scheduler.
+    """Real-time settings that are requested of the scheduler.
 
     Attributes:
         priority: of SCHED_FIFO, 0 for none.
@@ -332,7 +332,7 @@ class Ticker(TickThread):
         return loop.deadline, behind
 
     def attend(self) -> None:
-        """Let the next tick call ``tick``, whatever was to be done outside the interpreter."""
+        """Let the next tick call ``tick`` in the interpreter."""
         self.count.wanted = 1
 
     def _stalled(self, behind: int, period: int) -> tuple[int, bool]:

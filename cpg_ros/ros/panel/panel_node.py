@@ -70,7 +70,7 @@ class StartWatch:
         self._text, self._when = '', 0.0
 
     def update(self, on: bool) -> str:
-        """Return what the node that starts waits for, '' if it is not known."""
+        """Return the text on the progress of the node that starts, '' if it is not known."""
         if not on:
             self.close()
             return ''
@@ -508,7 +508,7 @@ class Panel(StartedNode):
             self._choose(page, first)
 
     def _first(self) -> str:
-        """Return what a new page shows: the generator in the panel's namespace, '' for none.
+        """Return the generator that a new page shows, the one in the panel's namespace, or ''.
 
         A panel without a namespace shows any.
         """

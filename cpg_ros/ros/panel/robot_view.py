@@ -171,7 +171,7 @@ def descriptions(space: str) -> tuple[str, str]:
 
 async def robot_info(watch: Node, services: ServiceClients, graph: Graph, generator: str,
                      robot: str, urdf: str) -> shape.RobotInfo:
-    """Collect what the graph and the user state of a robot.
+    """Return the description of a robot by the graph and the user.
 
     Args:
         watch: a node that is not spun.
@@ -337,7 +337,7 @@ class RobotView:
         return topic.newest() if topic else None
 
     def frame(self) -> dict[str, Any]:
-        """Return what has changed since the last frame."""
+        """Return the values that changed since the last frame."""
         values: dict[str, Any] = {}
         fresh = False
         for name in [name for name in self._topics if name.endswith('/joint_states')]:
@@ -520,7 +520,7 @@ class BridgeViews:
 
 
 def _read(status: DiagnosticStatus) -> dict[str, Any]:
-    """Return what pages show of a bridge's status."""
+    """Return the part of a bridge's status that pages show."""
     bridge: dict[str, Any] = {'level': level(status),
                               'text': status.message[:LONGEST], 'battery': None, 'hottest': None}
     heat: list[tuple[float, str]] = []

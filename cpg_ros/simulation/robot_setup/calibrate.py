@@ -45,7 +45,7 @@ SAME = 0.02
 
 @dataclass(frozen=True)
 class Calibrated:
-    """What a recording gave.
+    """Result of the calibration by a recording.
 
     Attributes:
         source: the bag.

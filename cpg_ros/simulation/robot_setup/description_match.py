@@ -126,7 +126,7 @@ class RobotCheck:
 
     @property
     def faults(self) -> list[str]:
-        """What does not match, one line each."""
+        """Differences, one line each."""
         return [f'{joint.joint.name}: {fault}' for joint in self.joints for fault in joint.faults
                 ] + [*self.lopsided, *self.shape] + [f'{gait.network} {gait.name}: {fault}'
                                         for gait in self.gaits for fault in gait.faults]
@@ -141,7 +141,7 @@ class RobotCheck:
                 'notes': list(self.notes)}
 
     def text(self) -> str:
-        """Return it as tables, then what does not match, then notes."""
+        """Return tables, then the differences, then notes."""
         rows: list[tuple[str, ...]] = [
             ('joint', 'leg', 'kind', 'limits [rad]', self.format, 'speed [rad/s]',
              self.format, '')]
@@ -301,7 +301,7 @@ def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator
 
 
 def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
-    """Say which lengths and masses of a description no walking robot has."""
+    """Return a line for each implausible length or mass of a description."""
     legs, what = _chains(robot, known), known.format
     longest = max((float(sum(chain.lengths)) for chain in legs.values()), default=0.0)
     for leg, chain in legs.items():
@@ -318,7 +318,7 @@ def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
 
 
 def _differing(stated: BodyGeometry, found: BodyGeometry, what: str) -> Iterator[str]:
-    """Say where the geometry of a robot file is not the description's; what is its format."""
+    """Return lines on where a robot file's geometry differs; ``what`` is the other's format."""
     if found.mass > 0.0 and not 1.0 / MASS_RATIO <= stated.mass / found.mass <= MASS_RATIO:
         yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {found.mass:.4g} kg"
     for leg, own in stated.legs.items():

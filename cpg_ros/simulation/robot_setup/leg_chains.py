@@ -96,7 +96,7 @@ def _paths(known: RobotDescription) -> list[tuple[str, ...]]:
 
 
 def _crosswise(known: RobotDescription, paths: Sequence[Sequence[str]]) -> bool:
-    """Whether more joints turn about the x axis than about y, as of a robot that faces y."""
+    """Return whether more joints turn about x than about y, as in a robot that faces y."""
     along = np.zeros(3)
     for path in paths:
         axes = np.array([known.direction(name) for name in path
@@ -230,7 +230,7 @@ def _named(known: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple
 
 
 def _cleaned(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs:
-    """Leave out what no cell can drive, on both sides, and say so."""
+    """Remove joints that no cell can drive, on both sides, and add notes on them."""
     notes, names = [], list(legs)
     keep: dict[str, tuple[str, ...]] = {}
     for pair in zip(names[::2], names[1::2], strict=True):
@@ -252,7 +252,7 @@ def _cleaned(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs
 
 
 def _held(known: RobotDescription, leg: Sequence[str], name: str) -> str:
-    """Say why a joint of a leg is not driven, '' if it is."""
+    """Return why a joint of a leg is not driven, '' if it is."""
     joint = known.joints[name]
     if joint.mimic in leg:
         raise DescriptionError(f"the joint '{name}' follows '{joint.mimic}' of the same leg: legs "
@@ -265,7 +265,7 @@ def _held(known: RobotDescription, leg: Sequence[str], name: str) -> str:
 
 
 def _wheel(known: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
-    """Whether a joint turns without end below two that do not, about the axis of the last."""
+    """Return whether a joint is a wheel: unlimited, below two limited, parallel to the last."""
     before = [name for name in leg if known.joints[name].kind == 'revolute']
     if joint.kind != 'continuous' or joint.name != leg[-1] or len(before) < 2:
         return False

@@ -165,7 +165,7 @@ def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
 
 
 def _kind(mujoco: Any, model: Any, k: int) -> str:
-    """Return a joint's kind as URDF has it."""
+    """Return a joint's type by URDF's names."""
     if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE:
         return 'revolute' if max(map(abs, _limits(mujoco, model, k)[:2])) < math.inf \
             else 'continuous'
@@ -208,7 +208,7 @@ CROUCH = 0.01
 
 
 def read_biped(name: str, robot: Robot) -> BipedBody:
-    """Read what a robot file's part ``biped`` needs off a model.
+    """Return a robot file's part ``biped`` from a model.
 
     Joints that are no leg's are held where all are at 0, or at the nearest angle they have.
 
@@ -262,7 +262,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
 
 
 def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
-    """Add what follows from the stand: height and width of the steps, size, and servos for it."""
+    """Add the values that follow from the stand: height and width of steps, size, servos."""
     links, stand = links_of(robot), {joint.name: joint.offset for joint in robot.joints}
     stand |= robot.held
     pose, count = blank_pose(links), len(links.masses) - 1
@@ -297,7 +297,7 @@ def _range(model: Any, k: int) -> tuple[float, float]:
 
 
 def _movers(model: Any, hinges: list[int]) -> dict[int, int]:
-    """Return the joint that moves each body, -1 for the base and what is fixed to it."""
+    """Return the joint that moves each body, -1 for the base and bodies fixed to it."""
     mover = {0: -1}
     for body in range(1, model.nbody):
         own = [k for k in hinges if model.jnt_bodyid[k] == body]
@@ -316,7 +316,7 @@ def _outwards(model: Any, robot: Robot, leg: str) -> list[Any]:
 
 
 def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the middle of a sole and its length and width, m: what is lowest of a foot."""
+    """Return the middle, length and width, m, of a sole: the lowest part of a foot."""
     points = []
     for geom in range(model.ngeom):
         if model.geom_bodyid[geom] in bodies and model.geom_contype[geom]:

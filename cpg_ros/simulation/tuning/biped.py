@@ -96,7 +96,7 @@ class WalkJob:
 
 @dataclass(frozen=True)
 class TunedBiped:
-    """What fresh runs make of gains before and after a search.
+    """Results of fresh runs with the gains before and after a search.
 
     Attributes:
         pushes: how many were met.
@@ -152,7 +152,7 @@ def with_gains(robot: Robot, gains: Mapping[str, float]) -> Robot:
 def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
                executor: Executor | None = None,
                update: Callable[[int], None] = lambda done: None) -> tuple[Robot, TunedBiped]:
-    """Look for gains that suit a biped in its walk.
+    """Search for a biped's gains in its walk.
 
     Args:
         robot: whose file has the part ``biped``.

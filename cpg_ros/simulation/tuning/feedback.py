@@ -65,7 +65,7 @@ WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture')
 
 @dataclass(frozen=True)
 class Benefit:
-    """What feedback does to a gait.
+    """Effect of feedback on a gait in simulation.
 
     Attributes:
         gait: its name.
@@ -144,7 +144,7 @@ class FeedbackTrial:
 
     def pushed(self, rng: np.random.Generator, count: int, impulses: Sequence[float]
                ) -> list[Scenario]:
-        """Return runs with pushes from so many directions of each impulse, as of IMPULSES."""
+        """Return runs with pushes of each impulse, see IMPULSES, from some directions."""
         unit = self.loop.geometry.weight * math.sqrt(self.length / GRAVITY)
         found = []
         for fraction in impulses:
@@ -182,7 +182,7 @@ class FeedbackTrial:
 
 def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
                    kd: float | None = None, seed: int = 0) -> tuple[Robot, list[Benefit]]:
-    """Return a robot whose file says whether its feedback helps in gaits, and by what it is so.
+    """Return a robot whose file states whether its feedback helps in gaits, and the evidence.
 
     Of the sets of laws in WITHOUT it gets the first that helps in every gait; where none does, its
     feedback is off unless one asks for it. Laws and gains of its own stay.
@@ -298,7 +298,7 @@ def prices(job: PriceJob) -> list[float]:
 
 @dataclass(frozen=True)
 class TunedFeedback:
-    """What pushes on fresh seeds make of gains: survivors of all gaits, of so many.
+    """Results of pushes on fresh seeds: survivors in all gaits, and number of pushes.
 
     Attributes:
         pushes: how many.
@@ -319,7 +319,7 @@ class TunedFeedback:
 
     @property
     def better(self) -> bool:
-        """Whether what was found survives more, and fells no undisturbed robot.
+        """Whether the new gains survive more pushes and fell no undisturbed robot.
 
         The same pushes were met before and after: of those that only one survives, more than
         chance would have it (p < 0.05, one-sided sign test) must be survived after.
@@ -341,7 +341,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
                   executor: Executor | None = None, kp: float | None = None,
                   kd: float | None = None, update: Callable[[int], None] = lambda done: None
                   ) -> tuple[Robot, TunedFeedback]:
-    """Look for gains of the feedback that suit a robot in all of some gaits.
+    """Search for gains of a robot's feedback in all of some gaits.
 
     Args:
         robot: with the geometry of its legs and efference copies of the gaits.
@@ -403,7 +403,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
 
 def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int
               ) -> TunedFeedback:
-    """Return what pushes that no generation has met make of gains before and after a search."""
+    """Return the results of fresh pushes with the gains before and after a search."""
     fresh = [trial.pushed(np.random.default_rng(FRESH + seed), JUDGED, IMPULSES)
              for trial in trials]
 

@@ -127,7 +127,7 @@ class ClosestDesign:
         return 1.0 / (1.0 + self.error.excess) if self.error.key == 'velocity' else 1.0
 
     def __str__(self) -> str:
-        """Say by how much it misses, and what to change."""
+        """Return by how much the design misses the limits, and a remedy."""
         design, error = self.design, self.error
         return (f'the nearest, with {self.frequency:.2f} Hz, strides of '
                 f'{100.0 * self.scale * design.stride:.1f} cm and a lift of '
@@ -329,7 +329,7 @@ class DesignTrial:
     threads: int
 
     def search(self, tuner: Tuner, update: Callable[[int], None]) -> Tuned | NoDesign:
-        """Look for the design, and measure how to steer it."""
+        """Search for the design of a gait, and measure its steering table."""
         try:
             found = tuner.tune(self.gait, self.evaluations, self.seed, update)
         except NoDesign as error:
@@ -458,7 +458,7 @@ def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,
 
 
 def more_than_chance(won: int, lost: int) -> bool:
-    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test).
+    """Return whether significantly more runs are won than lost (p < 0.05, sign test).
 
     The test is one-sided; it is the exact form of McNemar's test.
     """

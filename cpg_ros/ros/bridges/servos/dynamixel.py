@@ -91,7 +91,7 @@ class Dynamixel(ServoProtocol):
         yield packet(BROADCAST, SYNC_READ, _field(PRESENT_POSITION) + bytes(servos)), len(servos)
 
     def replies(self, received: bytearray) -> Iterator[Reply]:
-        """Take out all status packets whose check sums are right."""
+        """Remove and return all status packets with a right check sum."""
         while (start := received.find(HEADER)) >= 0:
             del received[:start]
             if len(received) < HEAD:

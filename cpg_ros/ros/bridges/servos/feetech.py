@@ -37,7 +37,7 @@ LONGEST = 32
 
 
 def checksum(data: bytes) -> int:
-    """Return the check sum of what stands between the header and it."""
+    """Return the check sum of the bytes between the header and it."""
     return ~sum(data) & 0xFF
 
 
@@ -79,7 +79,7 @@ class Feetech(ServoProtocol):
             yield packet(servo, READ, bytes(PRESENT_POSITION)), 1
 
     def replies(self, received: bytearray) -> Iterator[Reply]:
-        """Take out all answers with a position whose check sums are right."""
+        """Remove and return all answers with a position and a right check sum."""
         while (start := received.find(HEADER)) >= 0:
             del received[:start]
             if len(received) < 4:

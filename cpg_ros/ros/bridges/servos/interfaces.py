@@ -25,7 +25,7 @@ class ServoState(RobotState):
     """Angles; there is no IMU, no speed and no temperature."""
 
     def __init__(self) -> None:
-        """Know no joints yet."""
+        """Prepare without joints."""
         super().__init__(0)
         self._names: tuple[str, ...] = ()
 
@@ -35,7 +35,7 @@ class ServoState(RobotState):
         self.q, self.dq = np.zeros((2, len(names)))
 
     def read(self, message: JointState) -> bool:
-        """Take a JointState over; return whether it has the joints, all of them."""
+        """Copy a JointState; return whether it has all joints."""
         if tuple(message.name) != self._names or len(message.position) != len(self._names):
             return False
         self.q[:] = message.position

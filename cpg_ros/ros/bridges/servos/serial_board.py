@@ -86,7 +86,7 @@ class SerialPort:
             raise OSError('the serial port takes no more bytes')
 
     def forget(self) -> None:
-        """Drop what has been received: it answers an earlier question."""
+        """Discard received bytes, which answer an earlier question."""
         termios.tcflush(self._file, termios.TCIFLUSH)
 
     def receive(self, until: float) -> bytes:
@@ -125,7 +125,7 @@ class ServoProtocol(Protocol):
         """Return packets that ask for positions, each with the number of its answers."""
 
     def replies(self, received: bytearray) -> Iterator[Reply]:
-        """Take all complete answers out of what was received, and drop what is none."""
+        """Remove and return all complete answers; drop bytes that are not part of one."""
 
     def position(self, reply: Reply) -> int:
         """Return the position in an answer."""

@@ -188,7 +188,7 @@ class LowState(RobotState):
         self.reset_motor_faults()
 
     def read(self, message: bytes) -> bool:
-        """Take a message over; return whether it is one of these."""
+        """Copy a message; return whether it is a LowState."""
         if len(message) < STATE_SIZE or message[1] != _LITTLE_ENDIAN:
             return False
         self._buffer[:] = message[:STATE_SIZE]
