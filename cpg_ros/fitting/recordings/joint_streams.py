@@ -28,7 +28,7 @@ from cpg_ros.fitting.recordings.cdr import (
     SerializedBlock,
     UndecodableError,
 )
-from cpg_ros.fitting.recordings.low_state import decode_low_states, LOW_STATE
+from cpg_ros.fitting.recordings.low_state import decode_low_states, MOTORS
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     Chunk,
@@ -165,8 +165,8 @@ class Stream:
         received = np.array(self.received, np.int64)
         try:
             efforts = self.servo is not None
-            blocks = (decode_low_states(self.messages, self.order, efforts)
-                      if self.kind == LOW_STATE else in_order(decode(self.messages, efforts)))
+            blocks = (decode_low_states(self.messages, self.order, efforts, self.kind)
+                      if self.kind in MOTORS else in_order(decode(self.messages, efforts)))
             for block in blocks:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
