@@ -16,7 +16,7 @@
 
 Each state is drawn at random: every variable of every cell evenly over twice its range on the
 orbit, about the middle of that; with a delay the history is constant. The whole network runs from
-it, and what it does in the end is compared with the orbit and with the gaits' symmetries.
+it, and its last cycles are compared with the orbit and with the gaits' symmetries.
 """
 
 from collections import Counter

@@ -198,7 +198,7 @@ class Front:
     """Result of a search.
 
     Attributes:
-        space: what was varied.
+        space: of the varied weights.
         scores: the Pareto front of all sets that were tried, best first.
         tried: all of them, in the order in which they were tried.
         best: the first of them, with its exact orbit.

@@ -39,7 +39,7 @@ def number(text: str) -> float:
     """Read a number.
 
     Raises:
-        argparse.ArgumentTypeError: it is none.
+        argparse.ArgumentTypeError: the text is not a number.
 
     """
     try:

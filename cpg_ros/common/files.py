@@ -36,7 +36,7 @@ from cpg_ros.common.errors import CpgError
 # Files are written whole or not at all: under another name, then renamed.
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
-    """Write a file, which until then stays what it was.
+    """Write a file whole or not at all; until then its old contents stay.
 
     Raises:
         OSError: it cannot be written; the error has the file's name, also where a disk is full.

@@ -136,8 +136,8 @@ class JobOutcome(Generic[Job]):
 
     Attributes:
         job: its arguments.
-        value: what it returned.
-        error: what it raised, or None.
+        value: return value of the job.
+        error: exception of the job, or None.
 
     """
 

@@ -262,7 +262,7 @@ class SolutionCurve(Protocol):
         """
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Half the range of what is continued; zero at a bifurcation from rest."""
+        """Half the range of the continued orbit or state; zero at a bifurcation from rest."""
 
     def orbit(self, z: np.ndarray) -> Any:
         """Make an orbit of a solution."""
@@ -310,7 +310,7 @@ class CurvePoint(ShortRepr):
 
     @property
     def amplitude(self) -> float:
-        """Half the range of what is continued."""
+        """Half the range of the continued orbit or state."""
         return self.curve.amplitude(self.z)
 
     def reversed(self) -> 'CurvePoint':  # noqa: A003

@@ -156,7 +156,7 @@ class _Gap:
 
 
 def _located(gap: _Gap, part: int, rank: int, exact: float) -> Bifurcation | None:
-    """Return the crossing between two points of a multiplier with so many that are larger."""
+    """Return the crossing, between two points, of the multiplier of a given rank by size."""
     def size(fraction: float) -> float:
         """Logarithm of the multiplier's modulus."""
         return float(np.log(np.abs(gap.at(fraction)[1][part][rank])))

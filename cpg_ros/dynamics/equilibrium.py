@@ -93,7 +93,7 @@ class Quotient(Field[Network]):
         return out
 
     def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
-        """Solve for an equilibrium near a state; None where there is none."""
+        """Solve for an equilibrium near a state by Newton's method; None if it fails."""
         size = np.inf
         with np.errstate(all='ignore'):
             for _ in range(most):

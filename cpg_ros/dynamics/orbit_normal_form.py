@@ -89,7 +89,7 @@ class Linearised:
     """
 
     def __init__(self, orbit: Orbit, halvings: int) -> None:
-        """Linearise about an orbit, on its mesh halved so many times.
+        """Linearise about an orbit, on its mesh halved a number of times.
 
         Raises:
             NoOrbit: its rates have no derivatives, or there are too many unknowns.

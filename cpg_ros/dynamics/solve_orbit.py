@@ -101,7 +101,7 @@ def _on_branch(network: Network, point: HopfPoint, low: float, high: float) -> I
 
 
 def _crossings(network: Network, branch: Branch, value: float, turns: int) -> Iterator[Orbit]:
-    """Yield the orbits where a branch's value, plus so many periods, is the wanted one."""
+    """Yield the orbits at which a branch's value plus whole periods is the wanted one."""
     def ahead(point: BranchPoint) -> float:
         return point.value + turns * point.orbit.period - value
 

@@ -14,7 +14,7 @@
 
 """The gaits of a parameter set: existence, amplitude, period and stability.
 
-And what stands nearest where there is none: the threshold at which rest gives way.
+For parameter sets without a gait, also the nearest threshold at which rest loses stability.
 """
 
 from collections.abc import Callable
@@ -85,7 +85,7 @@ class GaitAssessment(ShortRepr):
         gait: one of the network's gaits.
         orbit: its orbit, or None; of several one that attracts within the gait's class if any
             does, nearest in period to that of the preset.
-        why: why there is none, or ''.
+        why: the reason why there is no orbit, or ''.
         others: the same of each coexisting orbit of the gait that was found.
         searched: what others were searched from, or ''.
 

@@ -400,7 +400,7 @@ def numbers(text: str, count: int, finite: bool = True) -> tuple[float, ...]:
     Args:
         text: numbers with spaces between them.
         count: how many there should be.
-        finite: count what is infinite as no number.
+        finite: whether infinite values count as missing.
 
     """
     try:

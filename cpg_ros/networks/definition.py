@@ -226,7 +226,7 @@ class NetworkDefinition(ABC):
             are a gait and no symmetry tells them.
         unnamed: the gait whose phases have no name, of such a network.
         rests: whether a cell without input has an equilibrium, from which gaits emerge.
-        usual_gait: that it starts with; a gait's own name is that of its usual preset.
+        usual_gait: gait that it starts with; a gait's usual preset has the gait's name.
         usual_robot: file that it starts with, or name of a shipped one.
         free: parameters or groups that are usually fitted to a recording.
         line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.

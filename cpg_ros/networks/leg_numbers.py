@@ -134,7 +134,7 @@ def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
 
 
 def split_name(name: str) -> tuple[str, int] | None:
-    """Split a name such as 'delayed6' into that of the family and the number of legs."""
+    """Split a name such as 'delayed6' into the family's name and the number of legs."""
     match = _NUMBERED.fullmatch(name)
     return (match['family'], int(match['legs'])) if match and len(match['legs']) < 4 else None
 

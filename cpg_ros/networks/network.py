@@ -264,7 +264,7 @@ class ParameterLine:
                         for name, sign in zip(self.names, self.signs, strict=True))
 
     def value(self, network: Network) -> float:
-        """Return the network's value on the line, that of its first parameter."""
+        """Return the network's value on the line, which is its first parameter's."""
         return network.as_dict()[self.names[0]]
 
     def direction(self, network: Network) -> np.ndarray:

@@ -58,7 +58,7 @@ class Terrain:
         kind: one of KINDS; a course has a height field, a ramp up and down, and boxes.
         size: largest height, m, from 0 to HIGHEST, or that of a step; of a ramp its angle up,
             degrees.
-        seed: of what is random.
+        seed: of random heights.
         across: of a ramp: whether it rises to the left instead of ahead.
 
     Raises:

@@ -34,7 +34,7 @@ ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first; that of the class first, without 1."""
+    """Multipliers of each subspace, largest first; the class comes first, without 1."""
     return subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)
 
 

@@ -49,7 +49,7 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
         names: of the cells.
         waves: number of each cell's waveform, from 0, which gives the colour; one each by
             default.
-        variable: what is drawn, for the axis.
+        variable: name of the drawn variable, for the axis.
 
     """
     waves = range(len(names)) if waves is None else waves
@@ -93,7 +93,7 @@ class ReproducedRow:
         compared: how, in words.
         value: the computed number; None where it is a word or has several numbers.
         erratum: number of the one that covers this row (see ``errata``), or None.
-        corrected: what is right according to the erratum, or ''.
+        corrected: the right value according to the erratum, or ''.
         explained: whether the computed one is that.
         note: for the reader, or ''.
 
@@ -127,7 +127,7 @@ class Picture:
     Attributes:
         paper: authors and year.
         place: the figure's number.
-        caption: what is shown, and where it differs from the paper's.
+        caption: of the picture, with its differences from the paper's.
         figure: its title names paper and figure.
 
     """
@@ -146,7 +146,7 @@ Section = Callable[[], Iterable[ReproducedRow | Picture]]
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper: a short name, authors and year, what it is, and its parts."""
+    """A paper: a short name, authors and year, title, and its parts."""
 
     name: str
     authors: str

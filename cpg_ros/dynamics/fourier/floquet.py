@@ -242,7 +242,7 @@ def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]
 
 
 def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
-    """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
+    """Return the largest modulus of the transverse multipliers, to a relative error, or 0."""
     equation = variation(orbit)[0]
     return max((float(np.abs(equation.leading(part, gain, 2, exact)).max())
                 for part in equation.outside), default=0.0)

@@ -276,7 +276,7 @@ def mode(orbit: MeshOrbit, part: int, multiplier: complex
 
 def returning(orbit: MeshOrbit, part: int, multiplier: complex
               ) -> tuple[np.ndarray, complex, np.ndarray]:
-    """Return the disturbance with a multiplier, and what it is multiplied by over T/m.
+    """Return the disturbance with a multiplier, and its factor over T/m.
 
     Args:
         orbit: as of mode.

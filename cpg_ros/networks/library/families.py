@@ -176,7 +176,7 @@ class LegPairs(Network):
     #: Ranges of the parameters other than the weights, and the largest weight.
     own_ranges: ClassVar[dict[str, Range]]
     most: ClassVar[float] = 20.0
-    #: The parameters but the weights of all presets, and how large weights are usually looked for.
+    #: Parameters of all presets other than the weights, and the largest weight that is usual.
     usual: ClassVar[dict[str, float]]
     looked_for: ClassVar[float] = 2.0
 
