@@ -113,8 +113,7 @@ def evolve(epoch: Epoch,
         if new:
             tried.update(zip(new, evaluate(new, space.gait, epoch.seed), strict=True))
         scores = [tried[one] for one in networks]
-        # Bounds as the algorithm has them; waveforms that miss what is asked of them come
-        # after all others, whatever their phases.
+        # Sets whose waveforms miss their limits come after all others, whatever their phases.
         static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
                                G=np.array([[one.shortfall] for one in scores]))
         Evaluator().eval(static, population)

@@ -312,8 +312,8 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Lim
     if near:
         shortfall = waveform_shortfall(signals, symmetry, MARGIN)
     else:
-        # The shapes are not those of the gait: only the range counts, and two waveforms that
-        # are not there at all fall shorter than any that are.
+        # Far from the gait, only the range counts, and a set without the gait's two waveforms
+        # has a larger shortfall than any with them.
         shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / LEAST_RANGE)
         shortfall += (MARGIN + errors.max() / WORST) if two else 0.0
     difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None

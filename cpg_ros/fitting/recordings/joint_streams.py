@@ -216,7 +216,7 @@ class Stream:
         found = Counter(name[:-len(one)] for name in names for one in self.wanted
                         if name.endswith(one))
         (prefix, most), *others = [*found.most_common(2), ('', 0)]
-        # As many under another prefix are those of another robot.
+        # Equally many joints under another prefix belong to another robot.
         if most < 2 or others[0][1] == most:
             return names
         self.prefix = prefix

@@ -153,7 +153,7 @@ class ServoBus(StartedNode):
                              'robot in its rest pose, and set no_position_feedback to true')
         self._reads = not blind
         self._timeout: float = self._value('command_timeout')
-        # Room for those of others, which must not displace the owner's.
+        # Leave room for the commands of other senders, which must not displace the owner's.
         self._commands = PolledSubscription(self, Float64MultiArray, Servos.command_topic,
                                             QoSProfile(depth=QUEUE))
         self._owner = CommandOwner(Servos.watchdog_name())
