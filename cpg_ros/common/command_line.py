@@ -190,6 +190,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{'formatter_class': argparse.RawDescriptionHelpFormatter, **options})
+        self.description = self.description and self.description.strip()
 
     def error(self, message: str) -> NoReturn:
         """Print the message and exit."""
