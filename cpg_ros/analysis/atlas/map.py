@@ -179,7 +179,8 @@ class AtlasFolder:
             return None  # Those of an earlier version are followed anew.
         return [Boundary(curve['kind'], tuple(curve['gaits']), np.array(curve['points']),
                          tuple(map(CodimensionTwo.of, curve['codimension_two'])),
-                         tuple(LossOnCurve(**loss) for loss in curve['losses']))
+                         tuple(LossOnCurve(tuple(loss['values']), loss['soft'], loss['why'])
+                               for loss in curve['losses']))
                 for curve in stored]
 
     def put_curves(self, curves: list[Boundary]) -> None:
