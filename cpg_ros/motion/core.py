@@ -15,7 +15,7 @@
 """The core of the pattern in C: structs of ``c/host.h`` and functions of ``c/host.c``.
 
 It is compiled of the parts that an export is made of, once for all robots and networks; each
-network's own library steps it (integration.c_kernel). Arrays here own all memory. Functions
+network's own library steps it (integration.c_kernel). All memory is that of arrays here. Functions
 hold the interpreter's lock: they take some microseconds, and other threads write what they read.
 """
 
@@ -60,7 +60,7 @@ Track = _struct(
     (_POINTER, 'angle rise reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
 Drive = _struct('Drive', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
 _RampPart = _struct('RampPart', (_REAL, 'start rate end time'))
-Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart * 2, 'part'),
+Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart, 'part'), (_REAL, 'end time'),
                (ctypes.c_uint8, 'parts'))
 Core = _struct(
     'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
@@ -212,30 +212,3 @@ class CTrack:
                                         stepper.ring.x.size))
         self.struct.advance = ctypes.cast(
             library_of(type(stepper.network)).advance, _POINTER).value
-
-
-def look(gait: CGait, components: int, now: np.ndarray, strides: float, clocks: np.ndarray,
-         angle: np.ndarray, rise: np.ndarray, legs: np.ndarray) -> float:
-    """Read joints and legs off a state some strides after the last; return its distance.
-
-    Args:
-        gait: the gait.
-        components: of the network.
-        now: x, x', x'' of the components, shape (3, components).
-        strides: since the last look; with 0 clocks stand and are only read.
-        clocks: of each cell, see CTrack.
-        angle: filled with the joints' deviation from their offset, rad.
-        rise: filled with its derivative by phase, rad per cycle.
-        legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
-
-    Returns:
-        The largest distance of a cell from where the gait has it, over the peak or half range.
-
-    """
-    track, now = CTrack(gait), np.ascontiguousarray(now, dtype=float)
-    gait.struct.components = components
-    track.struct.net.now = now.ctypes.data
-    track.clocks[:] = clocks
-    core().cpg_track_look(track.address, strides)
-    clocks[:], angle[:], rise[:], legs[:] = track.clocks, track.angle, track.rise, track.legs
-    return float(track.struct.distance)

@@ -33,7 +33,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion.core import CGait, look
 from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TURN, WaveReadout
 import numpy as np
 
@@ -173,13 +172,6 @@ class PhaseReadout:
             evaluate(known.terms[orbit.waves[cells[joint]]], phase, order)
             for order in range(3)), maps, 512)
 
-    def clocks(self, phase: float) -> np.ndarray:
-        """Return the cells' clocks where the gait has them at a phase of its orbit in cycles."""
-        phases = self.gait.phases
-        clocks = np.zeros((6, phases.size))
-        clocks[0], clocks[3] = (phase + phases) % 1.0, 1.0
-        return clocks
-
     def fields(self) -> dict[str, Any]:
         """Return the fields by which the core reads joints and legs, see core.CGait."""
         waves, phases, maps, known = self.gait
@@ -190,12 +182,6 @@ class PhaseReadout:
                 'shapes': known.shape, 'circles': known.circles, 'terms': known.terms,
                 'harmonics': known.terms.shape[1] - 1, 'crests': known.crests,
                 'maps': maps[self.joints.cells], **self.joints.fields()}
-
-    def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
-             d_angle_d_phase: np.ndarray, legs: np.ndarray) -> float:
-        """Advance clocks by some strides to a state and read joints and legs; see core.look."""
-        gait = CGait(**self.fields(), shift=np.zeros(angle.size))
-        return look(gait, now.shape[1], now, strides, clocks, angle, d_angle_d_phase, legs)
 
 
 def _crest(terms: np.ndarray) -> float:

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion.core import CGait, look, TABLE
+from cpg_ros.motion.core import TABLE
 import numpy as np
 
 # The duty factor: how much of a stride a leg stands, whatever its network does.
@@ -314,10 +314,6 @@ class WaveReadout:
         self.angles, self.rises = over_cycle(weights, lambda _, phase: tuple(
             orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3)), maps, TABLE)
 
-    def clocks(self, phase: float) -> np.ndarray:
-        """Return no clocks: the state alone determines the joints."""
-        return np.zeros((6, self.wave.phases.size))
-
     def fields(self) -> dict[str, Any]:
         """Return the fields by which the core reads joints and legs, see core.CGait."""
         wave, joints, retiming = self.wave, self.joints, self.retiming
@@ -325,12 +321,6 @@ class WaveReadout:
         return {'peak': wave.peak, 'period': wave.period, 'phase': wave.phases,
                 'cells': wave.phases.size, 'values': wave.values, 'lead': wave.lead,
                 'turn': turn, 'cycle': cycle, 'maps': maps, **joints.fields()}
-
-    def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
-             d_angle_d_phase: np.ndarray, legs: np.ndarray) -> float:
-        """Read joints and legs off a state; see core.look."""
-        gait = CGait(**self.fields(), shift=np.zeros(angle.size))
-        return look(gait, now.shape[1], now, strides, clocks, angle, d_angle_d_phase, legs)
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

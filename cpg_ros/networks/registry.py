@@ -38,13 +38,15 @@ from cpg_ros.networks.leg_numbers import GIRDLES, split_name, with_legs
 from cpg_ros.networks.library import shipped
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 
-#: Attributes that every network has.
+# Checks of the attributes of networks that do not come with the package.
+
+#: STATED: attributes that every network has to state.
 STATED = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs', 'usual_gait', 'free',
           'line')
 
 
-def definition_error(network: type[Network]) -> str:
-    """Return the first error in a network's definition, one line, or ''.
+def flaw(network: type[Network]) -> str:
+    """Return what is wrong with the attributes of a network, one line, or ''.
 
     Raises:
         ValueError: its presets cannot be read, or its line is none.
@@ -192,12 +194,12 @@ class _Networks(Mapping[str, type[Network]]):
             KeyError: there is none of this name.
 
         """
-        named = {**SHIPPED, **{network.name: network for network in self.files}}
-        if name in named:
-            return named[name]
-        family = split_name(name)
-        if name not in self._offered and family is not None and family[0] in self:
-            return _numbered(*family)
+        own = {**SHIPPED, **{network.name: network for network in self.files}}
+        if name in own:
+            return own[name]
+        parts = split_name(name)
+        if name not in self._offered and parts is not None and parts[0] in self:
+            return _numbered(*parts)
         return _of_entry_point(self._offered[name])
 
 
@@ -226,7 +228,7 @@ def is_path(name: str) -> bool:
 
 
 def find_network(name: str, folder: Path | None = None) -> type[Network]:
-    """Return a network by its name, or the network in a file, which then is known by its name.
+    """Return a network by its name, or the one that a file defines; from then on it has a name.
 
     Args:
         name: of a network, or path of a file.
@@ -240,10 +242,10 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
     if is_path(name):
         try:
             path = ((folder or Path()) / Path(name).expanduser()).resolve()
-            exists = path.is_file()
+            there = path.is_file()
         except (OSError, RuntimeError, ValueError) as error:
             raise NetworkError(' '.join(f'{name}: {error}'.split())) from error
-        if not exists:
+        if not there:
             raise NetworkError(f'{path}: there is no such file')
         return _of_file(path)
     if name not in NETWORKS:
@@ -266,7 +268,7 @@ def numbered(legs: int) -> tuple[type[Network], ...]:
 
 
 def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]:
-    """Return a network for a number of legs, or itself if it does not take that number."""
+    """Return a network for as many legs, if its family takes that number, or else itself."""
     try:
         return with_legs(network, len(legs))
     except InputError:
@@ -281,7 +283,7 @@ def _numbered(family: str, legs: int) -> type[Network]:
 
 
 def _usable(source: str, load: Callable[[], Entry]) -> Entry:
-    """Run code of others; an error becomes one line."""
+    """Run code of others; raise NetworkError with one line on its failure."""
     try:
         return load()
     except Exception as error:
@@ -290,7 +292,7 @@ def _usable(source: str, load: Callable[[], Entry]) -> Entry:
 
 
 def _checked(source: str, network: type[Network]) -> type[Network]:
-    why = _usable(source, lambda: definition_error(network))
+    why = _usable(source, lambda: flaw(network))
     if why:
         raise NetworkError(f'{source}: {why}')
     return network

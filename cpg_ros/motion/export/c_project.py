@@ -92,7 +92,7 @@ class CProject:
         # The number of a ramp's parts, that of a track's gait, the flag of what steers and a
         # track's pointer to it take as much as a number each.
         track += 1 + steers * (1 + joints)
-        return 4 + joints + size * (3 * joints + 17 + steers * (3 * legs + 4)
+        return 4 + joints + size * (3 * joints + 15 + steers * (3 * legs + 4)
                                     + self.tracks * track)
 
     def _sizes(self) -> dict[str, object]:

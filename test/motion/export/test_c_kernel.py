@@ -14,10 +14,12 @@
 
 """The exported C in place of numba's kernels: the same steps, with numba and without."""
 
+import os
+from pathlib import Path
 import subprocess
 import sys
 
-from c_export import needs_gcc
+from c_export import GCC, needs_gcc
 from cpg_ros.common import c_library
 from cpg_ros.common.c_library import NoCompiler
 from cpg_ros.common.errors import CpgError
@@ -202,3 +204,32 @@ def test_every_network_is_made_in_c_and_solved_by_it(made_by):
         stepper.advance(3.0 * orbit.period)
         assert stepper.now[0] == pytest.approx(orbit(np.array(0.0)), abs=1e-4 * np.abs(
             orbit.levels).max()), name
+
+
+SANITIZERS = '-fsanitize=address,undefined', '-fno-sanitize-recover=all'
+STORY = """
+import sys
+import test_core
+from cpg_ros.dynamics.integration.c_kernel import c_kernels
+from cpg_ros.dynamics.integration.simulate import use
+use(c_kernels)
+test_core.tell(sys.argv[1], float(sys.argv[2]), 1)
+"""
+
+
+@needs_gcc
+@pytest.mark.deep
+@pytest.mark.parametrize('network, duty', [('delayed', 0.55), ('quadruped', 0.6)])
+def test_the_core_stays_within_its_memory(tmp_path, network, duty):
+    """Compiled with checks of addresses and of what C does not define."""
+    here = Path(__file__).parents[1]
+    checks = subprocess.run([GCC, '-print-file-name=libasan.so'], capture_output=True, text=True,
+                            check=True).stdout.strip()
+    told = subprocess.run(
+        [sys.executable, '-P', '-c', STORY, network, str(duty)], capture_output=True, text=True,
+        env={**os.environ, 'CC': ' '.join((GCC, *SANITIZERS)), 'NUMBA_CACHE_DIR': str(tmp_path),
+             'LD_PRELOAD': checks, 'ASAN_OPTIONS': 'detect_leaks=0',
+             'PYTHONPATH': ':'.join((
+                 str(here), str(here.parent / 'support'), os.environ.get('PYTHONPATH', '')))})
+    assert told.returncode == 0, told.stderr[-2000:]
+    assert 'pattern-' in ' '.join(map(str, tmp_path.rglob('*.so')))

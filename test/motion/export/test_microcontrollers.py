@@ -68,8 +68,10 @@ int main(void)
 def project(form, gaits):
     """Return what a small board runs: a step of 0.05, one part a tick."""
     made = plans('quadruped', 'delayed', gaits)
+    steered = form == 'steered'
     data = FixedData(made, 50.0) if form == 'fixed' else data_of(
-        made, form, 'float32', step=0.05 if form == 'network' else None)
+        made, 'network' if steered else form, 'float32', steering=steered,
+        step=None if form == 'table' else 0.05)
     return data, project_of(data, 0.02)
 
 
@@ -111,7 +113,9 @@ def check(name, form, folder, found, positions, memory, unit):
           f'{found.get("stack", "-")} | {step} | {found["tick"]:,} | {found["fading"]:,} | {unit}')
 
 
-GAITS = {'network': ('trot',), 'table': ('trot', 'walk'), 'fixed': ('trot', 'walk')}
+#: Of each form; steered is the network's, with steering.
+GAITS = {'network': ('trot',), 'steered': ('trot',), 'table': ('trot', 'walk'),
+         'fixed': ('trot', 'walk')}
 
 
 @needs_gcc

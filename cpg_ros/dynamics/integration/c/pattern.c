@@ -26,7 +26,8 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
         /* The level moves away from its end: brake first, within half of the room that is left. */
         const cpg_real turn = level + R(0.5) * ((rate > R(0.0) ? R(1.0) : R(0.0)) - level);
         const cpg_ramp_part part = {level, rate, turn, R(2.0) * (turn - level) / rate};
-        ramp->part[ramp->parts++] = part;
+        ramp->parts = 1;
+        ramp->part = part;
         level = turn;
         rate = R(0.0);
     }
@@ -34,8 +35,14 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
         /* The path does not overshoot if it takes no longer than this. */
         time = least(time, R(3.0) * (end - level) / rate);
     }
-    const cpg_ramp_part part = {level, rate, end, time};
-    ramp->part[ramp->parts++] = part;
+    if (ramp->parts) {
+        ramp->end = end;
+        ramp->time = time;
+    } else {
+        const cpg_ramp_part part = {level, rate, end, time};
+        ramp->part = part;
+    }
+    ramp->parts++;
 }
 
 /* Value and rate at a share s of the duration of a path that ends at rest. */
@@ -49,18 +56,18 @@ static cpg_real come_to_rest(const cpg_ramp_part *way, cpg_real s, cpg_real *rat
 
 static void advance_ramp(cpg_ramp *ramp, cpg_real clock)
 {
-    const cpg_ramp_part part = ramp->part[0];
+    cpg_ramp_part *part = &ramp->part;
     ramp->past += clock;
-    const cpg_real s = part.time > R(0.0) ? ramp->past / part.time : R(1.0);
+    const cpg_real s = part->time > R(0.0) ? ramp->past / part->time : R(1.0);
     if (s >= R(1.0)) {
-        ramp->part[0] = ramp->part[1];
+        ramp->level = part->start = part->end;
+        ramp->rate = part->rate = ramp->past = R(0.0);
+        part->end = ramp->end;
+        part->time = ramp->time;
         ramp->parts--;
-        ramp->past = R(0.0);
-        ramp->level = part.end;
-        ramp->rate = R(0.0);
         return;
     }
-    ramp->level = come_to_rest(&part, s, &ramp->rate);
+    ramp->level = come_to_rest(part, s, &ramp->rate);
 }
 
 /* Factor of the clock, 0 to 1, at which no joint exceeds its speed bound in the next substep. */
@@ -184,9 +191,15 @@ static uint8_t cruise(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 #else
     move(t, strides);
 #endif
+#ifndef CPG_STEERING
+    frequency *= c->ramp.level;
+#endif
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
         wanted[joint] = t->angle[joint] * c->ramp.level + cpg_offset[joint];
-        rate[joint] = c->ramp.level * speed_of(c, t, joint, frequency);
+        rate[joint] = speed_of(c, t, joint, frequency);
+#ifdef CPG_STEERING
+        rate[joint] *= c->ramp.level;
+#endif
     }
     return 1;
 }

@@ -60,7 +60,7 @@ class SerialPort:
         """Open a port such as ``/dev/ttyUSB0``.
 
         Raises:
-            ServoError: Linux does not support the baud rate.
+            ServoError: the baud rate is none that Linux knows by name.
             OSError: the port cannot be opened, or is no serial port.
 
         """
