@@ -66,8 +66,8 @@ setup(
     version='0.2.0',
     cmdclass={'install_scripts': Scripts, 'dist_info': WheelMetadata},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
-    package_data={'cpg_ros': ['py.typed', 'analysis/atlas/*.css', 'analysis/atlas/*.js',
-                              'analysis/papers/*.yaml', 'ros/node/*.[cx]*', 'ros/panel/page/*',
+    package_data={'cpg_ros': ['py.typed', 'analysis/atlas/map.[chj]*', 'analysis/papers/*.yaml',
+                              'common/*.css', 'ros/node/*.[cx]*', 'ros/panel/page/*',
                               'dynamics/integration/c/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),

@@ -31,7 +31,7 @@ import time
 from common import emit, log
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
-from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers_within
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.orbit import check_values, signal_symmetry
 from cpg_ros.dynamics.settling import last_cycle
@@ -188,7 +188,7 @@ def judged(network: Network, gait: str, periods: list[float], everything: bool =
         orbits = coexisting_orbits(network, gait, everything=everything).orbits
     except NoOrbit as error:
         return str(error)[:60], periods[0], False
-    growth = [leading_within(one) for one in orbits]
+    growth = [multipliers_within(one).leading for one in orbits]
     attracting = [one.period for one, largest in zip(orbits, growth, strict=True)
                   if largest < 1.0 + NEUTRAL]
     neutral = any(ATTRACTS <= largest < 1.0 + NEUTRAL for largest in growth)

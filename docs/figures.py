@@ -32,9 +32,9 @@ import tempfile
 DOCS = Path(__file__).resolve().parent
 DARK = DOCS / 'static' / 'dark.matplotlibrc'
 WALK = DOCS.parent / 'test' / 'data' / 'human_walking.csv'
-#: Figure -> module, its arguments, in which FOLDER stands for where it writes, and the file there.
+#: Figure -> module or script, its arguments (FOLDER: where it writes), and the file there.
 FIGURES = {
-    **{name: ('analysis.gait_diagram', ['FOLDER/it.png', '--network', network], 'it.png')
+    **{name: (str(DOCS / 'footfalls.py'), ['FOLDER/it.png', network], 'it.png')
        for name, network in {'footfalls': 'delayed', 'quadruped': 'quadruped', 'biped': 'biped',
                              'phase': 'phase', 'hopf': 'hopf', 'matsuoka': 'matsuoka'}.items()},
     'branches': ('analysis.analyze', [
@@ -70,7 +70,8 @@ def draw(name: str, dark: bool) -> Path:
     module, words, left = FIGURES[name]
     out = DOCS / f'{name}{"_dark" if dark else ""}.png'
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, '-m', f'cpg_ros.{module}',
+        command = [sys.executable, *([module] if module.endswith('.py') else
+                                     ['-m', f'cpg_ros.{module}']),
                    *(word.replace('FOLDER', folder) for word in words)]
         variables = dict(os.environ, **{'MATPLOTLIBRC': str(DARK)} if dark else {})
         subprocess.run(command, env=variables, stdin=subprocess.DEVNULL,

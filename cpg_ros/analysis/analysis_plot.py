@@ -16,7 +16,6 @@
 
 from collections.abc import Sequence
 from functools import cache
-import io
 from itertools import chain, count, pairwise
 from typing import Literal
 
@@ -25,6 +24,7 @@ from cpg_ros.analysis.analysis_report import Analysis
 from cpg_ros.analysis.branch_report import JudgedBranch, on_line
 from cpg_ros.analysis.phase_report import cells, curves, PhaseReport
 from cpg_ros.common.errors import InputError
+from cpg_ros.common.report_page import rendered
 from cpg_ros.dynamics.continuation import Branch
 from cpg_ros.networks.network import Network
 import matplotlib
@@ -35,19 +35,19 @@ from matplotlib.lines import Line2D
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
-#: COLOURS: gait of the four-legged and two-legged networks -> its colour.
+#: Colours of the gaits of the four-legged and two-legged networks.
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
            'two_legged_hop': '#805ad5', 'skip': '#2f855a', 'gallop': '#b7791f',
            'hesitation_walk': '#97266d', 'asymmetric_hop': '#718096', 'one_legged_hop': '#975a16'}
-#: FURTHER: colours of other gaits, in their network's order; GREY: colour of what is not a gait.
+#: Colours of other gaits, in their network's order, and of what is no gait.
 FURTHER = ('#e53e8f', '#00a37a', '#5a67d8', '#a3a300', '#7b341e', '#38b2ff', '#ff8c42',
            '#b794f4', '#9ae600', '#f56565', '#234e52', '#d6bcfa', '#ffd166', '#1a365d')
 GREY = '#4a5568'
-#: STYLES: lines and labels of orbits that attract by themselves, with a symmetry lock, and not.
+#: Line styles by stability: by itself, with a symmetry lock, not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
-#: CROSSINGS: loss of stability other than a fold -> its mark, which is filled if it is soft.
+#: Markers of bifurcations other than folds, filled where supercritical.
 CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
 #: BETWEEN: number of lines between two points of a branch.
 BETWEEN = 8
@@ -61,7 +61,7 @@ def colours(network: type[Network]) -> dict[str, str]:
     hues = (to_hex(tuple(hsv_to_rgb((0.618 * n % 1.0, 0.7, 0.8)))) for n in count())
     spare = chain(FURTHER, hues)
     by_gait: dict[str, str] = {}
-    for gait in sorted(network.gaits(), key=lambda one: one not in COLOURS):
+    for gait in sorted(network.gaits(), key=lambda gait: gait not in COLOURS):
         colour = COLOURS.get(gait, '')
         while not colour or colour in by_gait.values():
             colour = next(spare)
@@ -78,12 +78,12 @@ def _smooth(branch: Branch) -> np.ndarray:
     path = np.stack([branch.values, branch.amplitudes])
     sizes = np.ptp(path, axis=1, keepdims=True)
     chords = np.linalg.norm(np.diff(path) / np.where(sizes > 0.0, sizes, 1.0), axis=0)
-    places = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-9))])
-    fine = np.interp(np.arange(BETWEEN * (places.size - 1) + 1) / BETWEEN,
-                     np.arange(places.size), places)
-    if places.size < 3:
-        return np.stack([np.interp(fine, places, row) for row in path])
-    return np.asarray(Akima1DInterpolator(places, path.T)(fine)).T
+    positions = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-9))])
+    fine = np.interp(np.arange(BETWEEN * (positions.size - 1) + 1) / BETWEEN,
+                     np.arange(positions.size), positions)
+    if positions.size < 3:
+        return np.stack([np.interp(fine, positions, row) for row in path])
+    return np.asarray(Akima1DInterpolator(positions, path.T)(fine)).T
 
 
 def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> None:
@@ -119,16 +119,16 @@ def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch
         axes.plot(start.value, 0.0, marker='o', color=_colour(analysis, start.gait), markersize=5,
                   clip_on=False)
         shown.add(start.gait)
-    here = analysis.along.value(analysis.network)
-    axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
+    value = analysis.along.value(analysis.network)
+    axes.axvline(value, color='#a0aec0', linewidth=1.0, zorder=0)
     for verdict in analysis.existing:
-        axes.plot(here, verdict.amplitude, marker='D', color=_colour(analysis, verdict.gait),
+        axes.plot(value, verdict.amplitude, marker='D', color=_colour(analysis, verdict.gait),
                   markersize=6)
         shown.add(verdict.gait)
     handles = [Line2D([], [], color=_colour(analysis, gait), label=gait.replace('_', ' '))
                for gait in dict.fromkeys([*colours(type(analysis.network)), *sorted(shown)])
                if gait in shown]
-    # Use the text's colour, which differs on a dark page.
+    # The colour of the text differs on a dark page.
     plain = matplotlib.rcParams['text.color']
     handles += [Line2D([], [], color=plain, linestyle=style, label=label)
                 for style, label in STYLES]
@@ -137,7 +137,6 @@ def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch
     handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label,
                        markerfacecolor=plain if label.endswith('(soft)') else
                        axes.get_facecolor()) for label, marker in met.items()]
-    # Above the axes, where it hides nothing.
     axes.legend(handles=handles, fontsize=7, ncols=5, frameon=False, title='Branches of gaits',
                 title_fontsize=10, alignment='left', loc='lower left', bbox_to_anchor=(0.0, 1.0),
                 borderaxespad=0.2, borderpad=0.0)
@@ -193,10 +192,9 @@ def check_suffix(option: str, suffix: str) -> None:
 def written(figure: Figure, suffix: str) -> bytes:
     """Return a figure as the contents of a file of that suffix, and close it."""
     from matplotlib import pyplot
-    out = io.BytesIO()
-    figure.savefig(out, format=suffix.lstrip('.'), dpi=130)
+    content = rendered(figure, suffix, 130)
     pyplot.close(figure)
-    return out.getvalue()
+    return content
 
 
 def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> bytes:
@@ -255,8 +253,8 @@ def phase_picture(report: PhaseReport, suffix: str) -> bytes:
         len(report.responses), columns, squeeze=False, sharex=True, layout='constrained',
         figsize=(max(7.0, 4.6 * columns), 0.8 + 2.2 * len(report.responses)))
     for row, gait in zip(axes, report.responses, strict=True):
-        for variable, one in enumerate(row):
-            _draw(one, report, gait, variable)
+        for variable, panel in enumerate(row):
+            _draw(panel, report, gait, variable)
     for axis in axes[-1]:
         axis.set_xlabel('phase of the cell [cycles], cell 1 peaks at 0')
     figure.suptitle(f'Phase response of {network.name}', fontsize=11)

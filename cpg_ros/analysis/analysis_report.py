@@ -30,11 +30,10 @@ from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Network, ParameterLine
 import numpy as np
 
-# Statements of the papers on Hopf points of their networks, beside the computed ones.
 
 def _published_numbers(point: HopfPoint) -> dict[str, float]:
     """Real parts of the normal form by the formulas of Liu & Zhang (2024)."""
-    # The papers load much that only a report of Hopf points needs.
+    # Only a report of Hopf points needs the papers' modules.
     from cpg_ros.analysis.papers.liu_zhang import published_normal_form
     form = published_normal_form(point)
     return {'k1_published': form.k1.real, 'k2_published': form.k2.real}
@@ -55,9 +54,9 @@ class Commentary:
     Attributes:
         heads: of columns in a table of Hopf points.
         explained: explanation of these columns.
-        title: above the remarks.
+        title: of the remarks.
         numbers: of the columns, name -> number.
-        remark: statement on a point as text and in plain types.
+        remark: statement on a point, as text and in plain types.
 
     """
 
@@ -75,9 +74,9 @@ COMMENTARIES = {
     'quadruped': Commentary(title='Buono & Golubitsky at these points:', remark=_theorem)}
 
 
-#: UNSURE: error of the trivial multiplier above which the report mentions it.
+#: Error of the trivial multiplier that the report mentions.
 UNSURE = 1e-6
-#: ON_KINK: distance from 0 at the stand up to which a variable is on its kink.
+#: Distance from 0 at which a variable lies on a kink at the equilibrium.
 ON_KINK = 1e-12
 
 
@@ -92,12 +91,12 @@ def _state(network: Network, rest: np.ndarray) -> str:
     return ', '.join(f'{name} {value:.4f}' for name, value in named(network, rest).items())
 
 
-def _yes(value: bool) -> str:
-    return 'yes' if value else 'no'
+def _yes(value: bool | None) -> str:
+    return {True: 'yes', False: 'no', None: 'cannot tell'}[value]
 
 
 def _which(verdict: GaitAssessment, meant: GaitAssessment) -> str:
-    """Return which of a gait's orbits is meant where it is not the first."""
+    """Return which of a gait's orbits is meant, if not the first."""
     if meant is verdict:
         return ''
     assert meant.orbit is not None
@@ -127,7 +126,7 @@ def _degenerate(network: Network) -> list[str]:
 class Analysis(ShortRepr):
     """A parameter set with its gaits.
 
-    Where the network has a delay, its Hopf points are those at which the delay is critical.
+    Hopf points are along the delay, if the network has one.
 
     Attributes:
         network: the parameters.
@@ -145,7 +144,7 @@ class Analysis(ShortRepr):
     longest: float
 
     @cached_property
-    def _found(self) -> tuple[list[HopfPoint], tuple[Block, ...], np.ndarray, str]:
+    def _equilibrium(self) -> tuple[list[HopfPoint], tuple[Block, ...], np.ndarray, str]:
         """Return Hopf points, blocks and equilibrium, or why there are none."""
         try:
             rest = equilibrium(self.network)
@@ -155,12 +154,12 @@ class Analysis(ShortRepr):
                 return [], (), np.array([]), (f'it lies on a kink of the rates, where '
                                               f'{" and ".join(on)} is 0: they have no '
                                               'linearisation, and there are no Hopf points')
-            parts = blocks(self.network, rest)
+            classes = blocks(self.network, rest)
             span = (0.0, self.longest) if self.delay else self.span
             points = hopf_points(self.network, self.line, *span) if span[0] < span[1] else []
         except CpgError as error:
             return [], (), np.array([]), str(error)
-        return points, parts, rest, ''
+        return points, classes, rest, ''
 
     @property
     def delay(self) -> str:
@@ -175,12 +174,12 @@ class Analysis(ShortRepr):
     @property
     def hopf(self) -> list[HopfPoint]:
         """Hopf points of the equilibrium, by rising parameter."""
-        return self._found[0]
+        return self._equilibrium[0]
 
     @property
     def blocks(self) -> tuple[Block, ...]:
         """The linearisation at the equilibrium, by symmetry class."""
-        return self._found[1]
+        return self._equilibrium[1]
 
     @property
     def _commentary(self) -> Commentary:
@@ -233,20 +232,26 @@ class Analysis(ShortRepr):
     def _reason(verdict: GaitAssessment) -> str:
         """Return why a gait does not exist, without the list of all parameters."""
         text = verdict.why.removeprefix(f'no {verdict.gait} ')
-        head, way, rest = text.partition(' of the way, to ')
-        return f'{head} of the way, no further{rest.partition("no further")[2]}' if way else text
+        head, found, rest = text.partition(' of the way, to ')
+        return f'{head} of the way, no further{rest.partition("no further")[2]}' if found else text
 
     def _conclusion(self) -> str:
         """Return a summary in a sentence or two."""
         if not self.existing:
             nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
             return f'This set gives no gait{nearest}.'
-        by_itself, locked, never, text = [], [], [], []
+        by_itself, locked, unsure, never, text = [], [], [], [], []
         for verdict in self.existing:
             if stable := [orbit for orbit in verdict.orbits if orbit.stable]:
                 by_itself.append(verdict.gait + _which(verdict, stable[0]))
             elif held := [orbit for orbit in verdict.orbits if orbit.stable_with_default_gain]:
-                locked.append(verdict.gait + _which(verdict, held[0]))
+                neutral = (', cannot tell about it without the lock' if held[0].stable is None
+                           else '')
+                locked.append(verdict.gait + _which(verdict, held[0]) + neutral)
+            elif unknown := [orbit for orbit in verdict.orbits
+                             if orbit.stable_with_default_gain is None]:
+                unsure.append(f'{verdict.gait} (leading multiplier '
+                              f'{unknown[0].multipliers.leading:.10g})')
             else:
                 count = len(verdict.orbits)
                 orbits = 'one orbit' if count == 1 else f'{count} orbits'
@@ -256,6 +261,8 @@ class Analysis(ShortRepr):
         if locked:
             text.append(f'{", ".join(locked)}: stable with the symmetry lock only; without it a '
                         'small disturbance takes over.')
+        if unsure:
+            text.append(f'{", ".join(unsure)}: cannot tell whether it attracts with the lock.')
         if never:
             text.append(f'{", ".join(never)}: does not attract, with or without the lock.')
         return ' '.join(text)
@@ -267,27 +274,28 @@ class Analysis(ShortRepr):
 
     def _rest(self) -> list[str]:
         """Return lines on the equilibrium and its Hopf points."""
-        _, parts, rest, why = self._found
+        _, classes, rest, why = self._equilibrium
         if why:
             return [f'Equilibrium: {why}.']
-        lines = [*(self._roots(parts, rest) if self.delay else self._eigenvalues(parts, rest)), '']
+        describe = self._roots if self.delay else self._eigenvalues
+        lines = [*describe(classes, rest), '']
         where = (f'up to a delay of {self.longest:g}' if self.delay else
                  f'with {self.along} from {self.span[0]:g} to {self.span[1]:g}')
         return [*lines, *(self._points(where) if self.hopf else [f'No Hopf point {where}.'])]
 
-    def _roots(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+    def _roots(self, blocks: tuple[Block, ...], rest: np.ndarray) -> list[str]:
         """Return, with a delay, how many roots lie to the right, and the rightmost."""
-        unstable = sum(len(block.right_of(0.0)) for block in parts)
-        block = max(parts, key=lambda one: one.leading.real)
+        unstable = sum(len(block.right_of(0.0)) for block in blocks)
+        block = max(blocks, key=lambda block: block.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
         where = '' if odd(self.network) else f' at {_state(self.network, rest)}'
         return [f'Equilibrium{where}: {count} with positive real part; the rightmost is '
                 f'{_root(block.leading)} per model time, of mode '
                 f'({", ".join(map(str, block.mode))}).']
 
-    def _eigenvalues(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+    def _eigenvalues(self, blocks: tuple[Block, ...], rest: np.ndarray) -> list[str]:
         rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
-        rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
+        rows += [(block.name, block.gait, _root(block.leading)) for block in blocks]
         return [f'Equilibrium: {_state(self.network, rest)}; eigenvalues per model time by '
                 'symmetry class:', *(f'  {line}' for line in table(rows))]
 
@@ -330,7 +338,7 @@ class Analysis(ShortRepr):
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything in plain types."""
-        _, parts, rest, why = self._found
+        _, classes, rest, why = self._equilibrium
         text: dict[str, Any] = {
             'network': self.network.name, 'params': self.network.as_dict(),
             'gaits': {gait: verdict.as_dict() for gait, verdict in self.gaits.items()}}
@@ -350,7 +358,7 @@ class Analysis(ShortRepr):
             **({} if odd(self.network) else {'stand': named(self.network, rest)}),
             'leading_roots': [{
                 'mode': list(block.mode), **({} if self.delay else {'gait': block.gait}),
-                'real': block.leading.real, 'imag': block.leading.imag} for block in parts]}
+                'real': block.leading.real, 'imag': block.leading.imag} for block in classes]}
         if self.delay and not self.existing:
             text['nearest_threshold'] = nearest_threshold(self.network)
         return text

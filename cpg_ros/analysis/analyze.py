@@ -12,11 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``analyze``: gaits and stability of a parameter set, before it runs on a robot.
-
-``analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4`` tells whether the set oscillates,
-in which gaits, from which delay on, how large and how fast, and how stable each gait is: on the
-centre manifold, in the full network, and with the symmetry lock.
+"""Analyse a parameter set before you run it on a robot: the equilibrium and its Hopf points, the
+gaits as exact periodic orbits, and whether each gait attracts in the full network and with the
+symmetry lock. Works without a ROS graph.
 """
 
 from argparse import Namespace
@@ -37,10 +35,6 @@ from cpg_ros.networks.network_options import add_network_options, chosen_preset
 from cpg_ros.networks.registry import SHIPPED
 import numpy as np
 
-DESCRIPTION = """\
-Analyse a parameter set before you run it on a robot: the rest state and its Hopf points, the gaits
-as exact periodic orbits, and whether each gait attracts in the full network and with the symmetry
-lock. Works without a ROS graph."""
 EPILOG = """\
 examples:
   analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4 --plot branches.png
@@ -58,7 +52,7 @@ MOST_STATES = 1_000_000
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG)
+    parser = Parser(prog='analyze', description=__doc__, epilog=EPILOG)
     add_network_options(parser)
     parser.add_argument('--longest-delay', type=number, metavar='TAU', help='find Hopf points of '
                         'the delayed network up to this delay, model time (default: twice tau)')
@@ -81,7 +75,7 @@ def _parser() -> Parser:
                         help='also print the phase response of each gait to inputs to one cell, '
                         'and, given a FILE, draw its curves (.png, .pdf or .svg)')
     parser.add_argument('--basin', type=int, metavar='N', help='also run the network from N '
-                        'random states for each gait and report the share that returns to it')
+                        'random states for each gait and report the fraction that returns to it')
     parser.add_argument('--seed', type=int, metavar='S', help='of the random states of --basin '
                         '(default: 0)')
     return parser

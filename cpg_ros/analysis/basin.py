@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Basins: the share of random states from which a network returns to a gait, and other ends.
+"""Basins: the fraction of random states from which a network returns to a gait.
 
-Each state is drawn at random: every variable of every cell evenly over twice its range on the
-orbit, about the middle of that; with a delay the history is constant. The whole network runs from
-it, and what it does in the end is compared with the orbit and with the gaits' symmetries.
+Every variable of every cell is drawn evenly over twice its range on the orbit, about the middle of
+the range; with a delay the history is constant. The final motion of the whole network is compared
+with the orbit and with the gaits' symmetries.
 """
 
 from collections import Counter
@@ -40,13 +40,11 @@ if TYPE_CHECKING:
 CYCLES, KEPT, TOGETHER = 100, 64, 64
 #: WIDTH: range of the random states over the orbit's range.
 WIDTH = 2.0
-#: A run has returned to the orbit if its signals differ by less than the share SAME of their
-#: range, and its period by less than the share SAME_PERIOD.
+#: Relative differences of equal signals and of equal periods.
 SAME, SAME_PERIOD = 0.05, 0.01
-#: HOLDS: difference of the signals, as a share of their range, up to which a symmetry holds.
+#: Relative difference of signals up to which a symmetry holds.
 HOLDS = 0.01
-#: RESTS: motion, as a share of the orbit's range, below which a network rests; LAST: number of
-#: last cycles in which that is judged.
+#: Range of the last cycles, over the orbit's range, below which a network rests; number of cycles.
 RESTS, LAST = 1e-3, 3
 #: Ends of runs that are not a gait.
 REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'
@@ -62,8 +60,8 @@ class Basin(ShortRepr):
         states: number of states.
         seed: with which they were drawn.
         returned: number of them that return to the orbit, or to an image of it under a symmetry.
-        others: what the others do -> how many: another gait by name, 'another NAME' for another
-            orbit of the same, 'rest', 'runs away', or 'unknown', as what has not settled.
+        others: motion -> number of the others: another gait by name, 'another NAME' for another
+            orbit of the same gait, 'rest', 'runs away', or 'unknown' if it has not settled.
 
     """
 
@@ -81,12 +79,12 @@ class Basin(ShortRepr):
 
     @property
     def fraction(self) -> float:
-        """Share of the states that return."""
+        """Fraction of the states that return."""
         return self.returned / self.states
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Ends of Wilson's 95 % interval of the share."""
+        """Ends of Wilson's 95 % interval of the fraction."""
         bounds = binomtest(self.returned, self.states).proportion_ci(0.95, 'wilson')
         return float(bounds.low), float(bounds.high)
 
@@ -100,7 +98,7 @@ def random_states(orbit: Orbit, count: int, seed: int) -> np.ndarray:
 
 def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
           done: Callable[[int], None] = lambda count: None) -> Basin:
-    """Run a network from random states; return the shares that end on a gait and elsewhere.
+    """Run a network from random states and count the returns to a gait.
 
     Args:
         orbit: of the gait.
@@ -131,11 +129,11 @@ def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
 
 
 def end_of(run: Trajectory, orbit: Orbit) -> str:
-    """Return the name of the end of a simulation of an orbit's network; see Basin.
+    """Name the final motion of a simulation, as in Basin.
 
     Args:
         run: of many cycles.
-        orbit: its gait is the one returned where it is this orbit.
+        orbit: of the gait whose name is returned for this orbit.
 
     """
     network = orbit.network

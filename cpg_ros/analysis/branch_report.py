@@ -21,7 +21,7 @@ from cpg_ros.common.command_line import progress_bar
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.bifurcation import Bifurcation, bifurcations
 from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_orbit
-from cpg_ros.dynamics.floquet import ATTRACTS, Multipliers, multipliers
+from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form, OrbitNormalForm
@@ -97,7 +97,7 @@ def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
             for member in entry.branch.points:
                 spectra.append(multipliers(member.orbit))
                 entry.kinds.append(0 if spectra[-1].attracts else
-                                   1 if spectra[-1].leading_within < ATTRACTS else 2)
+                                   1 if spectra[-1].attracts_within else 2)
                 done += 1
                 bar(done)
             entry.crossings = bifurcations(entry.branch, spectra)
@@ -159,9 +159,7 @@ def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     """Return the branch of a Hopf point; none where the first orbit cannot be found."""
     low, high = _span(analysis)
     try:
-        return [continue_from_hopf(point.network, point.block.symmetry, point.omega,
-                                   analysis.along, low, high, rest=point.state,
-                                   vector=point.eigenvector, most=POINTS, longest=SLOWEST,
-                                   longest_step=LONGEST)]
+        return [continue_from_hopf(point, analysis.along, low, high, most=POINTS,
+                                   longest=SLOWEST, longest_step=LONGEST)]
     except NoOrbit:
         return []

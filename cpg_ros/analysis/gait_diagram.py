@@ -14,37 +14,28 @@
 
 """Footfall (Hildebrand) diagrams of recorded runs and of gaits, and the executable for these.
 
-``python -m cpg_ros.analysis.gait_diagram gaits.png --network biped`` draws a network's gaits from
-their orbits. A leg stands while the signal that drives it falls, from peak to trough; where cells
-drive muscles, a muscle is active while its cell is above the middle of its range.
+A leg stands while the signal that drives it falls, from peak to trough; where cells drive muscles,
+a muscle is active while its cell is above the middle of its range.
 """
 
-from argparse import Namespace
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
-import sys
 
-from cpg_ros.common.command_line import Parser, run
-from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import write_atomically
+from cpg_ros.common.report_page import rendered
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.fitting.gaits.steady_stretch import true_runs
 from cpg_ros.motion.phase_readout import evaluate, phase_map
 from cpg_ros.motion.robot import HARMONICS
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.registry import find_network, SHIPPED
 import matplotlib
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
-# Footfall diagrams after Hildebrand: which foot stands when, and how fast the robot goes.
-
-#: STANDING: share of the weight on a foot above which it stands.
+#: Fraction of the weight above which a foot stands.
 STANDING = 0.04
 #: SMOOTHING: time over which the speed is averaged, s.
 SMOOTHING = 0.5
@@ -77,14 +68,14 @@ def draw_stances(axes: Axes, names: Sequence[str], bars: Sequence[list[tuple[flo
         alpha: opacity of the bars, 0 to 1.
 
     """
-    for row, (own, colour) in enumerate(zip(bars, colours, strict=True)):
-        axes.broken_barh(own, (row - 0.36, 0.72), color=colour, alpha=alpha)
+    for row, (stretches, colour) in enumerate(zip(bars, colours, strict=True)):
+        axes.broken_barh(stretches, (row - 0.36, 0.72), color=colour, alpha=alpha)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.45, -0.55)
 
 
 def _spacing(time: np.ndarray) -> float:
-    """Return the mean time between samples: those of a clock of another rate are not even."""
+    """Return the mean time between samples, which need not be even."""
     return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 0.0
 
 
@@ -124,12 +115,12 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     bars = [stances(time, column > least) for column in forces.T]
     draw_stances(above, [leg.upper() for leg in legs], bars, [rcParams['text.color']] * len(legs))
-    for row, own in enumerate(bars):
-        fraction = sum(length for _, length in own) / (time[-1] - time[0])
+    for row, stretches in enumerate(bars):
+        fraction = sum(length for _, length in stretches) / (time[-1] - time[0])
         above.annotate(f'{fraction:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
                        xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)
     above.set(ylabel='foot on the floor',
-              title='Footfalls (right: share of the time on the floor)')
+              title='Footfalls (right: fraction of the time on the floor)')
     below.plot(time, speed(time, position), color='tab:blue', linewidth=1.2)
     below.set(xlabel='time [s]', ylabel='speed [m/s]', xlim=(time[0], time[-1]))
     below.set_ylim(bottom=0.0)
@@ -139,9 +130,7 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
             axes.axvline(when, color='tab:red', linewidth=1.0)
         below.annotate(name, (when, 1.0), xycoords=('data', 'axes fraction'), xytext=(3, -3),
                        textcoords='offset points', va='top', color='tab:red', fontsize=8)
-    written = BytesIO()
-    figure.savefig(written, format=path.suffix[1:], dpi=110)
-    write_atomically(path, written.getvalue())
+    write_atomically(path, rendered(figure, path.suffix))
 
 
 STRIDES = 2.0
@@ -150,7 +139,7 @@ COLOURS = ('#2b6cb0', '#c05621', '#2f855a')
 
 
 def rows(network: type[Network]) -> list[tuple[str, int, str]]:
-    """Return the rows from the top: name of leg or muscle, its cell from 1, and its colour."""
+    """Return the rows from the top: a leg or a muscle, its cell from 1, and its colour."""
     legs, girdles = next(iter(network.legs.values())), network.girdles
     if network.muscles:
         names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
@@ -162,7 +151,7 @@ def rows(network: type[Network]) -> list[tuple[str, int, str]]:
 
 
 def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
-    """Return the signal that drives a leg, its cell as the joints see it, from -1 to 1.
+    """Return the signal that drives a leg: its cell, smoothed for the joints, from -1 to 1.
 
     Args:
         orbit: the gait.
@@ -191,7 +180,7 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
         wave = int(orbit.waves[cell - 1])
         on = orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) > orbit.levels[wave, 0, 0]
     else:
-        # Compare with a margin: at a peak on the grid, rounding decides the sign of the slope.
+        # Below -1e-9: the sign of the slope at a peak on the grid is a rounding error.
         on = signal(orbit, cell, theta, 1) < -1e-9
     return stances(theta, on)
 
@@ -206,62 +195,8 @@ def draw(axes: Axes, orbit: Orbit, title: str) -> None:
         wave = int(orbit.waves[cell - 1])
         middle, half = orbit.levels[wave, 0]
         line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
-        axes.plot(theta, row - 0.33 * line, color=matplotlib.rcParams['text.color'],
-                  linewidth=0.9)
+        axes.plot(theta, row - 0.33 * line, color=matplotlib.rcParams['text.color'], linewidth=0.9)
     axes.set_xlim(0.0, STRIDES)
     axes.set_title(title, fontsize=10, loc='left')
     axes.spines[['top', 'right', 'left']].set_visible(False)
     axes.tick_params(left=False)
-
-
-def picture(network: type[Network], path: Path) -> None:
-    """Write the picture of a network's gaits, each from the preset of its name.
-
-    Raises:
-        InputError: matplotlib does not write such files.
-
-    """
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-    presets = {name: preset for name, preset in network.presets().items() if name == preset.gait}
-    columns = 3
-    lines = -(-len(presets) // columns)
-    figure, grid = pyplot.subplots(lines, columns, figsize=(10.5, 0.4 + 2.4 * lines), sharex=True,
-                                   sharey=True, layout='constrained')
-    for axes in grid.flat[len(presets):]:
-        axes.axis('off')
-    for axes, (name, preset) in zip(grid.flat, presets.items(), strict=False):
-        orbit = solve_preset(preset)
-        draw(axes, orbit, f'{name.replace("_", " ")}   (period {orbit.period:.4f})')
-    for axes in grid[-1]:
-        axes.set_xlabel('time [strides]')
-    bars = ('Bars: the cell is above the middle of its range.' if network.muscles else
-            'Bars: the leg stands, while the signal that drives it falls.')
-    figure.suptitle(f'{bars} Lines: the cell. Periods in model time.', fontsize=10)
-    try:
-        figure.savefig(path, dpi=130)
-    except ValueError as error:
-        # The ending of the file is of no format that matplotlib writes.
-        raise InputError(str(error)) from error
-
-
-def _parser() -> Parser:
-    parser = Parser(prog='python -m cpg_ros.analysis.gait_diagram', description=__doc__)
-    parser.add_argument('picture', type=Path, help='file to write, .png or .pdf or .svg')
-    parser.add_argument('--network', default='delayed', metavar='NAME',
-                        help=f'{", ".join(SHIPPED)}, or a file (default: %(default)s)')
-    return parser
-
-
-def _draw(args: Namespace) -> int:
-    picture(find_network(args.network), args.picture)
-    return 0
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the picture; return the exit code."""
-    return run(_parser(), _draw, arguments)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -14,8 +14,8 @@
 
 """NSGA-II on islands, populations that exchange their best, and the search for a gait's weights.
 
-Each island is an NSGA-II of its own with random numbers of its own, derived from the seed, its
-number and the epoch. What is found depends on the number of islands, never on who computes them.
+Each island runs its own NSGA-II with random numbers derived from the seed, its number and the
+epoch. The result depends on the number of islands, but not on the number of workers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -29,7 +29,7 @@ from cpg_ros.common.errors import CpgError, InputError, MissingLibraryError, Sho
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: EPOCH: generations between two migrations; MIGRANTS: share of a population that migrates.
+#: Generations between two migrations, and the fraction of a population that migrates.
 EPOCH, MIGRANTS = 3, 0.1
 
 
@@ -53,13 +53,13 @@ class Epoch(ShortRepr):
     """An island for some generations.
 
     Attributes:
-        setup: where it looks.
+        setup: of the search.
         population: sets in a generation.
         generations: how many.
         random: seed of the island's random numbers.
-        seed: of the states that sets are judged from, the same for all.
+        seed: of the start states of the simulations, the same for all.
         start: first generation, shape (population, free variables); at random if None.
-        known: scores of sets that need not be judged anew.
+        judged: scores of sets that are not judged again.
 
     """
 
@@ -69,7 +69,7 @@ class Epoch(ShortRepr):
     random: int
     seed: int
     start: np.ndarray | None = None
-    known: tuple[Score, ...] = ()
+    judged: tuple[Score, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,8 +81,7 @@ class EpochResult(ShortRepr):
     tried: tuple[Score, ...]
 
 
-def evolve(epoch: Epoch,
-           progress: Callable[[int], None] = lambda generation: None) -> EpochResult:
+def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: None) -> EpochResult:
     """Run NSGA-II on an island for an epoch.
 
     Raises:
@@ -95,8 +94,7 @@ def evolve(epoch: Epoch,
         from pymoo.core.problem import Problem
         from pymoo.problems.static import StaticProblem
     except ImportError as error:
-        raise MissingLibraryError('optimize needs pymoo: pip install pymoo'
-                                  ) from error
+        raise MissingLibraryError('optimize needs pymoo: pip install pymoo') from error
     space = epoch.setup.space
     problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
                       n_ieq_constr=1,
@@ -105,23 +103,22 @@ def evolve(epoch: Epoch,
     algorithm = (NSGA2(pop_size=epoch.population) if epoch.start is None
                  else NSGA2(pop_size=epoch.population, sampling=epoch.start))
     algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
-    tried: dict[Network, Score] = {one.network: one for one in epoch.known}
+    tried: dict[Network, Score] = {score.network: score for score in epoch.judged}
     for generation in range(epoch.generations):
         population = algorithm.ask()
         networks = [space.build(values) for values in population.get('X')]
-        new = list(dict.fromkeys(one for one in networks if one not in tried))
+        new = list(dict.fromkeys(network for network in networks if network not in tried))
         if new:
             tried.update(zip(new, evaluate(new, space.gait, epoch.seed), strict=True))
-        scores = [tried[one] for one in networks]
-        # Bounds as the algorithm has them; waveforms that miss what is asked of them come
-        # after all others, whatever their phases.
-        static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
-                               G=np.array([[one.shortfall] for one in scores]))
+        scores = [tried[network] for network in networks]
+        # Sets whose waveforms miss their requirements come after all others.
+        static = StaticProblem(problem, F=np.array([score.objectives for score in scores]),
+                               G=np.array([[score.shortfall] for score in scores]))
         Evaluator().eval(static, population)
         algorithm.tell(infills=population)
         progress(generation + 1)
     values = algorithm.pop.get('X')
-    last = [tried[space.build(one)] for one in values]
+    last = [tried[space.build(row)] for row in values]
     best = sorted(range(len(last)), key=lambda k: (
         last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
     return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
@@ -135,14 +132,14 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
                 executor: Executor | None,
                 progress: Callable[[int], None] = lambda generation: None
                 ) -> tuple[Score, ...]:
-    """Return all sets that some islands have judged, in an order that is always the same.
+    """Return all sets that some islands have judged, in a reproducible order.
 
     Args:
-        setup: where they look.
+        setup: of the search.
         population: sets in a generation of each.
         generations: of each.
         seed: of everything random.
-        islands: how many, in a ring; each sends its best to the next one.
+        islands: number of islands in a ring; each sends its best to the next one.
         executor: any; None for this process.
         progress: takes the number of generations done.
 
@@ -152,7 +149,7 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
     scores: list[tuple[Score, ...]] = [()] * islands
     for epoch, begun in enumerate(range(0, generations, EPOCH)):
         count = min(EPOCH, generations - begun)
-        # The generation that an epoch begins with is the last one of that before.
+        # An epoch begins with the last generation of the previous one.
         epochs = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
                         starts[island], scores[island]) for island in range(islands)]
         results = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
@@ -167,28 +164,27 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
 
 def migrate(results: Sequence[EpochResult]
             ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
-    """The best of each island in the place of the worst of the next one."""
+    """Replace the worst of each island by the best of the previous one."""
     many = max(1, round(MIGRANTS * len(results[0].values)))
     starts: list[np.ndarray | None] = []
     scores = []
-    for island, own in enumerate(results):
+    for island, result in enumerate(results):
         other = results[island - 1]
-        starts.append(np.concatenate([own.values[:-many], other.values[:many]]))
-        scores.append((*own.scores[:-many], *other.scores[:many]))
+        starts.append(np.concatenate([result.values[:-many], other.values[:many]]))
+        scores.append((*result.scores[:-many], *other.scores[:many]))
     return starts, scores
 
 
 # Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
 
-#: TRIALS: most sets of the front that are verified before the search fails.
+#: Sets of the front that are verified, at most.
 TRIALS = 20
-#: SAME: difference of phase errors that does not matter in the choice of a set, degrees; LARGEST:
-#: largest phase error of a set, degrees.
+#: Resolution of phase errors in the choice of a set, and the largest allowed, degrees.
 SAME, LARGEST = 0.1, 1.0
 
 
 class NoGaitFound(CpgError):
-    """No set passed; the message says how close the search came."""
+    """No set passes; the message says how close the search comes."""
 
     exit_code = 1
 
@@ -198,7 +194,7 @@ class Front:
     """Result of a search.
 
     Attributes:
-        space: what was varied.
+        space: of the varied weights.
         scores: the Pareto front of all sets that were tried, best first.
         tried: all of them, in the order in which they were tried.
         best: the first of them, with its exact orbit.
@@ -226,8 +222,8 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
         bounds: variable -> lower and upper bound, instead of the usual ones.
         fixed: variable -> its value.
         progress: show a progress bar.
-        islands: populations that evolve apart and exchange their best; with more of them other
-            sets are found, on however many workers they are.
+        islands: populations that evolve separately and exchange their best; the result depends on
+            their number, but not on the number of workers.
         executor: any, for the islands; None for this process.
 
     Raises:
@@ -256,10 +252,10 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
 
 
 def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
-    """Choose from the front; a set that does not stand up to scrutiny is struck off it."""
-    left = [one for one in tried if one.exact and one.errors.max() <= LARGEST]
+    """Choose from the front; a set that fails the verification is removed from it."""
+    left = [score for score in tried if score.exact and score.errors.max() <= LARGEST]
     if not left:
-        best = min(tried, key=lambda one: (one.errors.max(), one.shortfall, one.stability))
+        best = min(tried, key=lambda score: (score.errors.max(), score.shortfall, score.stability))
         raise _nothing(space, tried, _closeness(best))
     for _ in range(TRIALS):
         front = sorted(_non_dominated(left), key=_order)
@@ -276,7 +272,7 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
 
 
 def _closeness(best: Score) -> str:
-    """Return a text on how close a set comes to its gait without being on it."""
+    """Describe how close a set comes to its gait."""
     if best.errors.max() > LARGEST:
         return f'the best has phase errors of up to {best.errors.max():.1f} degrees'
     if best.shortfall > 0.0:
@@ -297,5 +293,5 @@ def _order(score: Score) -> tuple[float, float]:
 
 def _non_dominated(scores: list[Score]) -> list[Score]:
     values = np.array([score.objectives for score in scores])
-    return [score for score, own in zip(scores, values, strict=True)
-            if not ((values <= own).all(axis=1) & (values < own).any(axis=1)).any()]
+    return [score for score, row in zip(scores, values, strict=True)
+            if not ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()]

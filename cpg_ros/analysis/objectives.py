@@ -42,12 +42,10 @@ from cpg_ros.networks.registry import find_network, is_path, NETWORKS, SHIPPED
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-# Unknowns of a search for weights: couplings that keep a gait's symmetry, and cells' parameters.
-
-#: SEARCHED: name -> shipped network whose weights can be searched for.
+#: Shipped networks whose weights can be searched.
 SEARCHED: dict[str, type[Network]] = {
     name: SHIPPED[name] for name in sorted(SHIPPED) if SHIPPED[name].searched}
-#: DECIMALS: decimals of the values that are tried, so that results can be written down exactly.
+#: Decimals of the values, with which presets are written.
 DECIMALS = 4
 
 
@@ -100,10 +98,10 @@ class Space:
 
     def build(self, values: np.ndarray) -> Network:
         """Return the network with values for the free variables, rounded to 4 decimals."""
-        places = iter(np.round(values, DECIMALS))
+        numbers = iter(np.round(values, DECIMALS))
         return self.network(**{
             member: value for variable in self.variables
-            for value in (float(next(places)) if variable.free else variable.low,)
+            for value in (float(next(numbers)) if variable.free else variable.low,)
             for member in variable.members})
 
 
@@ -116,12 +114,12 @@ def _variables(network: type[Network], gait: str) -> list[Variable]:
               for member in network.groups.get(name, (name,))}
     variables = []
     for family in families:
-        # Its members have the same bounds, whatever groups they are of.
+        # The members have the same bounds.
         name, limits = stated[min(family)]
         variables.append((name not in network.groups, Variable(
             names.get(frozenset(family), min(family)), *limits, tuple(sorted(family)))))
     return [variable for _, variable in sorted(
-        variables, key=lambda one: (one[0], () if one[0] else one[1].members))]
+        variables, key=lambda entry: (entry[0], () if entry[0] else entry[1].members))]
 
 
 def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],
@@ -147,15 +145,15 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         raise InputError(f'the network {network.name} does not state what may be looked for')
     known(gait, network.gaits())
     variables = _variables(network, gait)
-    places = {name: k for k, variable in enumerate(variables)
-              for name in (*variable.members, variable.name)}
+    indices = {name: k for k, variable in enumerate(variables)
+               for name in (*variable.members, variable.name)}
     given: dict[int, str] = {}
     for name, (low, high) in [*bounds.items(), *((name, (value, value))
                                                  for name, value in fixed.items())]:
-        if name not in places:
+        if name not in indices:
             raise InputError(f"'{name}' is not one of the variables of {gait}: "
                              f'{", ".join(variable.name for variable in variables)}')
-        index = places[name]
+        index = indices[name]
         old = variables[index]
         if index in given:
             raise InputError(f'{name} is the same as {given[index]}, which is given already')
@@ -174,23 +172,19 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     return space
 
 
-#: LARGEST_BATCH: most sets that are simulated at once, which limits memory; a usual generation
-#: fits.
+#: Sets that are simulated at once, which limits memory; a usual generation is one batch.
 LARGEST_BATCH = 256
-#: START_MISMATCH: distance of a start from the gait, as a share of the signals (see
-#: ``_mismatch``).
+#: Deviation of a start from the gait, as a fraction of the signals (see ``_mismatch``).
 START_MISMATCH = 0.2
-#: RESOLUTION: phase error, degrees, below which errors are rounding and count as equal.
+#: Resolution of phase errors, degrees.
 RESOLUTION = 0.001
-#: The exact orbit is solved for at phase errors up to NEAR, degrees, and mismatch to
-#: NEAR_MISMATCH.
+#: Phase errors (degrees) and mismatch below which the exact orbit is solved for.
 NEAR, NEAR_MISMATCH = 5.0, 0.15
-#: MOST_EXACT: most sets of a generation, the most stable ones, for which this is done, as it takes
-#: 20 to 300 ms; SAME_PERIOD: largest relative difference of its period from the simulated one.
+#: Sets of a generation whose orbit is solved for, the most stable ones, as it takes 20 to 300 ms;
+#: and relative difference of the period from that of the simulation.
 MOST_EXACT, SAME_PERIOD = 16, 0.02
-#: LEAST_RANGE: least range of every cell; LEAST_STEADINESS: least steadiness of its turning (see
-#: fitting.gaits.recognition); LEAST_DIFFERENCE: least difference in shape of two waveforms;
-#: MARGIN: factor by which the search keeps away from these limits.
+#: Least range of every cell, steadiness of its rotation (fitting.gaits.recognition.steadiness) and
+#: difference in shape of two waveforms; the search multiplies them by a margin.
 LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
 #: WORST: phase error of a set without a gait, degrees; DEAD: stability of a set that rests or runs
 #: away; APERIODIC: stability of a set whose motion does not repeat.
@@ -312,13 +306,13 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Lim
     if near:
         shortfall = waveform_shortfall(signals, symmetry, MARGIN)
     else:
-        # The shapes are not those of the gait: only the range counts, and two waveforms that
-        # are not there at all fall shorter than any that are.
+        # The shapes are not those of the gait, so only the range counts; two waveforms that are
+        # missing count less than any that are there.
         shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / LEAST_RANGE)
         shortfall += (MARGIN + errors.max() / WORST) if two else 0.0
     difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None
-    # An estimate at no cost: by how much a cycle has brought the disturbance of the start nearer
-    # to the gait. It is above 1 where the network has left, and smaller the slower it left.
+    # Estimate the multiplier by the decay of the start's disturbance per cycle. It is above 1 if
+    # the network has left the gait.
     stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)**(cycle.period / SPAN))
     score = Score(network, errors, float(stability), difference, float(shortfall))
     return score, cycle if near and shortfall == 0.0 else None
@@ -330,7 +324,7 @@ def _proven(score: Score, cycle: LimitCycle, gait: str) -> Score:
     orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
     if orbit is None or extra_symmetry(orbit) or abs(orbit.period / cycle.period
                                                      - 1.0) > SAME_PERIOD:
-        # The estimate does not apply to a set that is near the gait but has no orbit on it.
+        # The estimate does not hold near the gait but off it.
         return replace(score, stability=max(1.0, score.stability))
     return replace(score, stability=multipliers(orbit).leading, exact=True,
                    state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``optimize``: weights that give a network a gait, found by NSGA-II.
-
-``optimize --network biped --gait skip --seed 0`` prints the set that was chosen and writes the
-Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator`` loads.
+"""Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
+phase errors of the cells, the leading Floquet multiplier of the gait's orbit and, for a gait with
+two waveforms, minus their difference in shape. The set chosen from the Pareto front has the
+smallest phase errors and then the smallest multiplier; it is verified by its exact orbit and under
+noise.
 """
 
 import argparse
@@ -41,16 +42,14 @@ from cpg_ros.common.command_line import (
     say,
 )
 from cpg_ros.common.files import write_atomically
+from cpg_ros.common.report_page import rendered
 from cpg_ros.common.workers import add_options, executor_for
 from cpg_ros.networks.presets import write_presets
 import matplotlib
 from matplotlib.axes import Axes
 import numpy as np
 
-# The Pareto front of a search for weights, as a table in a file and as a picture.
-
-#: Colours. WAVES: of the waveforms; TRIED, SOLVED: of sets without and with an exact orbit; BEST:
-#: of the Pareto front.
+#: Colours of the waveforms, of sets that were tried or solved, and of the front.
 WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
 #: FLOOR: smallest multiplier that is drawn.
 FLOOR = 1e-6
@@ -120,7 +119,7 @@ def _signals(axes: Axes, front: Front) -> None:
                   color=WAVES[int(orbit.waves[cell])], linewidth=1.4)
     axes.axvline(orbit.period, color=TRIED, linewidth=0.8, linestyle=':')
     axes.set_yticks(middles, [f'cell {cell + 1}' for cell in range(cells)])
-    # Without dimension, like everything in these networks: a bar tells how large.
+    # A bar gives the scale of the dimensionless potential.
     unit = float(f'{0.5 * spacing:.1g}')
     axes.plot([time[-1] * 1.02] * 2, [middles[-1] - 0.5 * unit, middles[-1] + 0.5 * unit],
               color='#1a202c', linewidth=2.0, clip_on=False)
@@ -147,7 +146,7 @@ def draw_front(path: Path, front: Front) -> None:
     if front.best.orbit.waves.max():
         difference = 'difference in shape of the waveforms [1]'
         values[difference] = np.array([score.difference for score in front.tried])
-        # Without an exact orbit there are no two waveforms to compare.
+        # Other sets lack the gait's two waveforms.
         values[difference][~exact] = np.nan
         panels.append((difference, multiplier))
     else:
@@ -170,18 +169,10 @@ def draw_front(path: Path, front: Front) -> None:
                     f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
                     f'chosen: period {orbit.period:.3f} model time, leading multiplier '
                     f'{front.best.leading:.2g} a cycle', fontsize=11)
-    image = io.BytesIO()
-    figure.savefig(image, dpi=120, format='png')
+    write_atomically(path, rendered(figure, dpi=120))
     pyplot.close(figure)
-    write_atomically(path, image.getvalue())
 
 
-DESCRIPTION = """\
-Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
-phase errors of the cells, the leading Floquet multiplier of the gait's orbit and, for a gait with
-two waveforms, minus their difference in shape. The set chosen from the Pareto front has the
-smallest phase errors and then the smallest multiplier; it is verified by its exact orbit and under
-noise."""
 EPILOG = """\
 variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
 such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
@@ -201,7 +192,7 @@ def _name(text: str) -> str:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG)
+    parser = Parser(prog='optimize', description=__doc__, epilog=EPILOG)
     parser.add_argument('--network', default='biped', metavar='NAME',
                         help=f'{", ".join(SEARCHED)}, or the path of a Python file with a '
                         'network (default: %(default)s)')
@@ -257,7 +248,7 @@ def _optimize(args: argparse.Namespace) -> int:
     for option in ('fix', 'bounds'):
         refuse_repeated(f'argument --{option}', [name for name, _ in getattr(args, option)])
     name = args.name or f'{args.gait}_optimised'
-    # Now, and not when the work is done.
+    # An error should end the command before the search.
     args.out.mkdir(parents=True, exist_ok=True)
     with executor_for(max(1, args.islands), args, 'epochs of islands',
                       partial(note, 'optimize')) as executor:

@@ -29,16 +29,14 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: NOISE: intensity of noise that a gait has to survive, per square root of model time; DURATION:
-#: of the runs, model time; RUNS: number of runs, which fit into the vector registers.
+#: Noise that a gait survives (per square root of model time), its duration (model time), and runs
+#: of it at once, as many as fit into the vector registers.
 NOISE, DURATION, RUNS = 0.01, 500.0, 8
 #: PEACE: periods without noise after that; BACK: largest phase error then, degrees.
 PEACE, BACK = 30, 1.0
-#: LOST: phase error, degrees, averaged over CYCLES cycles under noise, above which the gait was
-#: left.
+#: Largest phase errors (degrees) in a number of cycles under noise.
 LOST, CYCLES = 60.0, 4
-#: POINTS: points of a cycle on which an orbit is judged; DIGITS: digits of a preset's start and
-#: period.
+#: Points of a cycle, and digits of the start and period of a preset.
 POINTS, DIGITS = 1024, 10
 
 
@@ -98,9 +96,9 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
     noisy = simulate(network, starts, DURATION, step, noise=NOISE, seed=seed, every=every,
                      progress=False)
     window = round(CYCLES * orbit.period / (step * every))
-    parts = noisy.x[:, :(noisy.t.size - 1) // window * window].reshape(
+    windows = noisy.x[:, :(noisy.t.size - 1) // window * window].reshape(
         RUNS, -1, window, network.components)
-    if not all(_holds(part, symmetry) for run in parts for part in run):
+    if not all(_holds(window_states, symmetry) for run in windows for window_states in run):
         return False
     calm = simulate(network, noisy.x[:, -1], PEACE * orbit.period, step, every=every,
                     progress=False)

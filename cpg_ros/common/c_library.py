@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Libraries that the system's C compiler builds when they are first used, kept in the cache."""
+"""C libraries that the system's compiler builds at their first use, kept in the cache."""
 
 from collections.abc import Callable, Mapping
 import ctypes
@@ -80,13 +80,12 @@ def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]
 
     Args:
         folder: of the cache, see cache_folder; None if nothing can be kept.
-        name: of the library, with a word that changes whenever its sources do.
+        name: of the library; it changes whenever the sources do.
         sources: returns its files, name -> text.
-        what: it is, for the error.
+        what: description for the error.
 
     Raises:
-        NoCompiler: it is not in the cache, and there is no compiler, or it fails; or it cannot
-            be loaded.
+        NoCompiler: there is no compiler, the compiler fails, or the library cannot be loaded.
 
     """
     try:
@@ -104,7 +103,7 @@ def _load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str
                 _compile(sources(), library, what)
         if library.exists():
             return ctypes.CDLL(str(library))
-    with tempfile.TemporaryDirectory() as place:
-        library = Path(place) / f'{name}.so'
+    with tempfile.TemporaryDirectory() as temporary:
+        library = Path(temporary) / f'{name}.so'
         _compile(sources(), library, what)
         return ctypes.CDLL(str(library))

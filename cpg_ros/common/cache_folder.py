@@ -136,7 +136,7 @@ def _untrusted_place(folder: Path) -> str:
 
 
 def _untrusted_contents(folder: Path) -> str:
-    """Return why others may have written a folder of a trusted place or what is in it, or ''."""
+    """Return why others may have written a folder in a trusted place or its contents, or ''."""
     status = folder.lstat()
     if not stat.S_ISDIR(status.st_mode):
         return f'{folder} is no folder'
@@ -190,7 +190,7 @@ def _place() -> Path | None:
 
 
 def _temporary() -> Path:
-    """Return a temporary folder that is the user's alone: what is in it will be run.
+    """Return a temporary folder of the user alone, as its contents will be executed.
 
     Raises:
         OSError: there is none.

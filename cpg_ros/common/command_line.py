@@ -39,7 +39,7 @@ def number(text: str) -> float:
     """Read a number.
 
     Raises:
-        argparse.ArgumentTypeError: it is none.
+        argparse.ArgumentTypeError: the text is not a number.
 
     """
     try:
@@ -190,6 +190,7 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{'formatter_class': argparse.RawDescriptionHelpFormatter, **options})
+        self.description = self.description and self.description.strip()
 
     def error(self, message: str) -> NoReturn:
         """Print the message and exit."""

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The errors of the package: what is wrong with its input, in words for the user.
+"""The errors of the package, whose messages tell users what is wrong with their input.
 
 Any other exception, such as a ValueError of numpy for arrays of a wrong shape, is a bug in the
 calling program: the package does not catch it, so it is never reported as the user's mistake.

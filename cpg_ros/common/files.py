@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Opening files that others name: regular files of a bounded size, and nothing that can block.
+"""Opening files named by users: regular files of a bounded size, and nothing that can block.
 
-A FIFO holds up whoever opens it, ``/dev/zero`` never ends, and files below ``/proc`` state a size
-of 0, whatever is in them. None of them is a robot, a mesh or a recording.
+A FIFO blocks its reader, ``/dev/zero`` never ends, and files below ``/proc`` state a size of 0.
+None of them is a robot, a mesh or a recording.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,10 +33,10 @@ from xml.parsers import expat
 from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import CpgError
 
-# Files are written whole or not at all: under another name, then renamed.
+# Atomic writing: a file is written under another name and then renamed.
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
-    """Write a file, which until then stays what it was.
+    """Write a file; until it is complete, the old file remains.
 
     Raises:
         OSError: it cannot be written; the error has the file's name, also where a disk is full.
@@ -51,7 +51,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield the name of a file to write, which then replaces another one, unless writing fails."""
+    """Yield the name of a file to write, which replaces the target unless writing fails."""
     beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
         yield beside
@@ -61,7 +61,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def stored_json(path: Path) -> Any:
-    """Return what a file of JSON holds; None if it is missing, or damaged by a disk failure."""
+    """Return the content of a JSON file; None if the file is missing or damaged."""
     try:
         return json.loads(path.read_text())
     except (FileNotFoundError, ValueError):
@@ -89,9 +89,9 @@ def resource_folder(kind: str) -> Path:
     raise FileNotFoundError(f'share/cpg_ros/config is missing from the installation at {package}')
 
 
-# XML that others write, as a tree: without entities, and no deeper than anything is described.
+# XML as a tree, without entities and of a bounded depth.
 
-#: DEEPEST: deepest nesting of elements; descriptions of robots have a dozen, Collada more.
+#: Depth of nested elements; descriptions of robots have a dozen, assemblies in Collada more.
 DEEPEST = 200
 #: MOST: most elements of a document; a robot with meshes has a few thousand.
 MOST = 1_000_000

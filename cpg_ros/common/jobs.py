@@ -14,9 +14,8 @@
 
 """A stream of jobs into an executor, and of their outcomes out of it.
 
-Jobs are made only when there is room for them, and an outcome is released once it is taken: what
-the client holds does not grow with the number of jobs. A fleet is an executor that is made anew
-when it breaks.
+Jobs are created only when there is room for them, and an outcome is released once it is taken, so
+memory does not grow with the number of jobs.
 """
 
 from collections import deque
@@ -136,8 +135,8 @@ class JobOutcome(Generic[Job]):
 
     Attributes:
         job: its arguments.
-        value: what it returned.
-        error: what it raised, or None.
+        value: return value of the job.
+        error: exception of the job, or None.
 
     """
 
@@ -259,7 +258,7 @@ class _Stream(Generic[Job]):
             yield JobOutcome(job, None if error else future.result(), error)
         if broken is None:
             return
-        # All that were with it are lost, too, done or not.
+        # All other jobs in the executor are lost, too.
         back += self.flying.values()
         self.flying.clear()
         died = isinstance(broken, BrokenProcessPool)
@@ -285,9 +284,9 @@ def outcomes(executor: Executor, function: Callable[[Job], Any], jobs: Iterable[
     error is WorkerDied. Jobs that were running when a scheduler was lost run again.
 
     Args:
-        executor: any; a Fleet survives the loss of workers.
-        function: of a job; both and the result travel to another process.
-        jobs: as they are wanted.
+        executor: any; a ResilientExecutor survives the loss of workers.
+        function: of a job; both and the result can be pickled.
+        jobs: read as room becomes free.
         tick: called twice a second at least.
 
     Raises:

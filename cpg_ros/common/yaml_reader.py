@@ -46,7 +46,7 @@ class _UniqueKeys(yaml.SafeLoader):
         self._sizes: dict[int, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """Count nodes: an alias is as many as what it stands for, which may hold aliases, too."""
+        """Count nodes; an alias counts as its target, which may contain aliases."""
         event, before = self.peek_event(), self._nodes  # type: ignore[no-untyped-call]
         mark, alias = event.start_mark, isinstance(event, yaml.AliasEvent)
         self._depth += 1
@@ -236,8 +236,7 @@ class YamlReader:
         listed = self.items(value, where)
         if count not in (None, len(listed)):
             raise self.fail(where, f'takes {count} numbers, not {len(listed)}')
-        return tuple(self.number(entry, f'{where}[{k}]', check)
-                     for k, entry in enumerate(listed))
+        return tuple(self.number(entry, f'{where}[{k}]', check) for k, entry in enumerate(listed))
 
     def check_rising(self, values: Sequence[float], where: str) -> None:
         """Check that each number is above the one before it."""

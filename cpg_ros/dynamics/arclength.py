@@ -12,17 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pseudo-arclength continuation of curves of solutions past folds; roots of scalar functions.
+"""Pseudo-arclength continuation of curves of solutions, past their folds.
 
-n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. From a
-point on it the tangent predicts the next one, and Newton's method corrects it in the hyperplane
-that the tangent is normal to (Keller 1977; Doedel, Keller & Kernevez, *Numerical analysis and
-control of bifurcation problems*, 1991). The parameter is an unknown like all others, so that a
-fold, where it turns round, is a point like all others.
+n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. The
+tangent at a point predicts the next point, and Newton's method corrects it in the hyperplane
+normal to the tangent (Keller 1977; Doedel, Keller & Kernevez, *Numerical analysis and control of
+bifurcation problems*, 1991). The parameter is an unknown like the others, so a fold is a regular
+point of the curve.
 """
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache, partial
 import math
 from typing import Any, Protocol, TypeVar
 
@@ -30,30 +31,51 @@ from cpg_ros.common.errors import CpgError, ShortRepr
 import numpy as np
 import scipy
 
-# Sign changes of functions of one variable, searched for on a grid and refined.
+#: A point of a curve, in the representation of that curve.
+Point = TypeVar('Point')
 
-#: EXACT: absolute and relative tolerance of roots.
+# Zeros of functions of one variable.
+
+#: Absolute and relative tolerance of a zero.
 EXACT = 1e-13
-#: REACH: an extremum on the grid is refined if its distance from zero is at most this multiple of
-#: its difference from its neighbours.
+#: An extremum on the grid may lie this many times further on than it differs from its neighbours.
 REACH = 4.0
+
+
+def locate(event: Callable[[Point], float], point_at: Callable[[float], Point], low: float,
+           high: float, tolerance: float) -> Point:
+    """Return the point of a curve at which an event function is zero.
+
+    Folds, Hopf points, period doublings, branch points, tori and points of codimension two are
+    all located by this function.
+
+    Args:
+        event: changes its sign between the ends.
+        point_at: from a coordinate to the point of the curve; called once for each coordinate.
+        low: coordinate on one side.
+        high: coordinate on the other side.
+        tolerance: of the coordinate.
+
+    """
+    solved = cache(point_at)
+    return solved(float(scipy.optimize.brentq(lambda s: event(solved(s)), low, high,
+                                              xtol=tolerance, rtol=EXACT)))
 
 
 def crossings(function: Callable[[float], float], grid: np.ndarray,
               values: np.ndarray | None = None) -> list[float]:
-    """Find sign changes of a continuous function, in the order of the grid.
+    """Find the zeros of a continuous function, in the order of the grid.
 
-    Where it turns back before it reaches zero, its extremum is looked up as well: two crossings
-    between neighbouring points of the grid are found, too.
+    An extremum near zero is refined, so that two zeros between neighbouring points are found.
 
     Args:
-        function: of a place; nan where it has no value.
-        grid: rising places, shape (n,).
-        values: of the function there, where they are already known.
+        function: of a number; nan where it is not defined.
+        grid: rising numbers, shape (n,).
+        values: of the function at the grid; by default they are computed.
 
     """
     values = np.array([function(x) for x in grid]) if values is None else np.asarray(values)
-    places, ordinates = list(grid), list(values)
+    points, ordinates = list(grid), list(values)
     sizes = np.abs(values)
     bend = np.maximum(sizes[:-2], sizes[2:]) - sizes[1:-1]
     turns = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
@@ -66,25 +88,25 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
             lambda x, side=side: side * function(x), method='bounded',
             bounds=(grid[k - 1], grid[k + 1]), options={'xatol': 1e-9})
         if lowest.fun < 0.0:
-            at = int(np.searchsorted(places, lowest.x))
-            places.insert(at, float(lowest.x))
+            at = int(np.searchsorted(points, lowest.x))
+            points.insert(at, float(lowest.x))
             ordinates.insert(at, side * lowest.fun)
     signs = np.sign(ordinates)
     signs[signs == 0.0] = 1.0
     # Signs are NaN where the function has no value; their products differ from -1.
     crossed = np.flatnonzero(signs[:-1] * signs[1:] == -1.0)
-    return [root for k in crossed for root in _roots(function, *places[k:k + 2])]
+    return [root for k in crossed for root in _roots(function, *points[k:k + 2])]
 
 
 def _roots(function: Callable[[float], float], low: float, high: float) -> list[float]:
-    """Find where a function changes sign between two places; on both sides of a gap in it."""
+    """Find the zeros between two numbers with values of different sign, also beside a gap."""
     gap: list[float] = []
 
     def whole(x: float) -> float:
         value = function(x)
         if np.isnan(value):
             gap.append(x)
-            # Any number ends the search: what it finds is not used.
+            # 0 ends the search; its result is not used.
             return 0.0
         return value
 
@@ -97,7 +119,7 @@ def _roots(function: Callable[[float], float], low: float, high: float) -> list[
 
 
 def _last(function: Callable[[float], float], inside: float, outside: float) -> float:
-    """Return the last place with a value, on the way to one without."""
+    """Return the last number at which the function is defined, towards one where it is not."""
     while abs(outside - inside) > EXACT * max(1.0, abs(inside)):
         middle = 0.5 * (inside + outside)
         if np.isnan(function(middle)):
@@ -107,23 +129,19 @@ def _last(function: Callable[[float], float], inside: float, outside: float) -> 
     return inside
 
 
-#: TOLERANCE: size of Newton's step at which it stops; the remaining error is of order its square.
-#: NEWTON: most of these steps.
+#: Newton's method ends after a step this short; the error is of the order of its square.
 TOLERANCE = 1e-9
 NEWTON = 8
-#: NEGLIGIBLE: size of the predicted next step at which it stops if the tangent need not be new.
+#: Without an exact tangent it ends where the next step would be shorter than this.
 NEGLIGIBLE = 1e-4 * TOLERANCE
-#: FIRST, SHORTEST, LONGEST: lengths of steps along the curve, each unknown relative to its scale.
+#: Steps along the curve, in the norm of its product.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
-#: GROWN: factor of the period's growth beyond which steps grow with it.
+#: Once the period has grown by this factor, steps grow with it.
 GROWN = 3.0
-#: ALIGNED: least cosine of the angle between the tangents of two neighbours.
+#: Least cosine of the angle between the tangents at neighbouring points.
 ALIGNED = 0.9
-#: SHARE: largest share of the amplitude that a step may take, so that none leaps over the rest.
-SHARE = 0.6
-
-
-Place = TypeVar('Place')
+#: Largest fraction of the amplitude in a step, so that no step leaps over the equilibrium.
+LARGEST_FALL = 0.6
 
 
 def derivatives(values: Callable[[np.ndarray], Any], x: np.ndarray, difference: float
@@ -153,7 +171,7 @@ def newton(equations: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, step
         steps: at most.
         tolerance: largest change in the last step.
         difference: of the unknowns, for the derivatives.
-        longest: change of an unknown in a step from which on the solution is lost.
+        longest: change of an unknown at which the method counts as diverged.
 
     Raises:
         LinAlgError: the derivatives are singular.
@@ -169,37 +187,37 @@ def newton(equations: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, step
     return None
 
 
-def continue_steps(advance: Callable[[Place, float], Place | None], here: Place, first: float,
-                   shortest: float, longest: float) -> Iterator[Place]:
-    """Yield solutions ahead of one, with shorter steps where one fails and longer ones after.
+def continue_steps(advance: Callable[[Point, float], Point | None], point: Point, first: float,
+                   shortest: float, longest: float) -> Iterator[Point]:
+    """Yield the points that follow one on a curve; a step that fails is halved.
 
     Args:
-        advance: from a solution by a step to the next one; None where none is found.
-        here: solution to start from.
+        advance: from a point and a step to the next point; None if there is none.
+        point: to start from.
         first: first step.
-        shortest: step below which the continuation ends, as at the edge of the range.
+        shortest: step below which the continuation ends.
         longest: step.
 
     """
     step = first
     while step >= shortest:
-        ahead = advance(here, step)
+        ahead = advance(point, step)
         if ahead is None:
             step *= 0.5
             continue
         yield ahead
-        here, step = ahead, min(1.5 * step, longest)
+        point, step = ahead, min(1.5 * step, longest)
 
 
 def continue_along_tangents(
         correct: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray] | None],
         start: np.ndarray, tangent: np.ndarray, steps: tuple[float, float, float], *,
         aligned: float, most: int) -> Iterator[np.ndarray]:
-    """Yield points ahead on a curve, until it ends, is lost or returns to the start.
+    """Yield the points that follow one on a curve, until it ends or returns to the start.
 
     Args:
-        correct: from a guess and the tangent it was predicted along to a point of the curve and
-            the unit tangent there, either way; None where there is none.
+        correct: from a guess and the tangent at the last point to a point of the curve and the
+            unit tangent there, in either direction; None if there is none.
         start: point of the curve, shape (n,).
         tangent: unit tangent there, in the direction to continue in.
         steps: first, shortest and longest.
@@ -207,9 +225,9 @@ def continue_along_tangents(
         most: points.
 
     """
-    def advance(here: tuple[np.ndarray, np.ndarray], step: float
+    def advance(last: tuple[np.ndarray, np.ndarray], step: float
                 ) -> tuple[np.ndarray, np.ndarray] | None:
-        point, before = here
+        point, before = last
         ahead = correct(point + step * before, before)
         if ahead is None or np.linalg.norm(ahead[0] - point) > 2.0 * step:
             return None
@@ -222,23 +240,21 @@ def continue_along_tangents(
             return
 
 
-def offsets(curve: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Return the vectors from a point to the nearest point of each chord of a curve.
+def on_curve(curve: np.ndarray, point: np.ndarray, reach: float) -> bool:
+    """Whether a point lies on a curve, up to a distance in each component.
 
     Args:
-        curve: points in order, shape (n, d).
+        curve: points in order, shape (n, d), joined by chords.
         point: shape (d,).
-
-    Returns:
-        Shape (n - 1, d), or (1, d) for a curve of one point.
+        reach: the distance.
 
     """
-    if len(curve) < 2:
-        return curve - point
-    chords = np.diff(curve, axis=0)
-    fraction = np.clip(((point - curve[:-1]) * chords).sum(axis=1) / np.maximum(
+    ends = curve if len(curve) > 1 else np.repeat(curve, 2, axis=0)
+    chords = np.diff(ends, axis=0)
+    fractions = np.clip(((point - ends[:-1]) * chords).sum(axis=1) / np.maximum(
         (chords**2).sum(axis=1), 1e-30), 0.0, 1.0)
-    return np.asarray(curve[:-1] + fraction[:, None] * chords - point)
+    gaps = np.abs(ends[:-1] + fractions[:, None] * chords - point)
+    return bool((gaps.max(axis=1) < reach).any())
 
 
 class NoOrbit(CpgError):
@@ -248,7 +264,7 @@ class NoOrbit(CpgError):
 class SolutionCurve(Protocol):
     """A curve in a fixed discretisation; the last two unknowns are a period and the parameter."""
 
-    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+    def product(self, first: np.ndarray, second: np.ndarray) -> float:
         """Inner product of two vectors of unknowns."""
 
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -262,16 +278,16 @@ class SolutionCurve(Protocol):
         """
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Half the range of what is continued; zero at a bifurcation from rest."""
+        """Half the range of the continued orbit or state; zero at a bifurcation from rest."""
 
     def orbit(self, z: np.ndarray) -> Any:
         """Make an orbit of a solution."""
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['SolutionCurve', np.ndarray, np.ndarray] | None:
-        """Discretise anew where z is not resolved: curve, z and border; None if it is.
+        """Return a finer discretisation, z and border in it; None if z is resolved.
 
-        Again: this discretisation was itself made to resolve z, and may have failed.
+        Again: this discretisation was itself made to resolve z.
 
         Raises:
             NoOrbit: it cannot be resolved.
@@ -286,9 +302,9 @@ class CurvePoint(ShortRepr):
     Attributes:
         curve: the discretisation that it is a point of.
         z: unknowns; the last two are a period and the parameter.
-        tangent: in the direction in which the curve is followed.
-        steps: that Newton's method took to it.
-        cosine: of the angle between the tangent and the border, if that was a unit vector.
+        tangent: in the direction of the continuation.
+        steps: of Newton's method.
+        cosine: of the angle between the tangent and the border, if the border is a unit vector.
 
     """
 
@@ -310,24 +326,24 @@ class CurvePoint(ShortRepr):
 
     @property
     def amplitude(self) -> float:
-        """Half the range of what is continued."""
+        """Half the range of the continued orbit or state."""
         return self.curve.amplitude(self.z)
 
     def reversed(self) -> 'CurvePoint':  # noqa: A003
-        """Return the same point, to be left the other way."""
+        """Return the same point with the opposite tangent."""
         return replace(self, tangent=-self.tangent)
 
 
 def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
                   ) -> CurvePoint | None:
-    """Find the curve's point z + v with (v, border) = 0; None if Newton's method has lost it.
+    """Find the curve's point z + v with (v, border) = 0; None if Newton's method diverges.
 
     Args:
         curve: in a fixed discretisation.
         z: unknowns near the point.
         border: that v is normal to.
         exact: take the tangent at the point itself. Otherwise it is taken before Newton's last
-            step, which saves a step: precise enough to continue from, not to locate a fold.
+            step, which saves a step and suffices to continue, but not to locate a fold.
 
     """
     before = 0.0
@@ -339,7 +355,6 @@ def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
                 return None
             size = math.sqrt(curve.product(increment, increment))
             z = z + increment
-            # Steps of more than the scale of everything have lost the curve.
             if not size < 1.0 or z[-2] <= 0.0:
                 return None
             # Newton's next step is C size^2, with C = size / before^2 as in this one.
@@ -370,7 +385,7 @@ def resolve_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
 
 
 def fixed_unknown(size: int, which: int) -> np.ndarray:
-    """Return the border that holds one of the unknowns."""
+    """Return the border that holds an unknown, given by its index."""
     border = np.zeros(size)
     border[which] = 1.0
     return border
@@ -401,26 +416,26 @@ def point_at_value(point: CurvePoint, value: float) -> CurvePoint | None:
     return ahead if point.rate > 0.0 else ahead.reversed()
 
 
-def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | None:
+def next_crossing(start: CurvePoint, direction: float, value: float) -> CurvePoint | None:
     """Return the next point with a value of the parameter; None if Newton's method finds none.
 
     Args:
-        here: a point before it, which may be a fold.
-        way: 1 or -1, along the tangent or back.
-        value: that the parameter reaches monotonically from here.
+        start: a point before it, which may be a fold.
+        direction: 1 or -1, along the tangent or back.
+        value: that the parameter reaches monotonically.
 
     """
-    def gap(step: float) -> float:
-        return predict_and_correct(here, way * step).value - value
+    def ahead(step: float) -> CurvePoint:
+        return predict_and_correct(start, direction * step)
 
-    reach, sign = 1e-3, math.copysign(1.0, here.value - value)
+    reach, sign = 1e-3, math.copysign(1.0, start.value - value)
     try:
-        while sign * gap(reach) > 0.0:
+        while sign * (ahead(reach).value - value) > 0.0:
             reach *= 2.0
-        # Newton's method may put the point itself beyond a value that is next to it.
-        ahead = (scipy.optimize.brentq(gap, 0.0, reach, xtol=1e-2 * reach)
-                 if sign * gap(0.0) > 0.0 else 0.0)
-        near = predict_and_correct(here, way * ahead)
+        # Newton's method may put the start itself beyond a value that is next to it.
+        near = ahead(0.0)
+        if sign * (near.value - value) > 0.0:
+            near = locate(lambda point: point.value - value, ahead, 0.0, reach, 1e-2 * reach)
     except NoOrbit:
         return None
     return point_at_value(near, value) if near.rate else None
@@ -430,17 +445,17 @@ def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
     """Return the fold that lies up to about a step before a point; None if it cannot be found."""
     rate = rate_along(after)
     try:
-        # If the fold is the point itself, rounding may put it after the point.
+        # Rounding may put a fold at the point itself behind it.
         last = 0.0 if rate(0.0) * after.rate > 0.0 else 0.1 * step
         if rate(last) * after.rate <= 0.0:
             return None
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                fold = predict_and_correct(after, scipy.optimize.brentq(
-                    rate, -reach * step, last, xtol=1e-9 * step, rtol=1e-12))
+                fold = locate(lambda point: point.rate, partial(predict_and_correct, after),
+                              -reach * step, last, 1e-9 * step)
                 return resolve_point(fold.curve, fold.z, fold.tangent)
     except NoOrbit:
-        # Near a crossing of curves, as where symmetry is gained, Newton's method may fail.
+        # Newton's method may fail where two curves cross.
         return None
     return None
 
@@ -453,12 +468,12 @@ def rate_along(point: CurvePoint) -> Callable[[float], float]:
     return lambda step: predict_and_correct(point, step).rate
 
 
-def _room(here: CurvePoint) -> float:
-    """Longest step that takes no more than its share of the amplitude."""
-    size = here.amplitude
-    ahead = here.curve.amplitude(here.z + 1e-3 * size * here.tangent)
+def _longest_step(point: CurvePoint) -> float:
+    """Longest step in which the amplitude falls by no more than LARGEST_FALL."""
+    size = point.amplitude
+    ahead = point.curve.amplitude(point.z + 1e-3 * size * point.tangent)
     falling = (size - ahead) / (1e-3 * size)
-    return SHARE * size / falling if falling > 0.0 else math.inf
+    return LARGEST_FALL * size / falling if falling > 0.0 else math.inf
 
 
 def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[CurvePoint], str],
@@ -482,15 +497,15 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
 
     """
     folds: list[int] = []
-    count, here, step = 0, start, first_step
+    count, point, step = 0, start, first_step
     while count < most:
-        # Towards a homoclinic orbit only the period moves, and may move by ever more.
-        longer = max(1.0, float(here.z[-2] / start.z[-2]) / GROWN)
-        step = min(step, longest_step * longer, _room(here))
+        # Towards a homoclinic orbit only the period changes, ever faster.
+        longer = max(1.0, float(point.z[-2] / start.z[-2]) / GROWN)
+        step = min(step, longest_step * longer, _longest_step(point))
         if step < SHORTEST:
             return folds, 'lost'
         try:
-            ahead = resolve_point(here.curve, here.z + step * here.tangent, here.tangent,
+            ahead = resolve_point(point.curve, point.z + step * point.tangent, point.tangent,
                                   exact=False)
         except NoOrbit:
             return folds, 'steep'
@@ -498,7 +513,7 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
             step *= 0.5
             continue
         stations = [ahead]
-        if ahead.rate * here.rate < 0.0:
+        if ahead.rate * point.rate < 0.0:
             between = locate_fold(ahead, step)
             if between is None and step > 100.0 * SHORTEST:
                 step *= 0.5
@@ -509,7 +524,7 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
             if not low <= station.value <= high:
                 edge = point_at_value(station, low if station.value < low else high)
                 # A start on the bound is no second point of the branch.
-                if edge is None or edge.value == here.value:
+                if edge is None or edge.value == point.value:
                     return folds, 'bound'
                 return folds, visit(edge) or 'bound'
             why = visit(station)
@@ -518,7 +533,7 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
             if station is not ahead:
                 folds.append(count)
             count += 1
-        here = ahead
+        point = ahead
         if ahead.steps <= 3 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
             step *= 1.5
     return folds, 'steps'

@@ -14,10 +14,10 @@
 
 """Bifurcations of the orbits on a branch, other than folds.
 
-A multiplier that crosses the unit circle at 1 lets another branch leave (or this one fold), one
-at -1 a branch of twice the period, and a pair a torus (Kuznetsov, *Elements of Applied Bifurcation
-Theory*, chapter 5). Symmetry keeps subspaces apart, so crossings are counted in each by itself:
-what happens in two of them at one place is not mistaken for a pair.
+Where a multiplier crosses the unit circle at 1 another branch begins (or this one folds), at -1 a
+branch of twice the period, and where a pair crosses a torus (Kuznetsov, *Elements of Applied
+Bifurcation Theory*, chapter 5). Symmetry keeps subspaces apart, so crossings are counted in each
+subspace: simultaneous crossings in two of them are not mistaken for a pair.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,11 +30,10 @@ from cpg_ros.dynamics.arclength import CurvePoint, NoOrbit
 from cpg_ros.dynamics.continuation import Branch, BranchPoint
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
 import numpy as np
-import scipy
 
-#: EXACT: tolerance of a crossing, as a share of the way between two points of a branch.
+#: Tolerance of a crossing, as a fraction of the way between two points of a branch.
 EXACT = 1e-7
-#: NEUTRAL: logarithm of a multiplier's modulus up to which it is neutral and does not cross.
+#: A multiplier whose logarithm stays below this is neutral and does not cross.
 NEUTRAL = 1e-6
 #: REAL: imaginary part up to which a multiplier is real.
 REAL = 1e-3
@@ -47,8 +46,8 @@ class Bifurcation(ShortRepr):
     Attributes:
         kind: 'torus', 'period doubling' or 'branch point'.
         point: of the branch.
-        multiplier: that crosses; of a pair the one with positive imaginary part.
-        part: number of the subspace it belongs to: 0 the gait's class, then those transverse.
+        multiplier: that crosses; of a pair, the one with positive imaginary part.
+        part: index of its subspace: 0 for the gait's class, then the transverse ones.
 
     """
 
@@ -63,33 +62,33 @@ class Bifurcation(ShortRepr):
         return self.point.value
 
 
-def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
+def bifurcations(branch: Branch, spectra: Sequence[Multipliers] | None = None,
                  exact: float = EXACT) -> tuple[Bifurcation, ...]:
     """Locate all crossings of the unit circle between the points of a branch, in its order.
 
-    Two that lie between the same points in one subspace and take each other back are not seen.
+    Two opposite crossings in the same subspace between the same points are not found.
 
     Args:
         branch: of orbits.
-        judged: multipliers of its points, where they are known already.
-        exact: fraction of the way between two points to which a crossing is located.
+        spectra: multipliers of its points; by default they are computed.
+        exact: tolerance, as a fraction of the way between two points.
 
     """
-    spectra = [spectrum.subspaces for spectrum in judged or map(
+    subspaces = [spectrum.subspaces for spectrum in spectra or map(
         multipliers, (point.orbit for point in branch.points))]
     crossings: list[Bifurcation] = []
-    gaps: dict[int, _Gap] = {}
-    for k, part, rank in _crossings(branch, spectra):
-        gap = gaps.setdefault(k, _Gap(branch.points[k:k + 2], spectra[k:k + 2]))
+    for k, part, rank in _crossings(branch, subspaces):
+        ends = branch.points[k:k + 2]
+        width = abs(ends[1].value - ends[0].value)
         try:
-            crossing = _located(gap, part, rank, exact)
+            crossing = _located(ends, subspaces[k:k + 2], part, rank, exact)
         except NoOrbit:
-            # Two curves that cross are hard to tell apart right there.
+            # Newton's method may fail where two curves cross.
             continue
-        # Both of a pair cross, and what symmetry makes alike crosses in several subspaces.
+        # Both of a pair cross, and symmetry may make multipliers of several subspaces equal.
         if crossing is not None and not any(
                 crossing.kind == other.kind
-                and np.isclose(crossing.value, other.value, 1e-7, max(1e-9, exact * gap.width))
+                and np.isclose(crossing.value, other.value, 1e-7, max(1e-9, exact * width))
                 and np.isclose(crossing.point.orbit.period, other.point.orbit.period,
                                max(1e-5, exact))
                 for other in crossings):
@@ -97,12 +96,11 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
     return tuple(crossings)
 
 
-def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
-               ) -> Iterator[tuple[int, int, int]]:
-    """Yield the number of the point before, of the subspace, and how many there are larger."""
+def _crossings(branch: Branch, spectra: list[list[np.ndarray]]) -> Iterator[tuple[int, int, int]]:
+    """Yield the index of the point before, of the subspace, and of the multiplier by its size."""
     for k, (left, right) in enumerate(pairwise(spectra)):
         for part, (old, new) in enumerate(zip(left, right, strict=True)):
-            before, after = (int((np.abs(some) > 1.0).sum()) for some in (old, new))
+            before, after = (int((np.abs(spectrum) > 1.0).sum()) for spectrum in (old, new))
             folds = {k, k + 1} & set(branch.turns)
             for rank in range(min(before, after), max(before, after)):
                 pair = old[rank], new[rank]
@@ -131,42 +129,39 @@ def _between(left: CurvePoint, right: CurvePoint, fraction: float) -> CurvePoint
                                    exact=False)
 
 
-class _Gap:
-    """The curve between two neighbouring points of a branch, solved once at each place."""
+def _located(ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]], part: int,
+             rank: int, exact: float) -> Bifurcation | None:
+    """Return the crossing of a multiplier between two points of a branch; None if there is none.
 
-    def __init__(self, ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]]) -> None:
-        self._left, self._right = (end.place for end in ends)
-        self._known = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
-        self.width = abs(ends[1].value - ends[0].value)
+    Raises:
+        NoOrbit: a point between them cannot be resolved.
 
-    def at(self, fraction: float) -> tuple[BranchPoint, list[np.ndarray]]:
-        """Return the point at a fraction of the way, with the multipliers of each subspace.
+    """
+    known = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
 
-        Raises:
-            NoOrbit: it cannot be resolved.
+    def point_at(fraction: float) -> tuple[BranchPoint, list[np.ndarray]]:
+        if fraction in known:
+            return known[fraction]
+        located = _between(ends[0].curve_point, ends[1].curve_point, fraction)
+        if located is None:
+            raise NoOrbit('no orbit between two points of a branch')
+        point = BranchPoint(located.value, located.curve.orbit(located.z), located)
+        return point, multipliers(point.orbit).subspaces
 
-        """
-        if fraction not in self._known:
-            located = _between(self._left, self._right, fraction)
-            if located is None:
-                raise NoOrbit('no orbit between two points of a branch')
-            point = BranchPoint(located.value, located.curve.orbit(located.z), located)
-            self._known[fraction] = point, multipliers(point.orbit).subspaces
-        return self._known[fraction]
-
-
-def _located(gap: _Gap, part: int, rank: int, exact: float) -> Bifurcation | None:
-    """Return the crossing between two points of a multiplier with so many that are larger."""
-    def size(fraction: float) -> float:
+    def growth(point: tuple[BranchPoint, list[np.ndarray]]) -> float:
         """Logarithm of the multiplier's modulus."""
-        return float(np.log(np.abs(gap.at(fraction)[1][part][rank])))
+        return float(np.log(np.abs(point[1][part][rank])))
 
-    if size(0.0) * size(1.0) >= 0.0:
+    if growth(point_at(0.0)) * growth(point_at(1.0)) >= 0.0:
         return None
-    point, spectrum = gap.at(float(scipy.optimize.brentq(size, 0.0, 1.0, xtol=exact)))
+    point, spectrum = arclength.locate(growth, point_at, 0.0, 1.0, exact)
     mu = complex(spectrum[part][rank])
-    if abs(mu.imag) > REAL:
-        kind, mu = 'torus', complex(mu.real, abs(mu.imag))
-    else:
-        kind = 'period doubling' if mu.real < 0.0 else 'branch point'
-    return Bifurcation(kind, point, mu, part)
+    kind = kind_of(mu)
+    return Bifurcation(kind, point, complex(mu.real, abs(mu.imag)) if kind == 'torus' else mu,
+                       part)
+
+
+def kind_of(multiplier: complex) -> str:
+    """Return the kind of bifurcation at which a multiplier crosses the unit circle."""
+    return ('torus' if abs(multiplier.imag) > REAL else
+            'period doubling' if multiplier.real < 0.0 else 'branch point')

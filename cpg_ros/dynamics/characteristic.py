@@ -14,11 +14,11 @@
 
 """Characteristic roots of a linear equation with a delay, ``h' = L0 h(t) + L1 h(t - tau)``.
 
-They are where ``Delta(lambda) = lambda - L0 - L1 exp(-lambda tau)`` is singular. Without a delay
-they are eigenvalues. With one variable ``(lambda - A) tau`` is a branch of Lambert's W at
+There ``Delta(lambda) = lambda - L0 - L1 exp(-lambda tau)`` is singular. Without a delay they are
+eigenvalues. With one variable ``(lambda - A) tau`` is a branch of Lambert's W at
 ``B tau exp(-A tau)``: ``lambda_n = A + W_n(B tau exp(-A tau)) / tau``, whose real parts fall as n
-goes from 0 to either side. With several the infinitesimal generator is discretised on Chebyshev
-points (Breda, Maset & Vermiglio 2005), and what it gives is refined by Newton's method on
+goes from 0 to either side. With several variables they are eigenvalues of the infinitesimal
+generator on Chebyshev points (Breda, Maset & Vermiglio 2005), refined by Newton's method on
 det Delta.
 """
 
@@ -28,9 +28,7 @@ import math
 import numpy as np
 import scipy
 
-# Crossings of the imaginary axis by roots of ``h' = L0 h(t) + L1 h(t - tau)``, in closed form.
-
-#: ON_CIRCLE: rounding error up to which a solution lies on the unit circle, or on the axis.
+#: Largest distance from the unit circle, and from the axis, that is due to rounding.
 ON_CIRCLE = 1e-7
 
 
@@ -88,17 +86,17 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
     return sorted(crossings, reverse=True)
 
 
-#: LARGEST: exponent beyond which exp overflows, and W is computed from a logarithm.
+#: Exponent above which exp overflows, so that W is computed from a logarithm.
 LARGEST = 690.0
-#: POINTS, MOST_POINTS: initial and largest number of Chebyshev points; RESOLVED: relative change
-#: by Newton's method up to which these points resolve a root.
+#: Chebyshev points at first and at most, and relative change by Newton's method below which a root
+#: is resolved.
 POINTS, MOST_POINTS, RESOLVED = 24, 192, 1e-6
-#: FIRST: initial number of roots in the search for all roots right of a line.
+#: Roots computed first in the search for all to the right of a line.
 FIRST = 9
 
 
 def rightmost_first(values: np.ndarray) -> np.ndarray:
-    """Sort roots by falling real part, of a pair that with positive imaginary part first."""
+    """Sort roots by falling real part; of a pair, the one with positive imaginary part first."""
     return values[np.lexsort((-values.imag, -np.round(values.real, 12)))]
 
 
@@ -110,11 +108,11 @@ def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count:
         now: L0, shape (n, n).
         past: L1, shape (n, n).
         delay: tau, model time, not negative.
-        count: how many roots to return.
-        real: whether the matrices are real, though their type be complex.
+        count: number of roots.
+        real: whether the matrices are real, whatever their type.
 
     Returns:
-        Complex numbers by falling real part, shape (count,), or fewer where there are no more.
+        Complex numbers by falling real part, shape (count,), or all if there are fewer.
 
     """
     if real:

@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Coexisting orbits of a gait, and their stability.
+"""Coexisting orbits of a gait.
 
-At one parameter set a gait may have several periodic orbits, of which the one that Newton's method
-reaches first need not be the one on which the network settles. Orbits that attract within the
-gait's symmetry class are what simulations within it settle on; unstable ones lie on the branches
-of the class's Hopf points, or are reached by Newton's method when those known are deflated.
+A gait may have several periodic orbits, and the network need not settle on the one that Newton's
+method reaches first. Simulations in the gait's symmetry class settle on orbits that attract in it;
+unstable ones lie on the branches of the class's Hopf points, or follow from deflation.
 """
 
 from collections.abc import Iterator
@@ -26,7 +25,7 @@ from dataclasses import dataclass
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
+from cpg_ros.dynamics.floquet import Multipliers, multipliers_within
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit
 from cpg_ros.dynamics.settling import find_orbit, Path, RANDOM, SIZES
@@ -36,16 +35,14 @@ import numpy as np
 
 #: MORE_RANDOM: number of random states from which a thorough search simulates.
 MORE_RANDOM = 37
-#: Relative differences up to which two solutions are one orbit, up to phase and symmetry.
-#: SAME_PERIOD: of the periods; SAME_LEVEL: of the waveforms' ranges.
+#: Relative differences of periods and of ranges below which two orbits are the same, up to phase
+#: and the network's symmetry.
 SAME_PERIOD, SAME_LEVEL = 1e-6, 1e-4
-#: Relative differences up to which a simulation has settled on a known orbit. NEAR_PERIOD: of the
-#: periods; NEAR_WAVEFORM: of the waveforms, over their range.
+#: Differences below which a simulation's cycle is an orbit that has been solved for.
 NEAR_PERIOD, NEAR_WAVEFORM = 5e-3, 0.02
-#: SCALED: starts of the deflated method: factors of a known orbit's size about its mean, and of
-#: its period.
+#: Starts of the deflated method: factors of an orbit's size about its mean, and of its period.
 SCALED = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))
-#: MOST: number of orbits of a gait at which the search ends.
+#: Orbits of a gait, at most.
 MOST = 24
 #: POINTS: points of a cycle at which waveforms are compared.
 POINTS = 120
@@ -57,8 +54,8 @@ class CoexistingOrbits(ShortRepr):
 
     Attributes:
         gait: one of the network's.
-        orbits: those that attract within the gait's class first, and of them that whose period is
-            nearest to the known one's first.
+        orbits: those that attract within the gait's class first, sorted by the distance of their
+            period from the given orbit's.
         starts: number of states in the gait's class from which simulations were run.
         hopf_points: number of Hopf points of its class whose branches were followed.
         deflated: whether Newton's method was deflated about the orbits.
@@ -88,22 +85,21 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
                       starts: bool = True, everything: bool = True) -> CoexistingOrbits:
     """Find the orbits that a gait has at one parameter set.
 
-    If the orbit that is reached first attracts within its class, only what is requested is
-    searched besides; otherwise everything is, except for branches without a delay.
+    If the first orbit does not attract within its class, all searches run, except that branches
+    without a delay are followed on request only.
 
     Args:
         network: parameters.
         gait: one of the network's gaits.
-        near: a known orbit of the gait, from which to start and to whose period the one that
-            comes first is nearest.
+        near: an orbit of the gait to start from.
         starts: simulate from states in the gait's class.
-        everything: simulate from more states and always for longer, follow the branches of the
-            class's Hopf points and deflate Newton's method about each orbit.
+        everything: simulate from more states and for longer, follow the branches of the class's
+            Hopf points and deflate Newton's method about each orbit.
 
     Raises:
         InputError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoEquilibrium: a gait that no start is known for, of a network without equilibrium.
-        NoOrbit: none was found; the message says from how many starts and Hopf points.
+        NoEquilibrium: a gait without a known start, of a network without equilibrium.
+        NoOrbit: there is none; the message says from how many starts and Hopf points.
 
     """
     check_values(network, gait)
@@ -124,12 +120,12 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
 
 
 class _Search:
-    """A search for the orbits of a gait: those known so far, and the extent of the search."""
+    """The orbits of a gait that have been found, and the extent of the search."""
 
     def __init__(self, network: Network, gait: str) -> None:
         self.network, self.gait, self.symmetry = network, gait, network.symmetry(gait)
         self.orbits: list[Orbit] = []
-        self._growth: list[float] = []
+        self._within: list[Multipliers] = []
         self.starts = self.hopf_points = 0
         self.deflated = False
 
@@ -139,7 +135,7 @@ class _Search:
             self.add(solve_orbit(self.network, self.gait, near))
         except NoOrbit as error:
             if not self.network.delay_parameter:
-                # It has been left to settle from the usual starts.
+                # The solver has simulated from these starts.
                 self.starts = len(SIZES) + RANDOM
             return str(error)
         return ''
@@ -147,29 +143,29 @@ class _Search:
     @property
     def attracting(self) -> bool:
         """Whether an orbit is known that attracts within its class."""
-        return any(growth < ATTRACTS for growth in self._growth)
+        return any(spectrum.attracts for spectrum in self._within)
 
     def result(self, near: Orbit | None) -> CoexistingOrbits:
         nearest = near or (self.orbits[0] if self.orbits else None)
         order = sorted(range(len(self.orbits)), key=lambda k: (
-            self._growth[k] >= ATTRACTS,
+            not self._within[k].attracts,
             0.0 if nearest is None else abs(np.log(self.orbits[k].period / nearest.period))))
         return CoexistingOrbits(self.gait, tuple(self.orbits[k] for k in order), self.starts,
                                 self.hopf_points, self.deflated)
 
     def add(self, orbit: Orbit | None) -> bool:
-        """Add an orbit unless it is known or has more symmetry; tell whether it is new."""
+        """Add an orbit that is new and has no more symmetry; return whether it was added."""
         if orbit is None or extra_symmetry(orbit) or any(
                 _same(orbit, other) for other in self.orbits):
             return False
         self.orbits.append(orbit)
-        self._growth.append(leading_within(orbit))
+        self._within.append(multipliers_within(orbit))
         return True
 
     def simulate(self, random: int, longer: bool) -> None:
         """Simulate the network from many states in the gait's class until it settles.
 
-        Those that take long are waited for while nothing that attracts is known, or with longer.
+        Slow runs continue while no orbit attracts, or with longer.
         """
         try:
             for path, period in find_orbit(self.network, self.gait, random,
@@ -178,7 +174,7 @@ class _Search:
                         _near(path, period, orbit) for orbit in self.orbits):
                     self.add(solve_from_path(self.network, self.symmetry, path, period))
         except NoEquilibrium:
-            # About which the starts would be.
+            # The starts lie about the equilibrium.
             return
         self.starts = len(SIZES) + random
 
@@ -191,7 +187,7 @@ class _Search:
                     self.add(orbit)
 
     def deflate(self) -> None:
-        """Deflate Newton's method about all known orbits until it finds no more."""
+        """Deflate Newton's method about all orbits until it finds no more."""
         self.deflated = True
         todo = list(self.orbits)
         while todo:
@@ -214,20 +210,20 @@ def _scaled(orbit: Orbit) -> Iterator[tuple[Path, float]]:
 
 
 def _levels(orbit: Orbit) -> np.ndarray:
-    """Ranges of the waveforms in an order that no symmetry changes, shape (waves, 2 variables)."""
+    """Ranges of the waveforms, sorted, shape (waves, 2 variables)."""
     rows = orbit.levels.reshape(len(orbit.levels), -1)
     return rows[np.lexsort(rows.round(6).T)]
 
 
-def _same(one: Orbit, other: Orbit) -> bool:
-    if abs(one.period / other.period - 1.0) > SAME_PERIOD:
+def _same(orbit: Orbit, other: Orbit) -> bool:
+    if abs(orbit.period / other.period - 1.0) > SAME_PERIOD:
         return False
-    a, b = _levels(one), _levels(other)
+    a, b = _levels(orbit), _levels(other)
     return bool(np.abs(a - b).max() < SAME_LEVEL * np.abs(a).max())
 
 
 def _near(path: Path, period: float, orbit: Orbit) -> bool:
-    """Whether the cycle of a simulation is an orbit that has already been solved for."""
+    """Whether the cycle of a simulation is an orbit that has been solved for."""
     if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
         return False
     theta = np.arange(POINTS) / POINTS

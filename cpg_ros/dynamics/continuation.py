@@ -12,35 +12,37 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Branches of periodic orbits: a gait followed along a line of parameters, past its folds.
+"""Branches of periodic orbits along a line of parameters, past folds.
 
-A branch says over which range of parameters a gait exists, where two orbits of it coexist, and
-how it ends: at a Hopf point of the rest state, where its amplitude falls to zero, at an orbit of
-more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends of the range.
+A branch shows over which range of parameters a gait exists, where two orbits coexist, and how it
+ends: at a Hopf point, at an orbit of more symmetry, near a homoclinic orbit, where the period has
+no bound, or at the ends of the range.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypedDict, Unpack
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import CurvePoint, NoOrbit
+from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-# How branches of orbits end, and where: what lies beyond the last orbit is extrapolated.
+# The ends of branches, extrapolated beyond the last orbit.
 
-#: A branch that is no longer resolved ends at an orbit of unbounded period if the period has grown
-#: by the factor GROWN, and the value changes by less than STILL of its scale per period.
+#: A branch ends near a homoclinic orbit if its period has grown by this factor while the value
+#: changes by less than this fraction of its scale per period.
 GROWN, STILL = 3.0, 1e-2
-#: It has also ended there if, in a step, the period grows by more than the share LONGER while the
-#: value changes by less than ROUNDING of its scale.
+#: The period grows alone in a step in which it grows by this fraction while the value changes by
+#: less than this fraction of its scale.
 LONGER, ROUNDING = 0.01, 1e-9
-#: STEEPER: power of the period's inverse from which on the fall of the value's slope counts as
-#: exponential (homoclinic); near a saddle-node the power is 3.
+#: Near a saddle-node the slope of the value falls as the period to the power -3; a fall from this
+#: power on is taken for an exponential one.
 STEEPER = 4.0
 
 
@@ -49,13 +51,13 @@ class BranchEnd:
     """The end of a branch and its reason.
 
     Attributes:
-        why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (it runs into an
-            orbit that has more of it, where it turns back as its own mirror image), 'period'
-            (it grows without bound: near a homoclinic orbit), 'bound' (an end of the range),
-            'steps', 'steep' (the waveform cannot be resolved), 'lost' (Newton's method fails
-            however short the step), 'start' (it was not followed that way).
-        value: where; of a Hopf point extrapolated to amplitude 0, of 'period' to no period.
-        period: at the Hopf point; else that of the last orbit.
+        why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (an orbit with more
+            symmetry, where the branch meets its own mirror image), 'period' (it grows without
+            bound: near a homoclinic orbit), 'bound' (an end of the range), 'steps', 'steep' (the
+            waveform cannot be resolved), 'lost' (Newton's method fails with the shortest step),
+            'start' (the branch was not followed in this direction).
+        value: of the parameter; extrapolated for 'rest' and 'period'.
+        period: at the Hopf point; otherwise that of the last orbit.
 
     """
 
@@ -73,7 +75,7 @@ class BranchEnd:
 
 
 def grows_alone(values: np.ndarray, periods: np.ndarray, scale: float) -> bool:
-    """Whether from one point to the next the period grows and the value no longer moves."""
+    """Whether between two points the period grows and the value no longer changes."""
     return bool(len(values) > 1 and abs(np.diff(periods)) > LONGER * periods[0]
                 and abs(np.diff(values)) < ROUNDING * scale)
 
@@ -93,7 +95,7 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     if not abs(slopes[-1]) * periods[-1] < STILL * scale:
         return None
     if _winds(slopes):
-        # The value spirals in, in ever smaller turns: the last one is the best estimate.
+        # In ever smaller windings: the last value is the best estimate.
         return float(values[-1])
     fall = np.log(slopes[0] / slopes[2])
     power = fall / np.log(middle[2] / middle[0])
@@ -129,8 +131,7 @@ def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
 
 def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the value by the period between the last four points, and periods there."""
-    return (np.diff(values[-4:]) / np.diff(periods[-4:]),
-            0.5 * (periods[-4:-1] + periods[-3:]))
+    return (np.diff(values[-4:]) / np.diff(periods[-4:]), 0.5 * (periods[-4:-1] + periods[-3:]))
 
 
 def _winds(slopes: np.ndarray) -> bool:
@@ -147,15 +148,15 @@ class BranchPoint(ShortRepr):
     """A point of a branch.
 
     Attributes:
-        value: where on the line.
+        value: of the parameter.
         orbit: of the network there. At a fold its derivatives by parameters have no bound.
-        place: the same as continuation has it, with the tangent along the branch.
+        curve_point: the same as a point of the continuation, with the tangent along the branch.
 
     """
 
     value: float
     orbit: Orbit
-    place: CurvePoint
+    curve_point: CurvePoint
 
     def _summary(self) -> str:
         return f'{self.value:.6g}, {self.orbit!r}'
@@ -172,9 +173,9 @@ class Branch(ShortRepr):
 
     Attributes:
         along: the line.
-        points: in the order in which they follow one another on the branch.
-        turns: which of them are folds.
-        ends: of the branch, before the first point and after the last.
+        points: in their order on the branch.
+        turns: indices of the folds.
+        ends: before the first point and after the last.
 
     """
 
@@ -210,10 +211,10 @@ class Branch(ShortRepr):
         return np.array([point.amplitude for point in self.points])
 
     def at(self, value: float) -> tuple[Orbit, ...]:
-        """All orbits of the branch at a value, in its order; at a fold it may be one or two.
+        """All orbits of the branch at a value, in its order; at a fold one or two.
 
         Raises:
-            NoOrbit: between two points that the value lies between, Newton's method found none.
+            NoOrbit: Newton's method fails between two points.
 
         """
         points = []
@@ -221,10 +222,10 @@ class Branch(ShortRepr):
             if left.value == value:
                 points.append(left.orbit)
             elif (left.value - value) * (right.value - value) < 0.0:
-                # Start from the end nearer to a fold, from which the value's rate grows.
-                located = (arclength.next_crossing(left.place, 1.0, value)
-                           if abs(left.place.rate) < abs(right.place.rate) else
-                           arclength.next_crossing(right.place, -1.0, value))
+                # From the end that is nearer to a fold.
+                located = (arclength.next_crossing(left.curve_point, 1.0, value)
+                           if abs(left.curve_point.rate) < abs(right.curve_point.rate) else
+                           arclength.next_crossing(right.curve_point, -1.0, value))
                 if located is None:
                     raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
                 points.append(_point(located).orbit)
@@ -233,22 +234,35 @@ class Branch(ShortRepr):
         return tuple(points)
 
 
-def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: float, *,
-                   first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
-                   most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
-    """Follow a gait's orbit along a line of parameters, past folds.
+class StepLimits(TypedDict, total=False):
+    """Limits of a continuation.
 
-    Args:
-        orbit: of a network on the line; its gait's symmetry is kept.
-        along: the line, or its text: 'tau', 'alpha=-beta', or a group of the network.
-        low: least value, in the parameter's unit.
-        high: greatest value, in the parameter's unit.
+    Attributes:
         first_step: arclength of the first step. States count as they are, the period against
             the first one's, the value against high - low.
         longest_step: arclength of any step.
-        most: number of points in each direction, at most.
+        most: points in each direction.
+        longest: period at which the branch ends, over the first one's; by default 20.
+
+    """
+
+    first_step: float
+    longest_step: float
+    most: int
+    longest: float
+
+
+def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: float, *,
+                   both: bool = True, **limits: Unpack[StepLimits]) -> Branch:
+    """Follow a gait's orbit along a line of parameters, past folds.
+
+    Args:
+        orbit: of a network on the line; the symmetry of its gait is kept.
+        along: the line, or its text: 'tau', 'alpha=-beta', or a group of the network.
+        low: least value, in the parameter's unit.
+        high: greatest value, in the parameter's unit.
         both: also in the direction in which the value falls at first; its points come first.
-        longest: period at which the branch ends, as a ratio to the first one's.
+        **limits: first_step, longest_step, most and longest; see StepLimits.
 
     Raises:
         InputError: no such parameter, the orbit's network is not on the line or not in the
@@ -266,96 +280,69 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     if start is None:
         raise NoOrbit(f"Newton's method fails at the orbit given, {along} {value:g}")
     start = start if start.rate >= 0.0 else start.reversed()
-    limits = (low, high, longest * orbit.period)
-    steps = {'first_step': first_step, 'longest_step': longest_step, 'most': most}
-    points, turns, end = _run(start, limits, steps)
+    points, turns, end = _run(start, low, high, orbit.period, limits)
     before: list[BranchPoint] = []
     back: list[int] = []
     begin = BranchEnd('start', value, orbit.period)
     if both:
-        before, back, begin = _run(start.reversed(), limits, steps)
-    here = _point(start)
+        before, back, begin = _run(start.reversed(), low, high, orbit.period, limits)
     n = len(before)
-    earlier = [replace(point, place=point.place.reversed()) for point in reversed(before)]
-    return Branch(along, (*earlier, here, *points),
+    earlier = [replace(point, curve_point=point.curve_point.reversed())
+               for point in reversed(before)]
+    return Branch(along, (*earlier, _point(start), *points),
                   (*(n - 1 - k for k in reversed(back)), *(n + 1 + k for k in turns)),
                   (begin, end))
 
 
-def continue_from_hopf(network: Network, symmetry: Symmetry, omega: float,
-                       along: ParameterLine, low: float, high: float, *,
-                       rest: np.ndarray | None = None, vector: np.ndarray | None = None,
-                       amplitude: float = 0.02, first_step: float = arclength.FIRST,
-                       longest_step: float = arclength.LONGEST, most: int = 200,
-                       longest: float = 20.0) -> Branch:
+def continue_from_hopf(point: HopfPoint, along: ParameterLine, low: float, high: float, *,
+                       amplitude: float = 0.02, **limits: Unpack[StepLimits]) -> Branch:
     """Follow the orbits that bifurcate at a Hopf point, whichever side of it they are on.
 
     The first orbit has a given amplitude and the value that goes with it, which near the Hopf
     point is better conditioned than the reverse.
 
     Args:
-        network: at the Hopf point.
-        symmetry: of the critical class.
-        omega: its angular frequency, rad per model time.
+        point: the Hopf point.
         along: the line.
         low: least value.
         high: greatest value.
-        rest: equilibrium, shape (components,); by default 0.
-        vector: critical eigenvector, complex, shape (components,); by default that of cells with
-            one variable, which their phases give.
         amplitude: of the first orbit.
-        first_step: arclength of the first step, as in continue_orbit.
-        longest_step: arclength of any step.
-        most: points, at most.
-        longest: period, over that of the Hopf point, at which the branch ends.
+        **limits: as in continue_orbit.
 
     Raises:
-        InputError: the network is not on the line or not in the range, the line breaks the
-            gait's symmetry, or the eigenvector does not have it.
+        InputError: the network is not on the line or not in the range, or the line breaks the
+            gait's symmetry.
         NoOrbit: Newton's method finds no orbit of this amplitude.
 
     """
-    _check(network, symmetry, along, low, high)
-    value, period = along.value(network), float(2.0 * np.pi / omega)
-    rest = np.zeros(network.components) if rest is None else rest
-    if vector is None:
-        if network.variables > 1:
-            raise InputError(f'with {network.variables} variables a cell, a Hopf point needs the '
-                             'stand and the eigenvector')
-        vector = np.exp(2j * np.pi * symmetry.phases)
     # Cell 1 peaks at phase 0.
-    vector = vector / vector[0]
-    _check_vector(vector, symmetry, network)
+    vector, period = point.eigenvector / point.eigenvector[0], float(2.0 * np.pi / point.omega)
     branch = continue_from_disturbance(
-        network, symmetry, along, low, high, lambda theta: np.tile(rest, (theta.size, 1)),
+        point.network, point.block.symmetry, along, low, high,
+        lambda theta: np.tile(point.state, (theta.size, 1)),
         lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
-        amplitude=amplitude, first_step=first_step, longest_step=longest_step, most=most,
-        longest=longest)
-    return replace(branch, ends=(BranchEnd('rest', value, period), branch.ends[1]))
+        amplitude=amplitude, **limits)
+    begin = BranchEnd('rest', along.value(point.network), period)
+    return replace(branch, ends=(begin, branch.ends[1]))
 
 
 def continue_from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine,
                               low: float, high: float, path: Callable[[np.ndarray], np.ndarray],
                               disturbance: Callable[[np.ndarray], np.ndarray], period: float, *,
-                              amplitude: float = 0.02, first_step: float = arclength.FIRST,
-                              longest_step: float = arclength.LONGEST, most: int = 200,
-                              longest: float = 20.0) -> Branch:
-    """Follow the orbits that leave a state or another orbit, on whichever side of it they are.
+                              amplitude: float = 0.02, **limits: Unpack[StepLimits]) -> Branch:
+    """Follow the orbits that branch off a state or another orbit, on whichever side they are.
 
     Args:
-        network: at the place.
-        symmetry: of the orbits that leave.
+        network: at the bifurcation.
+        symmetry: of the new orbits.
         along: the line.
         low: least value.
         high: greatest value.
-        path: states of what they leave, shape (m, components), over times in cycles.
-        disturbance: the direction in which they leave it, the same.
-        period: at the place, model time.
-        amplitude: share of the disturbance in the first orbit.
-        first_step: arclength of the first step, as in continue_orbit.
-        longest_step: arclength of any step.
-        most: points, at most.
-        longest: period, over that at the place, at which the branch ends.
+        path: states of the old solution, shape (m, components), over times in cycles.
+        disturbance: critical disturbance of it, the same.
+        period: at the bifurcation, model time.
+        amplitude: factor of the disturbance in the first orbit.
+        **limits: as in continue_orbit.
 
     Raises:
         InputError: the network is not on the line or not in the range, or the line breaks the
@@ -370,45 +357,34 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
-    points, turns, end = _run(start, (low, high, longest * period), {
-        'first_step': first_step, 'longest_step': longest_step, 'most': most})
-    here = _point(start)
-    return Branch(along, (here, *points), tuple(1 + k for k in turns),
+    points, turns, end = _run(start, low, high, period, limits)
+    return Branch(along, (_point(start), *points), tuple(1 + k for k in turns),
                   (BranchEnd('start', value, period), end))
-
-
-def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> None:
-    blocks = np.arange(network.variables)[:, None] * network.cells
-    for name, shift in symmetry.shifts:
-        image = (np.array(symmetry.group.elements[name]) + blocks).ravel()
-        turned = vector[image] - vector * np.exp(2j * np.pi * float(shift))
-        if not np.abs(turned).max() <= 1e-6 * np.abs(vector).max():
-            raise InputError(f'the eigenvector does not have the symmetry: {name} shifts it by '
-                             f'something else than {shift}')
 
 
 def _point(located: CurvePoint) -> BranchPoint:
     return BranchPoint(located.value, located.curve.orbit(located.z), located)
 
 
-def _course(points: list[BranchPoint]) -> tuple[np.ndarray, np.ndarray]:
+def _values_and_periods(points: list[BranchPoint]) -> tuple[np.ndarray, np.ndarray]:
     """Values and periods, each of shape (points,)."""
     return (np.array([point.value for point in points]),
             np.array([point.orbit.period for point in points]))
 
 
-def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
+def _run(start: CurvePoint, low: float, high: float, period: float, limits: StepLimits
          ) -> tuple[list[BranchPoint], list[int], BranchEnd]:
-    """Follow in one direction: the points after start, which are folds, and the end."""
-    low, high, longest = limits
+    """Follow in one direction: the points after start, the indices of folds, and the end."""
+    steps: dict = {**limits}
+    longest = steps.pop('longest', 20.0) * period
     points: list[BranchPoint] = []
 
-    def visit(origin: CurvePoint) -> str:
-        points.append(_point(origin))
+    def visit(located: CurvePoint) -> str:
+        points.append(_point(located))
         orbit = points[-1].orbit
-        if origin.amplitude < REST:
+        if located.amplitude < REST:
             return 'rest'
-        if orbit.period > longest or grows_alone(*_course(points[-2:]), high - low):
+        if orbit.period > longest or grows_alone(*_values_and_periods(points[-2:]), high - low):
             return 'period'
         return 'symmetry' if extra_symmetry(orbit) else ''
 
@@ -416,13 +392,13 @@ def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
     last = points[-1] if points else _point(start)
     value, period = last.value, last.orbit.period
     if why in ('period', 'steep', 'lost'):
-        limit = without_period(*_course(points), high - low)
+        limit = without_period(*_values_and_periods(points), high - low)
         why, value = ('period', limit) if limit is not None else (why, value)
     if why == 'rest':
         # Near a Hopf point value and period are linear in the square of the amplitude.
         before = points[-2] if len(points) > 1 else _point(start)
-        size = last.place.amplitude**2
-        fraction = size / (before.place.amplitude**2 - size)
+        size = last.curve_point.amplitude**2
+        fraction = size / (before.curve_point.amplitude**2 - size)
         value += fraction * (value - before.value)
         period += fraction * (period - before.orbit.period)
     return points, turns, BranchEnd(why, value, period)

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Equilibria at which all cells are equal: the stand of a network.
+"""Equilibria at which all cells are equal.
 
-Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are those
-of one cell that is its own input. Where its rates are linear in all variables but one, x, they are
-``f0(x) + F1(x) y``, couplings included, and equilibria are roots of ``det(f0, F1)`` in x, which
-has no poles.
+Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are the
+equilibria of a cell that is its own input. Where its rates are linear in all variables but one, x,
+they are ``f0(x) + F1(x) y``, couplings included, and equilibria are roots of ``det(f0, F1)`` in x,
+which has no poles.
 """
 
 from collections.abc import Iterator
@@ -30,29 +30,27 @@ from cpg_ros.networks.equations import equations_of, Field
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: GRID: values of x at which equilibria are searched for: densely where the cell's functions bend,
-#: and far out, _FAR.
+#: Grid of x on which equilibria are searched: dense where the cell's functions bend.
 _FAR = np.geomspace(3.0, 100.0, 400)[1:]
 GRID = np.concatenate([-_FAR[::-1], np.linspace(-3.0, 3.0, 2001), _FAR])
-#: STARTS: number of initial states if the rates are not linear in all variables but one.
+#: Start states where there is no such x.
 STARTS = 400
-#: LONGEST: longest change of the state in a step along a branch, over its size; MISS: largest
-#: difference of a solution from its prediction, likewise.
+#: Largest relative change of the state in a step, and relative error of its prediction.
 LONGEST, MISS = 0.1, 0.01
-#: FURTHEST: size of a state beyond which an equilibrium has gone to infinity.
+#: Size at which an equilibrium has gone to infinity.
 FURTHEST = 1e3
-#: SHORTEST: shortest step of the share of the coupling; if it fails, the branch ends in a fold.
+#: Shortest step of the coupling fraction; a shorter one means a fold.
 SHORTEST = 1e-5
 
 
 class NoEquilibrium(CpgError):
-    """The stand cannot be followed from the uncoupled cells to these couplings."""
+    """The equilibrium cannot be continued from the uncoupled cells to these couplings."""
 
 
 class Quotient(Field[Network]):
-    """A network in which all cells are alike: a cell that is its own input, now as a delay ago.
+    """A network in which all cells are equal: a cell that is its own input, now and a delay ago.
 
-    Of the parameters that each cell has of its own, the first cell's stand for all.
+    The first cell's values count for parameters that each cell has of its own.
     """
 
     def __init__(self, network: Network) -> None:
@@ -63,16 +61,14 @@ class Quotient(Field[Network]):
         self._coupled = [equations.by_cell.get(row, (row,))[0] in network.couplings
                          for row in equations.rows]
 
-    def set_share(self, fraction: float) -> None:
-        """Set the factor of all couplings, 0 to 1."""
+    def set_coupling(self, fraction: float) -> None:
+        """Multiply all couplings by a fraction."""
         self._p = [fraction * value if coupled else value
                    for value, coupled in zip(self._whole, self._coupled, strict=True)]
 
     def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates, (..., variables), and their Jacobian, if all cells move together."""
         equations = self._equations
-        # For a single state these are plain numbers, with which equations take a third of the
-        # time.
         variables = np.moveaxis(states, -1, 0)
         rates, slopes = equations.slopes(
             [variables[argument.variable] for argument in equations.arguments], self._p)
@@ -84,7 +80,7 @@ class Quotient(Field[Network]):
         return out, jacobian
 
     def push(self, state: np.ndarray) -> np.ndarray:
-        """Return the derivative of the rates by the share of the couplings, shape (variables,)."""
+        """Return the derivative of the rates by the coupling fraction, shape (variables,)."""
         out = np.zeros(state.size)
         slopes = self._equations.by_parameter(self._arguments(state, None), self._p)
         for (v, r), slope in slopes.items():
@@ -94,24 +90,10 @@ class Quotient(Field[Network]):
 
     def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
         """Solve for an equilibrium near a state; None where there is none."""
-        size = np.inf
-        with np.errstate(all='ignore'):
-            for _ in range(most):
-                rates, slope = self.together(state)
-                try:
-                    move = np.linalg.solve(slope, rates)
-                except np.linalg.LinAlgError:
-                    return None
-                state = state - move
-                size = np.abs(move).max() / (1.0 + np.abs(state).max())
-                if not size < 1e3:
-                    return None
-                if size < 1e-14:
-                    break
-        return state if size < 1e-11 else None
+        return next(iter(self.newton_from_all(state[None], most)), None)
 
     def newton_from_all(self, states: np.ndarray, most: int = 50) -> np.ndarray:
-        """Return the equilibria that Newton's method reaches from states, shape (n, variables)."""
+        """Return the equilibria that newton reaches from states, shape (n, variables)."""
         arrived = [states[:0]]
         sizes = np.full(len(states), np.inf)
         with np.errstate(all='ignore'):
@@ -175,13 +157,13 @@ def equilibria(network: Network) -> np.ndarray:
 
 @cache
 def _scanned(network: type[Network]) -> int | None:
-    """Return a variable x such that the rates are linear in all others, or None."""
+    """Return the index of a variable x such that the rates are linear in all others, or None."""
     equations = equations_of(network)
     with np.errstate(all='ignore'):
-        # Only which derivatives there are matters, not where.
+        # Only the pattern of the derivatives matters.
         second = equations.second([np.array(0.0)] * len(equations.arguments),
                                   [np.array(1.0)] * len(equations.rows))
-    pairs = [{equations.arguments[k].variable for k in places} for _, *places in second]
+    pairs = [{equations.arguments[k].variable for k in indices} for _, *indices in second]
     return next((x for x in range(network.variables) if all(x in pair for pair in pairs)), None)
 
 
@@ -217,15 +199,13 @@ def _scattered(n: int) -> np.ndarray:
 
 
 def equilibrium(network: Network) -> np.ndarray:
-    """Find the equilibrium that the uncoupled cells' becomes, a cell's state, shape (variables,).
+    """Find the equilibrium that continues that of the uncoupled cells, shape (variables,).
 
-    It is followed while all couplings grow from 0 to their values (Buono & Golubitsky 2001,
-    proposition 5.1). Where coupling is diffusive it stays where it is; with the symmetry x -> -x
-    it is 0.
+    All couplings grow from 0 to their values (Buono & Golubitsky 2001, proposition 5.1). With
+    diffusive coupling it does not move; with the symmetry x -> -x it is 0.
 
     Raises:
-        NoEquilibrium: it is lost in a fold on the way, or the uncoupled cell has several
-            equilibria, or none.
+        NoEquilibrium: it ends in a fold, or the uncoupled cell has several equilibria, or none.
         InputError: a parameter is not finite.
 
     """
@@ -238,26 +218,26 @@ def equilibrium(network: Network) -> np.ndarray:
     if rest is not None:
         return rest
     cell = Quotient(network)
-    cell.set_share(0.0)
+    cell.set_coupling(0.0)
     state = _uncoupled(replace(  # type: ignore[type-var]
         network, **dict.fromkeys(network.couplings, 0.0)))
     fraction, step, grow = 0.0, 0.25, 2.0
     slope = cell.together(state)[1]
     while fraction < 1.0:
         step = min(step, 1.0 - fraction)
-        way = -step * np.linalg.solve(slope, cell.push(state))
+        change = -step * np.linalg.solve(slope, cell.push(state))
         size, new = 1.0 + np.abs(state).max(), None
-        cell.set_share(fraction + step)
-        if np.abs(way).max() <= LONGEST * size:
-            new = cell.newton(state + way)
+        cell.set_coupling(fraction + step)
+        if np.abs(change).max() <= LONGEST * size:
+            new = cell.newton(state + change)
         ahead = slope if new is None else cell.together(new)[1]
         # Beyond a fold the determinant has the other sign.
-        if (new is not None and np.abs(new - state - way).max() <= MISS * size
+        if (new is not None and np.abs(new - state - change).max() <= MISS * size
                 and np.linalg.det(ahead) * np.linalg.det(slope) > 0.0):
             state, slope = new, ahead
             fraction, step, grow = fraction + step, grow * step, 2.0
         else:
-            cell.set_share(fraction)
+            cell.set_coupling(fraction)
             step, grow = 0.5 * step, 1.0
         if step < SHORTEST < 1.0 - fraction or size > FURTHEST:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'

@@ -12,57 +12,74 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Floquet multipliers of a gait: the factors of small disturbances over a period.
+"""Floquet multipliers of a gait: the factors by which small disturbances grow in a period.
 
 They split into those within the gait's symmetry class, 1 among them, and those transverse to it,
-which the symmetry lock -g (I - P) x shrinks and nothing else does.
+which only the symmetry lock -g (I - P) x damps.
 """
 
 from dataclasses import dataclass
 
 from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics.fourier.floquet import Accuracy, EXACT
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method
 import numpy as np
 import scipy
 
-#: ATTRACTS: modulus of a multiplier below which it is distinguishable from 1.
+#: A multiplier above this is not distinguished from 1.
 ATTRACTS = 1.0 - 1e-7
-#: GAINS: number of gains between 0 and the bound among which the smallest sufficient one is
-#: sought.
+#: Gains at which the growth is computed in the search for the smallest sufficient one.
 GAINS = 8
-#: ROUGHLY: error of the growth during that search.
+#: Error of the growth during that search.
 ROUGHLY = 1e-4
 #: MOST_GAINS: number of gains that are tried where no bound is known.
 MOST_GAINS = 40
+#: Names of the values of stable().
+VERDICTS = {True: 'stable', False: 'unstable', None: 'cannot tell'}
+
+
+def stable(modulus: float, error: float = 0.0) -> bool | None:
+    """Whether a disturbance with a multiplier decays; None if the multiplier is 1 to the error.
+
+    Args:
+        modulus: of the multiplier.
+        error: of the modulus; 1e-7 at least is assumed.
+
+    """
+    error = max(error, 1.0 - ATTRACTS)
+    return None if abs(modulus - 1.0) <= error else modulus < 1.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Multipliers(ShortRepr):
     """Floquet multipliers of an orbit over a period, largest first.
 
-    With a delay there are infinitely many; those that decay to nothing are rounding.
+    A delay gives infinitely many; those that decay to nothing are rounding errors.
 
     Attributes:
         period: T in model time.
         gain: of the symmetry lock, 1/model time.
         within: in the gait's symmetry class, without the trivial one.
-        transverse: outside of it.
-        trivial: the one along the orbit, 1 but for the error of the computation.
-        parts: those transverse again, of each subspace that the flow keeps apart from others.
+        trivial: the multiplier along the orbit, 1 up to the numerical error.
+        parts: the transverse ones of each subspace that the flow keeps apart.
 
     """
 
     period: float
     gain: float
     within: np.ndarray
-    transverse: np.ndarray
     trivial: complex
     parts: tuple[np.ndarray, ...] = ()
 
     @property
+    def transverse(self) -> np.ndarray:
+        """Those outside the class."""
+        return by_size(np.concatenate([np.zeros(0), *self.parts]))
+
+    @property
     def subspaces(self) -> list[np.ndarray]:
-        """Multipliers of the class, without the trivial one, and of each part; largest first."""
+        """Those of the class without the trivial one, then those of each transverse subspace."""
         return [by_size(part) for part in (self.within, *self.parts)]
 
     def _summary(self) -> str:
@@ -80,38 +97,50 @@ class Multipliers(ShortRepr):
         return float(np.abs(self.transverse).max(initial=0.0))
 
     @property
+    def leading(self) -> float:
+        """Modulus of the largest but the trivial one."""
+        return max(self.leading_within, self.leading_transverse)
+
+    @property
+    def unstable(self) -> int:
+        """Number of multipliers that are not inside the unit circle, without the trivial one."""
+        return sum(int((np.abs(part) >= ATTRACTS).sum()) for part in (self.within, *self.parts))
+
+    @property
     def error(self) -> float:
         """Distance of the trivial multiplier from 1, an estimate of the error of the others."""
         return abs(self.trivial - 1.0)
 
     @property
-    def attracts(self) -> bool:
-        """Whether all disturbances decay; neutral ones, as of uncoupled rings, do not."""
-        return self.leading < ATTRACTS
+    def attracts(self) -> bool | None:
+        """Whether all disturbances decay; None if the largest multiplier is 1 to the error."""
+        return stable(self.leading, self.error)
 
     @property
-    def leading(self) -> float:
-        """Modulus of the largest but the trivial one: the gait attracts if it is below 1."""
-        return max(self.leading_within, self.leading_transverse)
+    def attracts_within(self) -> bool | None:
+        """Whether all disturbances within the class decay; None as for attracts."""
+        return stable(self.leading_within, self.error)
 
 
-def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
+def multipliers(orbit: Orbit, gain: float = 0.0, accuracy: Accuracy = EXACT) -> Multipliers:
     """Compute the multipliers from the variational equation along the orbit.
 
     Args:
         orbit: of any network.
         gain: of a symmetry lock, 1/model time.
+        accuracy: with a delay; by default all multipliers, as exactly as possible.
 
     """
-    rest, trivial = orbit_method(orbit.network).floquet.within(orbit)
-    parts = orbit_method(orbit.network).floquet.transverse(orbit, gain)
-    return Multipliers(orbit.period, gain, by_size(rest),
-                       by_size(np.concatenate([np.zeros(0), *parts])), trivial, parts)
+    floquet = orbit_method(orbit.network).floquet
+    within, trivial = floquet.within(orbit, accuracy)
+    return Multipliers(orbit.period, gain, by_size(within), trivial,
+                       floquet.transverse(orbit, gain, accuracy))
 
 
-def leading_within(orbit: Orbit) -> float:
-    """Return the modulus of the leading multiplier within the class but the trivial one."""
-    return float(np.abs(orbit_method(orbit.network).floquet.within(orbit)[0]).max(initial=0.0))
+def multipliers_within(orbit: Orbit) -> Multipliers:
+    """Compute the multipliers within the gait's class only."""
+    within, trivial = orbit_method(orbit.network).floquet.within(orbit, EXACT)
+    return Multipliers(orbit.period, 0.0, by_size(within), trivial)
 
 
 def by_size(values: np.ndarray) -> np.ndarray:
@@ -119,14 +148,15 @@ def by_size(values: np.ndarray) -> np.ndarray:
     return values[np.argsort(-np.abs(values), kind='stable')]
 
 
-def attracts_with(orbit: Orbit, gain: float) -> bool:
-    """Whether all disturbances decay with a symmetry lock of this gain, 1/model time."""
-    if leading_within(orbit) >= ATTRACTS:
-        return False
-    rough = _largest_outside(orbit, gain, ROUGHLY)
-    # Only near the edge does it matter by how much.
-    return (rough if abs(rough - ATTRACTS) > 10.0 * ROUGHLY
-            else _largest_outside(orbit, gain)) < ATTRACTS
+def attracts_with(orbit: Orbit, gain: float) -> bool | None:
+    """Whether all disturbances decay with a symmetry lock, gain in 1/model time; None as above."""
+    inside = multipliers_within(orbit)
+    if not inside.attracts:
+        return inside.attracts
+    largest = _largest_outside(orbit, gain, ROUGHLY)
+    if abs(largest - ATTRACTS) <= 10.0 * ROUGHLY:
+        largest = _largest_outside(orbit, gain)
+    return stable(largest, inside.error)
 
 
 def _largest_outside(orbit: Orbit, gain: float, exact: float = 1e-10) -> float:
@@ -143,7 +173,7 @@ def smallest_gain(orbit: Orbit) -> float:
     if not orbit.network.delay:
         # Transverse multipliers shrink by exp(-g T) exactly.
         return max(0.0, growth(0.0) / orbit.period)
-    # With a delay a lock need not help evenly: from one that is enough downward.
+    # With a delay the growth need not fall evenly with the gain: search downward.
     enough = sufficient_gain(orbit, 0.0)
     for gain in enough * np.arange(GAINS - 1, -1, -1) / GAINS:
         if growth(gain, ROUGHLY) >= -ROUGHLY:
@@ -158,8 +188,8 @@ def smallest_gain(orbit: Orbit) -> float:
 def sufficient_gain(orbit: Orbit, rate: float) -> float:
     """Return a symmetry gain with which transverse disturbances decay at a rate, 1/model time.
 
-    The network's own bound, which holds in any state of it, also while one gait gives way to
-    another; or, where none is known, from the orbit's multipliers.
+    It is the network's own bound, which holds in any state, also during a change of gait; where
+    the network has none, it follows from the orbit's multipliers.
     """
     bound = orbit.network.sufficient_gain(rate)
     if bound is not None:

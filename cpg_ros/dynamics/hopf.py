@@ -50,11 +50,10 @@ from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network, ParameterLine
 import numpy as np
 
-# The normal form of a Hopf bifurcation: ``z' = (i omega + k1 mu) z + k2 z |z|^2``.
 
 @dataclass(frozen=True)
 class NormalForm:
-    """Coefficients of the normal form in the units of its own time.
+    """Coefficients of the normal form ``z' = (i omega + k1 mu) z + k2 z |z|^2`` in its own time.
 
     Attributes:
         k1: derivative of the critical eigenvalue by the parameter.
@@ -67,15 +66,15 @@ class NormalForm:
 
     @property
     def degenerate(self) -> bool:
-        """Whether the cubic coefficient vanishes, Re k2 = 0, so that it does not decide."""
+        """Whether the cubic coefficient vanishes, Re k2 = 0."""
         return self.k2.real == 0.0
 
     @property
     def supercritical(self) -> bool:
         """Whether the orbits attract on the centre manifold: k2 < 0.
 
-        They then lie where rest is unstable. Liu & Zhang (2024), theorem 2.1, say stable for
-        k2 < 0 and supercritical for k1 k2 < 0; for k1 > 0, as they have it, that is one thing.
+        They then lie where the equilibrium is unstable. Liu & Zhang (2024), theorem 2.1, call
+        k2 < 0 stable and k1 k2 < 0 supercritical, which is the same for k1 > 0.
         """
         return self.k2.real < 0.0
 
@@ -90,7 +89,7 @@ class NormalForm:
         """Radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
 
         Raises:
-            NoOrbit: on this side there is none, or it is degenerate.
+            NoOrbit: there is none on this side, or the form is degenerate.
 
         """
         if self.degenerate:
@@ -105,7 +104,7 @@ class NormalForm:
         return self.k1.imag * mu + self.k2.imag * self.radius(mu)**2
 
 
-#: ON_AXIS: distance up to which a root lies on the imaginary axis, 1/model time or over omega.
+#: Distance from the imaginary axis below which a root lies on it, 1/model time or over omega.
 ON_AXIS = 1e-8
 
 
@@ -114,13 +113,13 @@ class HopfPoint(ShortRepr):
     """A crossing of the imaginary axis by a pair of roots.
 
     Attributes:
-        network: there.
-        line: on which it lies.
-        value: of the parameters there; of the delay, model time.
-        block: the critical class's block, with its gait, mode and wave.
+        network: at the point.
+        line: of parameters on which it lies.
+        value: of the parameters; of the delay, model time.
+        block: of the critical class, with its gait, mode and wave.
         omega: of the critical root i omega, rad per model time, positive.
         rest: state of every cell at the equilibrium, shape (variables,).
-        n: where the delay moves, how many turns more than the smallest it holds.
+        n: along the delay, number of periods 2 pi / omega beyond the smallest delay.
 
     """
 
@@ -138,7 +137,7 @@ class HopfPoint(ShortRepr):
 
     @property
     def gait(self) -> str:
-        """The primary gait that branches off, whichever way its wave runs."""
+        """The primary gait that branches off, in either direction of its wave."""
         return self.block.gait
 
     @property
@@ -214,9 +213,9 @@ class HopfPoint(ShortRepr):
 
     @property
     def in_delays(self) -> NormalForm:
-        """In time over the delay, as Liu & Zhang (2024) have it, which the delay scales as well.
+        """In units of the delay, as in Liu & Zhang (2024).
 
-        z is half the amplitude of a cell's first variable.
+        The delay scales the time as well; z is half the amplitude of a cell's first variable.
         """
         form, delay = self.normal_form, self.network.delay
         return NormalForm(1j * self.omega + delay * form.k1,
@@ -224,10 +223,7 @@ class HopfPoint(ShortRepr):
 
     @property
     def slopes(self) -> dict[str, float]:
-        """Derivatives of the value on the line by the network's other parameters, by name.
-
-        The critical root stays on the axis: what one parameter moves it by, the line takes back.
-        """
+        """Derivatives of the value at the Hopf point by the other parameters, by name."""
         back = -self._speed(self.line).real
         return {name: self._speed(ParameterLine((name,), (1.0,))).real / back
                 for name in self.network.parameters() if name not in self.line.names}
@@ -255,17 +251,17 @@ class HopfPoint(ShortRepr):
         return self.normal_form.k2.real / self.omega
 
     def but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
-        """Return a block's roots without the critical one or pair, where it is the block's."""
-        mine = dict(block.symmetry.shifts)
+        """Return a block's roots without the critical one or pair."""
+        shifts = dict(block.symmetry.shifts)
         for critical, symmetry in ((1j * self.omega, self.block.symmetry),
                                    (-1j * self.omega, power(self.block.symmetry, -1))):
-            if mine == dict(symmetry.shifts) and len(roots):
+            if shifts == dict(symmetry.shifts) and len(roots):
                 roots = np.delete(roots, np.abs(roots - critical).argmin())
         return roots
 
     @cached_property
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
-        """All blocks with their other roots on the axis and right of it."""
+        """All blocks with their other roots on the axis and to the right of it."""
         close = ON_AXIS * max(1.0, self.omega)
         return tuple((block, self.but_critical(block, block.right_of(-close)))
                      for block in blocks(self.network, self.rest))
@@ -302,8 +298,8 @@ class HopfPoint(ShortRepr):
     def stable(self) -> bool:
         """Whether the bifurcation is stable in the sense of Buono & Golubitsky (section 4).
 
-        Critical roots simple, all others to the left; the orbits attract if the bifurcation is
-        supercritical as well.
+        The critical roots are simple, all others lie to the left. The orbits attract if the
+        bifurcation is also supercritical.
         """
         return self.simple and self.unstable_roots == 0
 
@@ -340,12 +336,12 @@ class HopfPoint(ShortRepr):
 
 
 def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Solve for the response to a push; without one, a singular matrix does not matter."""
+    """Solve a linear system; a right-hand side of 0 has the solution 0 with any matrix."""
     return np.linalg.solve(matrix, push) if push.any() else np.zeros_like(push)
 
 
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:
-    """Return the Hopf point from which a primary gait emerges as the delay grows, or None.
+    """Return the Hopf point at a gait's critical delay; None if it has none.
 
     It is the smallest delay at which a pair of roots of the gait's class moves to the right.
 
@@ -365,7 +361,7 @@ def first_hopf(network: Network, gait: str) -> HopfPoint | None:
     block = block_of(Expansion(network, rest), symmetry)
     points = [crossing_at(block, line, rest, omega, tau)
               for omega, tau in delay_crossings(block.now, block.past)]
-    # With one variable the fast wave is the one that is born, and the slow one ends.
+    # With one variable the fast wave begins there, and the slow one ends.
     born = points[:1] if len(rest) == 1 else [point for point in points if point.direction > 0]
     return min(born, key=lambda point: point.value, default=None)
 
@@ -379,22 +375,20 @@ def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: floa
         line: of the delay alone.
         rest: state of every cell at the equilibrium, shape (variables,).
         omega: rad per model time.
-        tau: a delay at which the block's roots cross, and n turns more.
-        n: how many turns.
+        tau: smallest delay at which the block's roots cross.
+        n: number of periods 2 pi / omega to add to it.
 
     """
     tau += 2.0 * np.pi * n / omega
-    there = line.at(block.network, tau)
-    return HopfPoint(there, line, tau, replace(block, network=there), omega, rest, n)
+    network = line.at(block.network, tau)
+    return HopfPoint(network, line, tau, replace(block, network=network), omega, rest, n)
 
 
 # All Hopf points of a network's equilibrium along a line of parameters.
 
-#: GRID: number of values of the parameters at which the equilibrium is computed before crossings
-#: are refined.
+#: Points of the grid between which crossings are refined.
 GRID = 241
-#: SPARE: with a delay, number of roots of a class that are followed in addition to those that are
-#: right of the axis somewhere on the grid.
+#: Roots of a class that are followed with a delay, beside those to the right of the axis.
 SPARE = 2
 
 
@@ -402,20 +396,19 @@ def hopf_points(network: Network, line: ParameterLine | str, low: float, high: f
                 ) -> list[HopfPoint]:
     """Find all Hopf points of the equilibrium between two values of parameters, by rising value.
 
-    Values at which the network has no equilibrium are passed over. Where not the delay alone
-    moves, points closer to one another than (high - low)/240 are distinguished only where a pair
-    crosses twice in the same class.
+    Values without an equilibrium are skipped. Along other lines than the delay, points closer than
+    (high - low)/240 are distinguished only if a pair crosses twice in the same class.
 
     Args:
         network: the other parameters.
-        line: the parameters that move, or their text: 'tau', 'alpha=-beta', or a group.
+        line: the line of parameters, or its text: 'tau', 'alpha=-beta', or a group.
         low: least value, in the parameter's unit.
         high: greatest value, in the parameter's unit.
 
     Raises:
-        NoEquilibrium: it exists nowhere on the way.
+        NoEquilibrium: there is none on the whole line.
         InputError: low is not below high, no such parameter, one is not finite, the delay would be
-            negative, or the weights have not the symmetry of the network.
+            negative, or the weights lack the symmetry of the network.
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
@@ -433,18 +426,18 @@ def hopf_points(network: Network, line: ParameterLine | str, low: float, high: f
 
 def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega: float
             ) -> HopfPoint:
-    """Return a Hopf point whose place is known.
+    """Return the Hopf point of a network at which a class is critical.
 
     Args:
         network: at the point.
-        line: the parameters by which the pair crosses.
-        mode: the critical class.
-        omega: about that of the critical root i omega, to tell it from others of its block.
+        line: of parameters, along which the pair crosses.
+        mode: of the critical class.
+        omega: estimate of that of the critical root i omega.
 
     """
     rest = equilibrium(network)
     block = block_at(network, rest, mode)
-    # Its real part is zero but for rounding, unless the caller was wrong by more.
+    # The real part is zero up to rounding.
     roots = block.right_of(-1e-3)
     root = roots[np.abs(roots - 1j * omega).argmin()]
     return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
@@ -454,9 +447,10 @@ def _by_delay(network: Network, line: ParameterLine, low: float, high: float) ->
     rest, points = equilibrium(network), []
     for block in blocks(network, rest):
         for omega, tau in delay_crossings(block.now, block.past):
-            turn = 2.0 * np.pi / omega
+            period = 2.0 * np.pi / omega
             points += [crossing_at(block, line, rest, omega, tau, n) for n in range(
-                max(0, int(np.ceil((low - tau) / turn))), int(np.floor((high - tau) / turn)) + 1)]
+                max(0, int(np.ceil((low - tau) / period))),
+                int(np.floor((high - tau) / period)) + 1)]
     return sorted(points, key=lambda point: point.value)
 
 
@@ -464,9 +458,9 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
     @cache
     def split(value: float) -> tuple[Block, ...]:
         """Return the blocks; none where there is no equilibrium."""
-        there = line.at(network, value)
+        moved = line.at(network, value)
         try:
-            return blocks(there, equilibrium(there))
+            return blocks(moved, equilibrium(moved))
         except NoEquilibrium:
             return ()
 
@@ -489,7 +483,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                 return float(roots(value, *at[:2])[at[2]].real)
 
             for value in crossings(real_part, np.array(grid)):
-                # Two roots of a block may cross together; each is met twice then.
+                # Two roots of a block may cross together; each then appears twice.
                 for root in roots(value, which, count):
                     omega = float(root.imag)
                     if (abs(root.real) <= ON_AXIS < omega
@@ -497,19 +491,19 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                         pairs.append((value, omega))
                         points.append(hopf_at(line.at(network, value), line,
                                               split(value)[which].mode, omega))
-    # Points that symmetry puts in one place differ by rounding.
+    # Equal values, by symmetry, differ by rounding.
     return sorted(points, key=lambda point: (round(point.value, 9), point.omega, point.mode))
 
 
 def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
-    """Return how many roots of a class can cross along some blocks: without a delay, all."""
+    """Return how many roots of a class to follow along some blocks: without a delay, all."""
     if not any(block.past.any() for block in along):
         return along[0].network.variables
     return spare + max(len(block.right_of(0.0)) for block in along)
 
 
 def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:
-    """Add the last places before gaps of the equilibrium, and the first ones after them."""
+    """Add to a grid the ends of the intervals in which something exists."""
     whole = grid[:1]
     for left, right in pairwise(grid):
         if exists(left) != exists(right):

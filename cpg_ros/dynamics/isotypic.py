@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Isotypic blocks of the linearisation at an equilibrium: small matrices, one for each class.
+"""Isotypic blocks of the linearisation at an equilibrium: a small matrix for each class.
 
-The cells are permuted by an abelian group, simply and transitively, so each of its characters
-chi has the eigenvector (chi(cell)) once for each variable, and the linearisation falls into
-``L_chi = sum_i J_1i chi(i)`` (Buono & Golubitsky 2001, section 5.2), once for the state now and
-once for that a delay ago. Oscillations of a class are primary gaits:
-``x_i ~ chi(i) exp(i omega t)``, so the character is the gait (Table 5).
+An abelian group permutes the cells simply and transitively. Each of its characters chi has the
+eigenvector (chi(cell)) once for each variable, and the linearisation splits into
+``L_chi = sum_i J_1i chi(i)`` (Buono & Golubitsky 2001, section 5.2), for the state now and for the
+state a delay ago. Oscillations of a class are primary gaits: ``x_i ~ chi(i) exp(i omega t)``, so
+the character is the gait (Table 5).
 """
 
 from collections.abc import Mapping
@@ -34,13 +34,12 @@ from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.symmetry import Group, homomorphisms, Symmetry
 import numpy as np
 
-# Subspaces of a network's states that its linearised flow along a gait keeps apart.
 
 @cache
 def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return orthonormal columns of the gait's class, and of the subspaces transverse to it."""
     cells = symmetry.group.cells
-    inside, parts = symmetry.basis.T, [np.eye(cells)]
+    inside, spaces = symmetry.basis.T, [np.eye(cells)]
     for name, shift in symmetry.shifts:
         sign = 1.0 if shift == 0 else -1.0
         if shift not in (0, Fraction(1, 2)) or (sign < 0.0 and not symmetry.odd):
@@ -48,31 +47,30 @@ def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
         image = np.zeros((cells, cells))
         image[np.array(symmetry.group.elements[name]), np.arange(cells)] = sign
         if np.array_equal(image @ image, np.eye(cells)):
-            parts = [half for part in parts for half in _halves(part, image)]
+            spaces = [half for space in spaces for half in _halves(space, image)]
     outside = []
-    for part in parts:
-        columns = np.kron(np.eye(symmetry.variables), part)
-        rest = columns - inside @ (inside.T @ columns)
-        vectors, sizes, _ = np.linalg.svd(rest, full_matrices=False)
+    for space in spaces:
+        columns = np.kron(np.eye(symmetry.variables), space)
+        remainder = columns - inside @ (inside.T @ columns)
+        vectors, sizes, _ = np.linalg.svd(remainder, full_matrices=False)
         if (sizes > 0.5).any():
             outside.append(vectors[:, sizes > 0.5])
     return inside, outside
 
 
-def _halves(part: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
-    """Split a subspace, orthonormal columns, into the parts that an involution keeps and flips."""
+def _halves(basis: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
+    """Split a subspace, orthonormal columns, into the eigenspaces of an involution."""
     columns = []
     for sign in (1.0, -1.0):
-        vectors, sizes, _ = np.linalg.svd(0.5 * (part + sign * image @ part), full_matrices=False)
+        vectors, sizes, _ = np.linalg.svd(0.5 * (basis + sign * image @ basis),
+                                          full_matrices=False)
         if (sizes > 0.5).any():
             columns.append(vectors[:, sizes > 0.5])
     return columns
 
 
-# A cell's rates about a state in which all cells are alike, expanded in its inputs.
-
 class Expansion:
-    """Derivatives of the first cell's rates, exact; they are those of every cell.
+    """Exact derivatives of a cell's rates by its inputs, at a state in which all cells are equal.
 
     Attributes:
         network: parameters.
@@ -141,8 +139,7 @@ class Expansion:
         """Third derivative of the rates, C(a, b, c), shape (variables,)."""
         return self._multilinear(self._third, a, b, c)
 
-    def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray
-                     ) -> np.ndarray:
+    def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray) -> np.ndarray:
         out = np.zeros(self.network.variables, dtype=complex)
         for v, rate in multilinear(derivatives, list(sets)).items():
             out[v] = rate
@@ -178,7 +175,7 @@ class Block(ShortRepr):
 
     Attributes:
         network: parameters.
-        symmetry: what the class's oscillation has, the shifts of the whole group.
+        symmetry: of the class's oscillation, the shifts of the whole group.
         now: L0, complex, shape (variables, variables), by the state now.
         past: L1, by the state a delay ago.
 
@@ -191,13 +188,13 @@ class Block(ShortRepr):
 
     @cached_property
     def gait(self) -> str:
-        """The network's gait that oscillates in this class, whichever way its wave runs."""
-        mine = dict(self.symmetry.shifts)
-        senses = [mine, {name: -shift % 1 for name, shift in mine.items()}]
+        """The network's gait that oscillates in this class, in either direction of its wave."""
+        own = dict(self.symmetry.shifts)
+        directions = [own, {name: -shift % 1 for name, shift in own.items()}]
         gaits = {gait: dict(self.network.symmetry(gait).shifts) for gait in self.network.gaits()}
-        # Some networks have a name for each sense.
-        return next((gait for sense in senses for gait, shifts in gaits.items()
-                     if shifts == sense), '')
+        # Some networks have a name for each direction.
+        return next((gait for direction in directions for gait, shifts in gaits.items()
+                     if shifts == direction), '')
 
     @property
     def mode(self) -> tuple[int, ...]:
@@ -216,10 +213,9 @@ class Block(ShortRepr):
 
     @property
     def wave(self) -> str:
-        """Leg that leads or follows the first one by neither 0 nor 1/2, or ''.
+        """Direction of the wave, such as 'LF leads LH', or '' where all phases are 0 or 1/2.
 
-        Tells the two senses of a wave apart, by the first cells of the legs of the network's
-        first assignment.
+        Legs have the phase of their first cell in the network's first assignment.
         """
         legs = next(iter(self.network.legs.values()))
         first, *others = ((leg.upper(), cells[0] - 1) for leg, cells in legs.items())
@@ -236,7 +232,7 @@ class Block(ShortRepr):
 
     @property
     def leading(self) -> complex:
-        """The rightmost root, of a conjugate pair one."""
+        """The rightmost root; of a conjugate pair, one."""
         return complex(self.roots(1)[0])
 
     def roots(self, count: int) -> np.ndarray:
@@ -250,19 +246,19 @@ class Block(ShortRepr):
     def within(self, other: 'Block') -> bool:
         """Whether the class lies in the fixed-point space of the K of the other's gait.
 
-        With x -> -x what a shift of 1/2 turns round has to be turned round, too.
+        With the symmetry x -> -x, the elements with a shift of 1/2 belong to K, too.
         """
-        mine = dict(self.symmetry.shifts)
+        own = dict(self.symmetry.shifts)
         kept = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
-        return all(mine[name] == shift for name, shift in other.symmetry.shifts if shift in kept)
+        return all(own[name] == shift for name, shift in other.symmetry.shifts if shift in kept)
 
 
 @cache
 def character(symmetry: Symmetry) -> np.ndarray:
-    """Values of a character for the cells, powers of i without error of rounding."""
-    turns = 4.0 * symmetry.phases
-    exact = np.array([1.0, 1j, -1.0, -1j])[np.round(turns).astype(int) % 4]
-    return np.where(turns == np.round(turns), exact, np.exp(0.5j * np.pi * turns))
+    """Values of a character for the cells, powers of i without rounding errors."""
+    quarters = 4.0 * symmetry.phases
+    exact = np.array([1.0, 1j, -1.0, -1j])[np.round(quarters).astype(int) % 4]
+    return np.where(quarters == np.round(quarters), exact, np.exp(0.5j * np.pi * quarters))
 
 
 @cache
@@ -303,8 +299,8 @@ def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
         state: of every cell, shape (variables,).
 
     Raises:
-        InputError: weights differ that the network's symmetry carries into one another, or its
-            group does not take the first cell to each cell in exactly one way.
+        InputError: weights differ that the network's symmetry makes equal, or its group does not
+            take the first cell to each cell in exactly one way.
 
     """
     expansion = Expansion(network, np.asarray(state, dtype=float))

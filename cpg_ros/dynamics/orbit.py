@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Periodic orbits of a network in a gait: the base class, deflation, checks and symmetries."""
+"""Periodic orbits of a network in a gait, for all methods that solve for them."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -27,21 +27,19 @@ from cpg_ros.networks.stated_gait import other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-# Deflation: Newton's method kept off the orbits that are known.
-
-#: WIDTH: width w, over a known period, of the range about it that deflation keeps free.
+#: Width of the range that deflation keeps free about a known period, relative to it.
 WIDTH = 0.1
-#: LARGEST: largest factor of Newton's step, which is meaningless near a pole.
+#: Largest factor of deflation, which has a pole.
 LARGEST = 3.0
 
 
 def deflation_factor(period: float, step: float, periods: Sequence[float]) -> float:
-    """Return the factor of Newton's step; 1 where no orbit is known.
+    """Return the factor of Newton's step that keeps it away from known orbits.
 
     Args:
         period: the current one, in any unit of time.
-        step: Newton's own step of it, in the same unit.
-        periods: periods of the orbits to be kept off, the same.
+        step: Newton's step of the period, in the same unit.
+        periods: of the known orbits, in the same unit.
 
     """
     slope = 0.0
@@ -52,27 +50,29 @@ def deflation_factor(period: float, step: float, periods: Sequence[float]) -> fl
     return max(-LARGEST, min(LARGEST, factor))
 
 
+#: States, shape (m, components), as a function of times in cycles, shape (m,).
+Path = Callable[[np.ndarray], np.ndarray]
 #: Waveforms over theta in cycles, of a wave and a variable: ``waveform(theta, wave, variable)``.
 Waveforms = Callable[[np.ndarray, int, int], np.ndarray]
-#: NOT_ISOLATED: message if there is no phase response.
+#: Reason why an orbit has no phase response.
 NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a disturbance other '
                 'than along it does not decay, either')
-#: POINTS: points of a cycle among which extremes are searched for before they are refined.
+#: Grid on which extremes are searched before they are refined.
 POINTS = 1024
-#: COMPARED: fewest points of a cycle at which signals are compared; PARTS: numbers of equal parts
-#: for which no orbit may repeat itself within its period.
+#: Least number of points at which signals are compared; and numbers of equal parts of a cycle that
+#: an orbit must not repeat.
 COMPARED, PARTS = 60, (2, 3, 5)
-#: SAME: difference, over their range, up to which two signals are equal.
+#: Difference of two equal signals, over their range.
 SAME = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orbit(ShortRepr, ABC):
-    """A gait of a network: its waveforms, its period, and where each cell is in them.
+    """A gait of a network: its waveforms, its period, and the phase of each cell.
 
-    Called with times it gives the states, so it serves as a history for the simulation. Cell i's
-    variable q is ``u_{w,q}(t/T + phi_i)``, w its wave, phi_i its phase; phase zero is where the
-    first variable of cell 1 peaks.
+    Called with times it returns states, so it serves as a history for the simulation. Cell i's
+    variable q is ``u_{w,q}(t/T + phi_i)``, w its wave, phi_i its phase; at phase zero the first
+    variable of cell 1 peaks.
 
     Attributes:
         network: the parameters for which it solves the equations.
@@ -112,7 +112,7 @@ class Orbit(ShortRepr, ABC):
 
     @property
     def gait(self) -> str:
-        """Name of the gait: the one that the parameters state, or that has this symmetry."""
+        """Name of the gait that the parameters state, or else that has this symmetry."""
         network = self.network
         return stated_gait(network) or next(
             (gait for gait in network.gaits() if network.symmetry(gait) == self.symmetry),
@@ -178,12 +178,12 @@ class Orbit(ShortRepr, ABC):
 
 
 def check_values(network: Network, gait: str) -> None:
-    """Check the input of every solver.
+    """Check that a network may have a gait.
 
     Raises:
-        InputError: a parameter is not finite, or the delay not positive.
-        NoOrbit: weights differ that the gait's symmetry needs to be equal, or the parameters
-            state the phases of another gait.
+        InputError: a parameter is not finite, or the delay is not positive.
+        NoOrbit: weights differ that the gait's symmetry makes equal, or the parameters state the
+            phases of another gait.
 
     """
     for name, value in network.as_dict().items():
@@ -201,11 +201,10 @@ def check_values(network: Network, gait: str) -> None:
 def extra_symmetry(orbit: Orbit) -> str:
     """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
 
-    Newton's method may end on an orbit with more symmetry, which every equation of the gait
-    also holds for: a walk is a skip whose two waveforms agree; or it goes round an orbit several
-    times, whose shifts are then others.
+    The equations of a gait also hold for orbits with more symmetry, such as a walk for a skip,
+    whose two waveforms then agree, and for several revolutions of an orbit.
     """
-    # A whole number of them for every shift that there may be.
+    # A multiple of the denominator of every possible shift.
     points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
     x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
     for parts in PARTS:
@@ -215,18 +214,18 @@ def extra_symmetry(orbit: Orbit) -> str:
 
 
 def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
-    """Return the name of a symmetry that a cycle has in addition to another one, or ''.
+    """Name a symmetry that a cycle has beyond another one, or ''.
 
     Args:
-        symmetry: that it has.
-        x: the cells' first variable at even times of a cycle, shape (points, cells), a multiple of
-            the group's exponent.
-        same: signals that differ by less are one, over the range of all.
+        symmetry: of the cycle.
+        x: the cells' first variable at even times of a cycle, shape (points, cells), the number of
+            points a multiple of the group's exponent.
+        same: difference of equal signals, over the range of all.
 
     """
     most = same * np.ptp(x)
     names, lates, cells = _beyond(symmetry, len(x))
-    # A single time rules out nearly all of them.
+    # A single time excludes nearly all of them.
     for k in np.flatnonzero(np.abs(x[0, cells] - x[lates]).max(axis=1) < most):
         if np.abs(x[:, cells[k]] - np.roll(x, -lates[k], axis=0)).max() < most:
             return names[k]
@@ -235,17 +234,16 @@ def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
 
 @lru_cache(maxsize=64)
 def _beyond(symmetry: Symmetry, points: int) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Return the symmetries that a cycle could have in addition to another one.
+    """List the symmetries that a cycle could have beyond another one.
 
     Returns:
-        What it is; by how many of a cycle's points it shifts; and whose signal each cell has,
-        shape (n, cells).
+        Their names; their shifts in points of a cycle; and the permutations, shape (n, cells).
 
     """
-    own, extra = dict(symmetry.shifts), []
+    shifts, extra = dict(symmetry.shifts), []
     for name, element in symmetry.group.elements.items():
         order = symmetry.group.order(name)
-        shift = round(order * own[name]) if name in own else None
+        shift = round(order * shifts[name]) if name in shifts else None
         extra += [(f'{name} shifts it by {k}/{order} of a cycle', points * k // order, element)
                   for k in range(order) if k != shift]
     return ([name for name, _, _ in extra], np.array([late for _, late, _ in extra], dtype=int),

@@ -15,7 +15,7 @@
 """Selection of the method that solves for orbits.
 
 Fourier collocation takes any delay, Gauss collocation on a mesh any steepness. Each is a folder
-with the same functions; what they solve for are orbits and curves that know what to do.
+with the same functions.
 """
 
 from types import ModuleType

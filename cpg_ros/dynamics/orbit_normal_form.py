@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Normal forms where orbits lose stability: whether the change of gait is soft or hard.
+"""Normal forms where orbits lose stability: is the bifurcation supercritical or subcritical.
 
 Near an orbit u of period T, of which a disturbance v has the multiplier mu on the unit circle, the
 states are ``x = u(s) + z v(s) + conj(z v(s)) + ...`` with, at the critical parameters,
@@ -22,12 +22,12 @@ states are ``x = u(s) + z v(s) + conj(z v(s)) + ...`` with, at the critical para
     s' = 1 + a z^2,  z' = c z^3  with x = u(s) + z v(s) + ... where mu is real: twice the period
     (mu = -1), or a branch that breaks a symmetry (mu = 1).
 
-Where Re c < 0 the motion that branches off attracts and grows slowly: the change of gait is soft.
-Where Re c > 0 no motion nearby attracts, and the gait jumps. With a delay tau the state is a
-history, of which s and z of a delay ago are known to the same order, s - tau s' and z - tau z': as
-rates B x(t - tau) depend on them, ``E y = y + tau B y(t - tau)`` takes y's place in what s' and z'
-multiply (cf. Lentjes, Spek, Bosschaert & Kuznetsov, Periodic normal forms for
-bifurcations of limit cycles in DDEs, 2023).
+Where Re c < 0 (supercritical, soft) the motion that branches off attracts and grows slowly. Where
+Re c > 0 (subcritical) no motion nearby attracts, and the gait jumps. With a delay tau the state is
+a history, in which s and z a delay ago are s - tau s' and z - tau z' to the same order. The rates
+depend on them by B x(t - tau), so ``E y = y + tau B y(t - tau)`` replaces y in the factors of s'
+and z' (cf. Lentjes, Spek, Bosschaert & Kuznetsov, Periodic normal forms for bifurcations of limit
+cycles in DDEs, 2023).
 """
 
 from dataclasses import dataclass
@@ -44,9 +44,9 @@ from cpg_ros.networks.equations import Field, States
 import numpy as np
 import scipy
 
-# The variational equation about an orbit where it is singular: null vectors and answers.
+# The variational equation about an orbit where it is singular: null vectors and solutions.
 
-#: ROUNDS: iterations in which null vectors become the borders of the next solution for them.
+#: Iterations in which the null vectors become the borders of the next system.
 ROUNDS = 2
 
 
@@ -60,23 +60,23 @@ class _Bordered:
             corner = np.zeros((len(rows), len(rows)))
             factors = scipy.linalg.lu_factor(np.block([[matrix, columns.T],
                                                        [rows.conj(), corner]]))
-            self._solve: Any = partial(scipy.linalg.lu_solve, factors)
+            self._factors: Any = partial(scipy.linalg.lu_solve, factors)
         else:
             whole = scipy.sparse.block_array([[matrix, columns.T], [rows.conj(), None]],
                                              format='csc') if len(rows) else matrix
             lu = scipy.sparse.linalg.splu(whole)
-            self._solve = lambda right, trans: lu.solve(right, 'NTH'[trans])
+            self._factors = lambda right, trans: lu.solve(right, 'NTH'[trans])
 
-    def answer(self, right: np.ndarray) -> np.ndarray:
-        """Return the answer that is normal to the rows, shape (n,) as the right-hand side."""
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Return the solution that is normal to the rows, shape (n,) as the right-hand side."""
         n, k = self._shape
-        solution: np.ndarray = self._solve(np.append(right, np.zeros(k)).astype(complex), trans=0)
-        return solution[:n]
+        padded = np.append(right, np.zeros(k)).astype(complex)
+        return np.asarray(self._factors(padded, trans=0))[:n]
 
     def null(self, adjoint: bool) -> np.ndarray:
         """Return the matrix's right or left null vectors, of length 1, shape (k, n)."""
         n, k = self._shape
-        vectors = self._solve(np.eye(n + k, k, -n, dtype=complex), trans=2 * adjoint)[:n].T
+        vectors = self._factors(np.eye(n + k, k, -n, dtype=complex), trans=2 * adjoint)[:n].T
         return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
 
@@ -89,7 +89,7 @@ class Linearised:
     """
 
     def __init__(self, orbit: Orbit, halvings: int) -> None:
-        """Linearise about an orbit, on its mesh halved so many times.
+        """Linearise about an orbit, on its mesh halved a number of times.
 
         Raises:
             NoOrbit: its rates have no derivatives, or there are too many unknowns.
@@ -101,33 +101,33 @@ class Linearised:
         self._field: Field = Field(orbit.network)
         self._systems: dict[complex, tuple[_Bordered, np.ndarray]] = {}
 
-    def find(self, turn: complex, guesses: np.ndarray) -> np.ndarray:
-        """Return all disturbances that return as a factor of themselves, shape (k, n).
+    def find(self, factor: complex, guesses: np.ndarray) -> np.ndarray:
+        """Return all disturbances that grow by a factor over a period, shape (k, n).
 
         Args:
-            turn: the factor.
+            factor: over a period.
             guesses: of them at the unknowns, shape (k, n).
 
         """
-        matrix = self.equation.matrix(turn)
+        matrix = self.equation.matrix(factor)
         rights = lefts = guesses / np.linalg.norm(guesses, axis=1)[:, None]
         for _ in range(ROUNDS):
             system = _Bordered(matrix, rights, lefts)
             rights, lefts = system.null(False), system.null(True)
-        self._systems[turn] = _Bordered(matrix, rights, lefts), lefts
+        self._systems[factor] = _Bordered(matrix, rights, lefts), lefts
         return rights
 
-    def fractions(self, turn: complex, rates: np.ndarray) -> np.ndarray:
-        """Return what of sources none can answer to, for each left null vector, shape (k,)."""
-        return self._systems[turn][1].conj() @ self.equation.right(rates, turn)
+    def fractions(self, factor: complex, rates: np.ndarray) -> np.ndarray:
+        """Return the products of sources with the left null vectors, shape (k,)."""
+        return self._systems[factor][1].conj() @ self.equation.right(rates, factor)
 
-    def solve(self, rates: np.ndarray, turn: complex) -> States:
-        """Return the disturbance that sources make which return as a factor of themselves."""
-        if turn not in self._systems:
+    def solve(self, rates: np.ndarray, factor: complex) -> States:
+        """Return the disturbance that sources cause which grow by a factor over a period."""
+        if factor not in self._systems:
             none = np.zeros((0, self.equation.along().size))
-            self._systems[turn] = _Bordered(self.equation.matrix(turn), none, none), none
-        solution = self._systems[turn][0].answer(self.equation.right(rates, turn))
-        return self.equation.values(solution, rates, turn)
+            self._systems[factor] = _Bordered(self.equation.matrix(factor), none, none), none
+        solution = self._systems[factor][0].solve(self.equation.right(rates, factor))
+        return self.equation.values(solution, rates, factor)
 
     def second(self, a: States, b: States) -> np.ndarray:
         """Return the rates' second derivative B(a, b) along the orbit."""
@@ -147,14 +147,13 @@ class Linearised:
         return np.zeros_like(y[0]), past
 
 
-#: CRITICAL: distance from the unit circle up to which a multiplier is on it; RESONANT: distance of
-#: a multiplier's power from 1 up to which there is a resonance.
+#: Distance below which a multiplier is on the unit circle, and below which a power of it is 1.
 CRITICAL, RESONANT = 1e-3, 0.02
-#: SAME: largest relative change of a coefficient when the mesh is halved.
+#: Largest relative change of a coefficient when the mesh is halved.
 SAME = 0.01
-#: GROWS: modulus from which on another multiplier is outside the circle at a crossing.
+#: Modulus above which a multiplier grows at a crossing of another one.
 GROWS = 1.001
-#: NOTHING: share of the largest of its parts up to which a term of the normal form is 0.
+#: Fraction of its terms below which a coefficient is 0.
 NOTHING = 1e-6
 
 
@@ -163,9 +162,8 @@ class OrbitNormalForm(ShortRepr):
     """The normal form at a point where a multiplier crosses the unit circle.
 
     Attributes:
-        cubic: c, 1/model time, for disturbances v of which the largest component is 1 at most;
-            nan where it is not known.
-        why: it does not decide, '' if it does.
+        cubic: c, 1/model time, for disturbances v whose largest component is 1; nan if unknown.
+        why: reason why the form does not decide, or ''.
 
     """
 
@@ -194,7 +192,7 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
         orbit: of the critical parameters.
         multiplier: that crosses: complex at a torus, where it is either of the pair, near -1 at a
             period doubling, near 1 at a branch point.
-        part: number of the subspace it belongs to: 0 the gait's class, then those transverse.
+        part: index of its subspace: 0 for the gait's class, then the transverse ones.
 
     """
     pair = abs(multiplier.imag) > REAL
@@ -211,16 +209,16 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
 
 
 def loses_stability(orbit: Orbit) -> bool:
-    """Whether all other multipliers are inside the unit circle where one of them crosses it."""
+    """Whether all multipliers but the crossing one are inside the unit circle."""
     spectrum = multipliers(orbit)
     return bool((np.abs([*spectrum.within, *spectrum.transverse]) < GROWS).all())
 
 
 def _undecided(orbit: Orbit, multiplier: complex, pair: bool) -> str:
-    """Return why a normal form of one disturbance is not valid, '' if it is."""
+    """Return why a normal form with one disturbance does not apply, or ''."""
     spectrum = multipliers(orbit)
-    there = np.concatenate([spectrum.within, spectrum.transverse])
-    if (np.abs(np.abs(there) - 1.0) < CRITICAL).sum() > 1 + pair:
+    moduli = np.abs(np.concatenate([spectrum.within, spectrum.transverse]))
+    if (np.abs(moduli - 1.0) < CRITICAL).sum() > 1 + pair:
         return 'other multipliers are on the unit circle, too'
     for power in (1, 2, 3, 4):
         if pair and abs(multiplier**power - 1.0) < RESONANT:
@@ -235,31 +233,31 @@ def _conj(y: States) -> States:
 def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> complex:
     """Return c on the mesh of a linearised network."""
     equation = linear.equation
-    turn, guess = equation.critical(part, multiplier)
-    turn = complex(turn / abs(turn)) if pair else complex(round(turn.real))
-    if not pair and abs(turn) != 1.0:
+    factor, guess = equation.critical(part, multiplier)
+    factor = complex(factor / abs(factor)) if pair else complex(round(factor.real))
+    if not pair and abs(factor) != 1.0:
         raise NoOrbit('two disturbances that symmetry makes alike are critical')
-    alike = turn == 1.0
+    alike = factor == 1.0
     along, guesses = equation.slope, [equation.along()]
     if alike:
         guesses.append(guess)
     critical = linear.find(1.0, np.array(guesses))
-    right = critical[1] if alike else linear.find(turn, guess[None])[0]
-    v = equation.values(right, np.zeros_like(along[0]), turn)
+    right = critical[1] if alike else linear.find(factor, guess[None])[0]
+    v = equation.values(right, np.zeros_like(along[0]), factor)
     size = np.abs(v[0]).max()
     v = v[0] / size, None if v[1] is None else v[1] / size
 
-    # Sources have a part along the orbit and one along v; where both return unchanged, the left
-    # null vectors tell them apart together.
+    # Sources have a component along the orbit and one along v; if both factors are 1, the left
+    # null vectors separate them together.
     weights = np.array([linear.fractions(1.0, linear.moved(y)) for y in ((along, v) if alike
                                                                       else (along,))]).T
-    own = None if alike else linear.fractions(turn, linear.moved(v))[0]
+    scale = None if alike else linear.fractions(factor, linear.moved(v))[0]
 
     def fraction(rates: np.ndarray) -> complex:
         """Return the component along v."""
-        if own is None:
+        if scale is None:
             return complex(np.linalg.solve(weights, linear.fractions(1.0, rates))[1])
-        return complex(linear.fractions(turn, rates)[0] / own)
+        return complex(linear.fractions(factor, rates)[0] / scale)
 
     other = _conj(v) if pair else v
     first = linear.second(v, other)
@@ -269,15 +267,15 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
     mixed = linear.solve(first - a * linear.moved(along), 1.0)
     cubic = linear.third(v, v, other)
     if pair:
-        double = linear.solve(linear.second(v, v), turn**2)
+        double = linear.solve(linear.second(v, v), factor**2)
         terms = [linear.second(v, mixed), 0.5 * linear.second(other, double), 0.5 * cubic]
     else:
         # The term of second order is that of z^2 / 2, and a that of z^2.
         a *= 0.5
         terms = [0.5 * linear.second(v, mixed), cubic / 6.0]
-    slope = equation.derivative(v, turn)
+    slope = equation.derivative(v, factor)
     terms += [-a * linear.moved(slope), -a * linear.second(v, linear.late(along))]
-    parts = [fraction(term) for term in terms]
-    if abs(sum(parts).real) <= NOTHING * max(map(abs, parts)):
+    components = [fraction(term) for term in terms]
+    if abs(sum(components).real) <= NOTHING * max(map(abs, components)):
         raise NoOrbit('its cubic term is 0')
-    return complex(sum(parts))
+    return complex(sum(components))

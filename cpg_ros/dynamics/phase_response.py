@@ -20,21 +20,14 @@ locks it within a range of frequencies whose half-width is the harmonic of Z (Pi
 Kurths, *Synchronization*, ch. 7), and white noise makes it diffuse.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.orbit import Orbit, Waveforms
 from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.networks.equations import Field
 import numpy as np
-from numpy.polynomial import legendre
 
 # Phase response curves: how far a small input to a variable of a cell shifts a gait's phase.
-
-#: Gauss points and weights of a panel of the integral over the history; panels of a cycle.
-_PLACES, _WEIGHTS = legendre.leggauss(12)
-PANELS = 24
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,47 +65,6 @@ class PhaseResponse(ShortRepr):
             for variable in range(orbit.network.variables):
                 out[..., cells, variable] = self.waveform(theta[..., cells], wave, variable)
         return out
-
-    def remembered(self, times: np.ndarray) -> np.ndarray:
-        """Return the responses to what a delay later is made of the states at model times.
-
-        A change of the history alone, ``dx(t + s)`` for -tau < s < 0, shifts the phase by the
-        integral over it of these times dx; all 0 without a delay.
-
-        Returns:
-            Cycles per unit and model time, shape times.shape + (cells, variables).
-
-        """
-        orbit, network = self.orbit, self.orbit.network
-        times = np.asarray(times, dtype=float)
-        later = times + network.delay
-        by_past = Field(network).linearised(orbit(later), orbit(times))[2]
-        shape = (*times.shape, network.cells, network.variables)
-        if not by_past.size:
-            return np.zeros(shape)
-        flat = self(later).swapaxes(-1, -2).reshape(*times.shape, network.components)
-        inputs = np.einsum('...i,...ij->...j', flat, by_past)
-        return inputs.reshape(*times.shape, network.variables, network.cells).swapaxes(-1, -2)
-
-    def shift(self, time: float, motion: Callable[[np.ndarray], np.ndarray]) -> float:
-        """Return by how many cycles a motion added to state and history advances the phase.
-
-        Args:
-            time: of the newest state, model time from a peak of cell 1 on.
-            motion: of model times up to 0, that of the newest state, shape (n,), to what is added,
-                shape (n, components); small, and smooth.
-
-        """
-        network, tau = self.orbit.network, self.orbit.network.delay
-        panels = int(np.ceil(PANELS * tau / self.orbit.period))
-        ends = -tau * np.arange(panels + 1) / max(panels, 1)
-        times = (0.5 * (ends[:-1] + ends[1:])[:, None] + 0.5 * tau / max(panels, 1) * _PLACES)
-        times = np.append(times.ravel(), 0.0)
-        weights = np.append(np.tile(0.5 * tau / max(panels, 1) * _WEIGHTS, panels), 1.0)
-        kernel = np.concatenate([self.remembered(time + times[:-1]),
-                                 self(np.array([time]))])
-        added = motion(times).reshape(-1, network.variables, network.cells).swapaxes(1, 2)
-        return float(weights @ (kernel * added).sum(axis=(1, 2)))
 
 
 def phase_response(orbit: Orbit) -> PhaseResponse:

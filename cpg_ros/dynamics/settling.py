@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Limit cycles that simulations settle on, of a network by itself or held in a symmetry."""
+"""Limit cycles that simulations settle on, of a free network or locked to a symmetry."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -25,33 +25,32 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: SPAN: duration of a simulation, model time; KEPT_FRACTION: time between recorded states,
-#: likewise.
+#: Duration of a simulation, and time between the states that are kept, model time.
 SPAN, KEPT_FRACTION = 500.0, 0.1
-#: COARSE_STEPS: step as a multiple of the network's real-time step; still more exact than adaptive
-#: methods with their usual tolerances (benchmarks/bench_optimize.py).
+#: Step over the network's real-time step; more exact than adaptive methods with their usual
+#: tolerances (benchmarks/bench_optimize.py).
 COARSE_STEPS = 2.5
-#: DISTURBANCE: standard deviation of every component at the start, which breaks all symmetry.
+#: Standard deviation of the start's disturbance, which breaks all symmetry.
 DISTURBANCE = 0.05
-#: AVERAGED: number of cycles that are averaged; POINTS: points of a cycle.
+#: Cycles that are averaged, and points of a cycle.
 AVERAGED, POINTS = 3, 256
 #: ALIVE: range of the first variable below which nothing oscillates.
 ALIVE = 0.05
-#: RETURNED: distance, over the range of the states, up to which a state has returned.
+#: Distance of a state from its return, over the range of the states.
 RETURNED = 0.1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LimitCycle(ShortRepr):
-    """The cycle that a simulation repeats in the end.
+    """The final cycle of a simulation.
 
     Attributes:
         run: the simulation.
-        begin: where cell 1 peaks for the last time but one, model time.
+        begin: time of cell 1's last peak but one, model time.
         period: in model time.
-        signals: mean of the last cycles on even points, shape (POINTS, components).
+        signals: mean of the last cycles at even points, shape (POINTS, components).
         drift: largest difference between states whole periods apart, over the range of the
-            states; infinite where there are fewer than three.
+            states; infinite for fewer than three states.
 
     """
 
@@ -62,15 +61,15 @@ class LimitCycle(ShortRepr):
     drift: float
 
     def __call__(self, theta: np.ndarray) -> np.ndarray:
-        """States at times in cycles from such a peak on, 0 to 1, shape (m, components)."""
+        """States at times in cycles after that peak, 0 to 1, shape (m, components)."""
         return self.run(self.begin + theta * self.period)
 
 
 def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarray:
-    """Start every network near the gait's pattern on a typical cycle, all disturbed alike.
+    """Start every network near the gait's pattern on a typical cycle, with the same disturbance.
 
-    So only a gait that attracts is found. A second waveform starts smaller than the first one
-    and anywhere in its cycle.
+    Only gaits that attract survive it. A second waveform starts smaller than the first and at a
+    random phase.
 
     Returns:
         States, shape (networks, components).
@@ -82,10 +81,10 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
     states = []
     for network in networks:
         symmetry = network.symmetry(gait)
-        turn = 2.0 * np.pi * (symmetry.phases + offsets[symmetry.waves])
+        angle = 2.0 * np.pi * (symmetry.phases + offsets[symmetry.waves])
         size = sizes[symmetry.waves]
         states.append(np.concatenate([
-            middle + half * size * np.cos(turn - 2.0 * np.pi * late)
+            middle + half * size * np.cos(angle - 2.0 * np.pi * late)
             for middle, half, late in network.typical_cycle]))
     return np.array(states) + disturbance
 
@@ -99,15 +98,15 @@ def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajector
 
 def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = ALIVE
                ) -> LimitCycle | None:
-    """Find a simulation's cycle; None where it rests, runs away or does not repeat.
+    """Find a simulation's cycle; None if it rests, runs away or does not repeat.
 
-    Cycles begin where the cell of the largest range crosses its middle upwards, which it does
-    fast; of several such crossings in a cycle the whole state tells which belong together.
+    A cycle begins where the cell with the largest range crosses its middle upwards, at a similar
+    state of the whole network.
 
     Args:
         run: simulation.
         cells: number of cells.
-        first: step from which on the simulation repeats; by default its middle.
+        first: step after which the simulation repeats; by default its middle.
         least: range of the first variable below which nothing oscillates.
 
     """
@@ -140,31 +139,26 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     cycles = min(AVERAGED, int(high[-1] / period))
     times = high[-1] + period * (np.arange(cycles * POINTS) / POINTS - cycles)
     signals = run(times).reshape(cycles, POINTS, -1).mean(axis=0)
-    # An orbit begins where cell 1 peaks, and so must the guess at it. The first of the crossings
-    # is past the middle of the run, so that two periods fit in before the last one.
+    # An orbit begins where cell 1 peaks. The crossings lie in the second half of the run, so two
+    # periods fit in before the last one.
     begin = high[-1] + period * (signals[:, 0].argmax() / POINTS - 2.0)
     return LimitCycle(run, float(begin), period, signals, drift)
 
 
-#: SETTLING: number of periods in which the network finds its gait; HOLD: gain of the symmetry lock
-#: meanwhile, 1/model time.
+#: Periods of a simulation that is locked to a gait, and gain of the lock, 1/model time.
 SETTLING, HOLD = 30, 1.0
-#: Initial states of the search for a gait. SIZES: amplitudes of waves about the equilibrium;
-#: RANDOM: number of random states in the gait's class; SCATTER: their standard deviation.
-#: Variables beyond
-#: 1 at the equilibrium are scaled by their values there.
+#: Starts of a gait without a known one: sizes of waves about the equilibrium, number of random
+#: states in the gait's class, and their standard deviation, all over the size of a variable at the
+#: equilibrium if that is above 1.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: LOOKED: numbers of steps after which it is checked whether a start has settled; LONGER: further
-#: ones, on request; COARSER: step without a delay, as a multiple of the real-time step.
+#: Steps after which starts are checked, further checks on request, and factor of the step without
+#: a delay.
 LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
-#: A run has settled at rates below RESTING, 1/model time, or if its cycles differ by at most
-#: REPEATING of their size.
+#: Rates below which a network rests, 1/model time, and relative difference of cycles that repeat.
 RESTING, REPEATING = 1e-9, 1e-3
-#: SMALLEST: range of the first variable below which a network held in a symmetry does not
-#: oscillate.
+#: Range of the first variable below which a locked network does not oscillate.
 SMALLEST = 1e-3
-#: KEPT: largest violation of the gait's shifts by a cycle, over its range; ADDED: violation up to
-#: which a cycle has a further symmetry.
+#: Relative errors of the gait's shifts, and of a further symmetry.
 KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]
@@ -188,16 +182,16 @@ class _Past:
 
 def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
            ) -> LimitCycle | None:
-    """Simulate from a state, locked to a symmetry, and return the cycle that follows.
+    """Simulate from a state, locked to a symmetry, and return the final cycle.
 
-    None where the network comes to rest or repeats nothing within three of the given periods.
+    None if the network comes to rest or does not repeat within three periods.
     """
     step = min(network.step, period / 400.0)
     lock = HOLD, symmetry
     history: History = start
     early = 0 if network.delay_parameter else SETTLING // 4
     if early:
-        # Most states from which no gait is reached come to rest soon.
+        # Most states that reach no gait come to rest soon.
         run = simulate(network, start, early * period, step, lock=lock, progress=False)
         if _ends(run, run.t.size // 2):
             return None
@@ -208,17 +202,17 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
 
 
 def _ends(run: Trajectory, first: int) -> bool:
-    """Whether the network rests from a step on, or has left all bounds."""
+    """Whether the network rests after a step, or has diverged."""
     return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
 
 
 def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
-    """States that the gait is sought from: waves with its phases, then any of its class."""
+    """Start states for a gait: waves with its phases, then random states of its class."""
     variables = np.arange(network.variables)[:, None]
-    turn = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
-    waves = np.multiply.outer(SIZES, np.cos(turn).ravel())
+    angle = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
+    waves = np.multiply.outer(SIZES, np.cos(angle).ravel())
     scattered = SCATTER * np.random.default_rng(0).standard_normal((random, network.components))
-    # On the class, of any length there: fewer numbers, each as large.
+    # Random states within the class, with the same standard deviation.
     inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
     inside *= np.sqrt(network.components / len(symmetry.basis))
     rest = np.repeat(equilibrium(network), network.cells)
@@ -228,14 +222,14 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
 
 def find_orbit(network: Network, gait: str, random: int = RANDOM,
                longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
-    """Yield the cycles with the gait's symmetry on which the network settles in its class.
+    """Yield the cycles with a gait's symmetry that the network settles on in the gait's class.
 
     Args:
         network: parameters.
         gait: one of its gaits.
         random: number of states at random, besides the waves.
-        longer: whether to wait longer for starts that have not settled, as slow relaxation
-            oscillations need it.
+        longer: whether to continue runs that have not settled, as slow relaxation oscillations
+            need.
 
     Yields:
         States over cycles, and the period in model time.
@@ -243,9 +237,8 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
     """
     symmetry = network.symmetry(gait)
     step = network.step * (1.0 if network.delay_parameter else COARSER)
-    # LANES starts advance together.
-    for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
-        histories: list[History] = list(some)
+    for group in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
+        histories: list[History] = list(group)
         before = 0
         for steps in LOOKED + LONGER:
             if not histories or (before == LOOKED[-1] and not longer()):

@@ -12,16 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Solving for the orbit of a gait of any network, also from its class's Hopf points.
+"""Solving for the orbits of a gait: from a preset, from an orbit nearby, or on branches.
 
-With a delay one branch gives many: an orbit of period T at a delay is an orbit at the delay plus
-any whole number of periods (Yanchuk & Perlikowski 2009, Phys. Rev. E 79, 046221). So only the
-first Hopf point of each frequency is followed, where waveforms are smooth.
+With a delay one branch gives many orbits: an orbit of period T at a delay is an orbit at the delay
+plus any whole number of periods (Yanchuk & Perlikowski 2009, Phys. Rev. E 79, 046221). So only the
+first Hopf point of each frequency is followed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.arclength import NoOrbit
@@ -35,17 +36,17 @@ from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: FURTHEST: multiple of the delay up to which Hopf points are searched for.
+#: Largest delay at which Hopf points are searched, over the network's delay.
 FURTHEST = 4.0
-#: POINTS: most points of a branch; TURNS: most whole periods that are added to a delay.
-POINTS, TURNS = 80, 12
+#: Points of a branch, and whole periods by which a delay is longer, at most.
+POINTS, MOST_PERIODS = 80, 12
 
 
 def branch_orbits(network: Network, gait: str) -> Iterator[list[Orbit]]:
     """Yield for each Hopf point of the gait's class the orbits on its branch at the parameters.
 
-    The delay moves, or without one the parameters that the network names for branches. Nothing is
-    yielded where the network has no equilibrium, or weights break its symmetry.
+    The branches run along the delay or, without a delay, along the network's own line. There are
+    none if the network has no equilibrium or its weights break the symmetry.
 
     Args:
         network: parameters.
@@ -68,7 +69,7 @@ def branch_orbits(network: Network, gait: str) -> Iterator[list[Orbit]]:
 
 
 def _line(network: Network) -> tuple[ParameterLine, float, float]:
-    """Return the parameters that move, and how far."""
+    """Return the line of parameters along which branches run, and its ends."""
     if network.delay_parameter:
         return ParameterLine((network.delay_parameter,), (1.0,)), 0.0, FURTHEST * network.delay
     line = ParameterLine.parse(network.line, type(network))
@@ -92,36 +93,33 @@ def _on_branch(network: Network, point: HopfPoint, low: float, high: float) -> I
             return
         low, high = 0.5 * min(point.value, value), max(value, 1.1 * point.value)
     try:
-        branch = continue_from_hopf(point.network, point.block.symmetry, point.omega, line, low,
-                                    high, rest=point.state, vector=point.eigenvector, most=POINTS)
+        branch = continue_from_hopf(point, line, low, high, most=POINTS)
     except NoOrbit:
         return
-    for turns in range(TURNS + 1 if _repeats(network) else 1):
-        yield from _crossings(network, branch, value, turns)
+    for periods in range(MOST_PERIODS + 1 if _repeats(network) else 1):
+        yield from _crossings(network, branch, value, periods)
 
 
-def _crossings(network: Network, branch: Branch, value: float, turns: int) -> Iterator[Orbit]:
-    """Yield the orbits where a branch's value, plus so many periods, is the wanted one."""
+def _crossings(network: Network, branch: Branch, value: float, periods: int) -> Iterator[Orbit]:
+    """Yield the orbits where a branch's value plus a number of periods is a given value."""
     def ahead(point: BranchPoint) -> float:
-        return point.value + turns * point.orbit.period - value
+        return point.value + periods * point.orbit.period - value
 
     for left, right in pairwise(branch.points):
         a, b = ahead(left), ahead(right)
         if a * b > 0.0 or a == b:
             continue
-        fraction = a / (a - b)
-        lower, other = left.orbit, right.orbit
+        orbits, weights = (left.orbit, right.orbit), np.array([b, -a]) / (b - a)
 
-        def path(theta: np.ndarray, fraction: float = fraction, lower: Orbit = lower,
-                 other: Orbit = other
+        def path(theta: np.ndarray, ends: Any = orbits, weights: np.ndarray = weights
                  ) -> np.ndarray:
-            return ((1.0 - fraction) * lower(theta * lower.period)
-                    + fraction * other(theta * other.period))
+            states: np.ndarray = weights @ [orbit(theta * orbit.period).ravel() for orbit in ends]
+            return states.reshape(theta.size, -1)
 
-        period = (1.0 - fraction) * lower.period + fraction * other.period
-        orbit = orbit_method(network).solve.from_path(network, lower.symmetry, path, period)
-        if orbit is not None:
-            yield orbit
+        period = float(weights @ [orbit.period for orbit in orbits])
+        solved = solve_from_path(network, left.orbit.symmetry, path, period)
+        if solved is not None:
+            yield solved
 
 
 # Gaits as exact periodic orbits, for every network.
@@ -139,8 +137,7 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
 
     Raises:
         InputError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoOrbit: this set has no such orbit, or none was found; the message says how far off
-            the parameters are.
+        NoOrbit: this set has no such orbit, or none was found; the message gives the reason.
 
     """
     preset = network.presets().get(gait)
@@ -161,7 +158,7 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
         near: the known orbit.
 
     Raises:
-        NoOrbit: the method leads elsewhere; a shorter way may do.
+        NoOrbit: the method leads elsewhere; a shorter step may succeed.
 
     """
     orbit: Orbit = orbit_method(network).solve.beside(network, near)

@@ -14,7 +14,7 @@
 
 """The gaits of a parameter set: existence, amplitude, period and stability.
 
-And what stands nearest where there is none: the threshold at which rest gives way.
+Where there is none, ``nearest_threshold`` names the threshold of the nearest one.
 """
 
 from collections.abc import Callable
@@ -23,25 +23,16 @@ from functools import cached_property
 from typing import Any
 
 from cpg_ros.common.errors import ShortRepr
+from cpg_ros.dynamics import floquet
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits, CoexistingOrbits
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import (
-    ATTRACTS,
-    attracts_with,
-    leading_within,
-    Multipliers,
-    multipliers,
-    smallest_gain,
-    sufficient_gain,
-)
+from cpg_ros.dynamics.floquet import Multipliers, multipliers_within, sufficient_gain
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.networks.network import Network
 
-# Stability of a gait: whether it attracts, and with what symmetry gain.
-
-#: RATE: rate at which transverse disturbances decay with the lock gain, 1/model time.
+#: Rate at which transverse disturbances decay with the lock gain, 1/model time.
 RATE = 0.5
 
 
@@ -50,31 +41,33 @@ class Stability:
     """Stability of an orbit.
 
     Attributes:
-        enough: symmetry gain (1/model time) that makes transverse disturbances decay.
-        lock_gain: gain to run with: that, with a margin.
-        flaw: why the gait does not attract whatever the gain, or ''.
+        enough: symmetry gain above which transverse disturbances decay, 1/model time.
+        lock_gain: gain with which they decay at RATE, 1/model time.
+        reason: why no gain makes the gait attract, or why that cannot be told; or ''.
 
     """
 
     enough: float
     lock_gain: float
-    flaw: str
+    reason: str
 
 
 def stability(orbit: Orbit) -> Stability:
-    """Judge an orbit by its multipliers.
-
-    Where the network knows a bound that holds in any of its states, the gain comes from that.
-    """
+    """Judge an orbit by its multipliers; the network's own bound gives the gain, if it has one."""
     bound = orbit.network.sufficient_gain(RATE)
     if bound is None:
         enough, gain = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
     else:
         enough = gain = bound
-    leading = leading_within(orbit)
-    flaw = '' if leading < ATTRACTS else (
-        f'a disturbance within its own symmetry class grows {leading:.4g} times a stride')
-    return Stability(enough, gain, flaw)
+    inside = multipliers_within(orbit)
+    reason = {
+        True: '',
+        False: f'a disturbance within its own symmetry class grows {inside.leading:.4g} times a '
+               'stride',
+        None: 'cannot tell whether a disturbance within its own symmetry class decays: its '
+              f'multiplier is {inside.leading:.10g}, with an error of '
+              f'{max(inside.error, 1.0 - floquet.ATTRACTS):.0e}'}
+    return Stability(enough, gain, reason[inside.attracts])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,11 +76,11 @@ class GaitAssessment(ShortRepr):
 
     Attributes:
         gait: one of the network's gaits.
-        orbit: its orbit, or None; of several one that attracts within the gait's class if any
+        orbit: its orbit, or None; of several, one that attracts within the gait's class if any
             does, nearest in period to that of the preset.
-        why: why there is none, or ''.
-        others: the same of each coexisting orbit of the gait that was found.
-        searched: what others were searched from, or ''.
+        why: reason why there is none, or ''.
+        others: the same for each coexisting orbit of the gait.
+        searched: extent of the search for others, or ''.
 
     """
 
@@ -124,17 +117,17 @@ class GaitAssessment(ShortRepr):
     @cached_property
     def multipliers(self) -> Multipliers:
         """Floquet multipliers without a symmetry lock."""
-        return multipliers(self._orbit)
+        return floquet.multipliers(self._orbit)
 
     @property
-    def stable(self) -> bool:
-        """Whether the gait attracts in the full network, without a lock."""
+    def stable(self) -> bool | None:
+        """Whether the gait attracts in the full network, without a lock; None: cannot tell."""
         return self.multipliers.attracts
 
     @cached_property
     def smallest_gain(self) -> float:
         """Symmetry gain above which every transverse disturbance decays, 1/model time."""
-        return smallest_gain(self._orbit)
+        return floquet.smallest_gain(self._orbit)
 
     @cached_property
     def default_gain(self) -> float:
@@ -142,9 +135,9 @@ class GaitAssessment(ShortRepr):
         return sufficient_gain(self._orbit, RATE)
 
     @cached_property
-    def stable_with_default_gain(self) -> bool:
-        """Whether the gait attracts with the gain the generator would choose."""
-        return attracts_with(self._orbit, self.default_gain)
+    def stable_with_default_gain(self) -> bool | None:
+        """Whether the gait attracts with the gain the generator would choose; None as above."""
+        return floquet.attracts_with(self._orbit, self.default_gain)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""
@@ -163,15 +156,15 @@ class GaitAssessment(ShortRepr):
 
 def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
              near: Orbit | None = None, everything: bool = False) -> dict[str, GaitAssessment]:
-    """Judge every gait of a network, by all of its orbits that are found.
+    """Judge every gait of a network by all of its orbits.
 
-    Where the orbit reached first is not stable, others are looked for from starts in the gait's
-    class; where none attracts in it, also by deflation and, with a delay, on branches.
+    If the first orbit is not stable, simulations from starts in the gait's class look for others;
+    if none attracts in the class, deflation and, with a delay, branches do so, too.
 
     Args:
         network: parameters, all finite.
         done: called with the number of gaits that are done.
-        near: a known orbit of one of the gaits, from which that one is solved for.
+        near: orbit of one of the gaits, from which that gait is solved for.
         everything: look for all orbits of every gait.
 
     Raises:
@@ -201,23 +194,22 @@ def _assessed(orbits: CoexistingOrbits) -> GaitAssessment:
 
 
 def nearest_threshold(network: Network) -> str:
-    """Return a text on the nearest threshold of a gait, for a network with a delay without one.
+    """Name the threshold of the nearest gait, of a network with a delay that has no gait.
 
-    The critical delay that is nearest above the delay; where no delay has one, what the network
-    says has to be larger.
+    It is the nearest critical delay above the delay or, if there is none, the least coupling.
     """
     name, delay = network.delay_parameter, network.delay
     points = {gait: first_hopf(network, gait) for gait in network.gaits()}
     ahead = {gait: point.value for gait, point in points.items()
              if point is not None and point.value >= delay}
     if ahead:
-        gait = min(ahead, key=lambda one: ahead[one])
+        gait = min(ahead, key=ahead.__getitem__)
         return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} ({name} "
                 f'is {delay:g})')
     needed = {gait: coupling for gait, point in points.items()
               if point is None and (coupling := network.least_coupling(gait)) is not None}
     if needed:
-        gait = min(needed, key=lambda one: needed[one].least)
+        gait = min(needed, key=lambda gait: needed[gait].least)
         what, value, least = needed[gait]
         return (f'the nearest threshold is {what} {least:.4f}, above which the {gait} has a '
                 f'critical delay ({what} is {value:g})')

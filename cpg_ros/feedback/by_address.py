@@ -32,7 +32,7 @@ import numpy as np
 
 
 def _load(_, pointer):
-    """Return what is at a pointer, as memory_of lays it out."""
+    """Return the value at a pointer, laid out as by memory_of."""
     def code(target, builder, signature, arguments):
         kind = target.get_value_type(pointer.dtype).as_pointer()
         return builder.load(builder.bitcast(arguments[0], kind))

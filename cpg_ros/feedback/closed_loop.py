@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One tick of the closed loop, compiled: from numbers of messages to corrected angles."""
+"""One tick of the closed loop, compiled: from the values of messages to corrected angles."""
 
 import math
 from typing import NamedTuple
@@ -50,12 +50,12 @@ AGREES = 0.5
 FLIGHT = 0.3
 #: Sources of the loads on the feet.
 FOOT_CONTACTS, WRENCHES, EFFORTS = CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
-#: Number of values that are read. JOINT: of each joint; FORCE: of a Wrench.
+#: JOINT: number of values that are read of each joint; FORCE: number of a Wrench's.
 JOINT, FORCE = 3, 3
 
 
 class Senses(NamedTuple):
-    """The numbers of the newest messages, and what they are checked by.
+    """The values of the newest messages, and the data by which they are checked.
 
     Inputs are the IMU, the joints and, unless those show them, the contacts: of all feet, or of
     each.
@@ -69,7 +69,7 @@ class Senses(NamedTuple):
         joints: positions, velocities and efforts, shape (JOINT, joints).
         feet: loads, shape (1, legs), or forces, shape (legs, FORCE).
         counts: measured joints, and which of CONTACTS it is, shape (2,).
-        places: 0, 1, 2 and so on.
+        places: indices 0, 1, 2 and so on.
         mount: orientation of the IMU in the base's frame, x y z w.
         limits: of the joints, lowest, highest, fastest, shape (3, joints).
         weight: of the robot, N, shape (1,).
@@ -136,7 +136,7 @@ def _judge_feet(senses, sensors, legs, k, gap):
 
 @jit_entry
 def take_in(senses, sensors, legs, now, moving):
-    """Check the messages that have come, and fill sensors with what is plausible.
+    """Check the messages that have come, and fill sensors with the plausible values.
 
     Args:
         senses: Senses.
@@ -171,23 +171,25 @@ def take_in(senses, sensors, legs, now, moving):
         senses.news[k] = 0
 
 
-#: Numbers of a loop's state: whether feedback is wanted; for how long its fraction has been 0, s;
-#: that fraction; see fade (2); how well contacts agree with the gait; how many inputs are out; how
-#: the IMU seems to be mounted, an index into leg_rates.MOUNTED; whether contacts do not agree;
-#: whether anything is fed back; and how many numbers these are.
+#: Indices of a loop's state. WANTED: whether feedback is requested; SPENT: time for which its
+#: share has been 0, s; FRACTION: that share; WAY, GOOD_FOR: see fade; AGREEMENT: mean share of
+#: legs whose contacts agree with the gait; OUT: number of inputs that are out; MOUNT: index of the
+#: IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts disagree; CLOSED: whether feedback
+#: acts. STATE is the number of these.
 (WANTED, SPENT, FRACTION, WAY, GOOD_FOR, AGREEMENT, OUT, MOUNT, CONTRARY, CLOSED,
  STATE) = range(11)
-#: Of the instant: length of the tick, s; time, s; level; phase; share of the gait that is entered;
-#: stride frequency, Hz; whether the gait changes.
+#: Indices of an instant. DT: length of the tick, s; NOW: time, s; LEVEL: of the ramp, 0 to 1;
+#: PHASE: cycles; MIX: share of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
+#: whether the gait changes.
 DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES = range(7)
 
 
 class Instant(NamedTuple):
-    """What the pattern does now, what is commanded, and what the pattern gets.
+    """Present state of the pattern, commands, and the outputs for the pattern.
 
     Attributes:
-        numbers: see DT and what follows it.
-        gaits: keys of the gait that is left and of that which is entered, shape (2,).
+        numbers: see DT to CHANGES.
+        gaits: keys of the gait that is left and of the gait that is entered, shape (2,).
         wish: speeds forward and to the left, m/s, and yaw rate, rad/s.
         scale: factor of the stride frequency, shape (1,); filled.
         trim: added to the strides, shape (legs,); filled.
@@ -233,7 +235,7 @@ def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
 
 @jit_entry
 def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant, state, out):
-    """Correct a tick's planned angles by what is measured.
+    """Correct a tick's planned angles by the measurements.
 
     Args:
         legs: LegArrays of the robot.

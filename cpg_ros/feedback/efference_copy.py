@@ -50,7 +50,7 @@ def between_phases(place, points):
 def between_speeds(speeds, speed):
     """Return the rows of a table on either side of a speed, and the share of the second.
 
-    Beyond the table, that of its nearest end.
+    Beyond the table, the nearest end counts.
 
     Args:
         speeds: of the rows, m/s, rising, shape (rows,).

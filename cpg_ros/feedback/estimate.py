@@ -223,7 +223,7 @@ class BodyState:
         self.scratch = np.zeros((legs, 4)), np.zeros((4, 3))
 
     def update(self, sensors: SensorData, dt: float) -> None:
-        """Update the estimate with what is measured, dt in s after the last time."""
+        """Update the estimate with new measurements, dt in s after the last ones."""
         _update_all(self.geometry.arrays, sensors, dt, self.velocity, self.contact,
                     self._doubt, *self.scratch)
 
@@ -337,7 +337,7 @@ class Odometry:
         """Take a step.
 
         Args:
-            sensors: what is measured now, of one run.
+            sensors: present measurements of one run.
             velocity: of the base in its own frame, as estimated, m/s, shape (3,).
             contact: whether each foot is on the ground, shape (legs,).
             dt: s.

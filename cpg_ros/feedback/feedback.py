@@ -86,7 +86,7 @@ class Feedback:
         """Return the corrected angles, rad, shape (runs, joints), which no limit holds yet.
 
         Args:
-            sensors: what is measured now.
+            sensors: present measurements.
             planned: what the pattern plans for now.
             dt: since the last time, s.
             fraction: of all corrections, 0 to 1.

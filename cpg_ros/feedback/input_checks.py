@@ -41,10 +41,12 @@ AGE_MEMORY, IN_TIME = 0.1, 0.9
 FADE, GOOD = 0.15, 0.3
 
 
-#: Numbers of a monitor, times in s: when the last valid message came, when numbers last
-#: differed, when any message came, the stamp of the last valid one, when its age was last looked
-#: at, that age, since when the input is out, whether it is late, what is wrong with the last
-#: message, how old its stamp is, and the largest age.
+#: Indices of a monitor's values, times in s. Instants of BELIEVED: the last valid message;
+#: CHANGED: the last change of values; CAME: the last message; MEASURED: the stamp of the last
+#: valid one;
+#: USED: the last update of its age; SINCE: the failure of the input. AGE: low-passed age; IS_LATE:
+#: whether it is too large; WRONG: verdict on the last message; LAG: age of its stamp; LATEST:
+#: largest age.
 BELIEVED, CHANGED, CAME, MEASURED, USED, AGE, SINCE, IS_LATE, WRONG, LAG, LATEST = range(11)
 
 
@@ -57,8 +59,8 @@ def note(monitor, now, stamp, same, verdict, patience):
         now: s.
         stamp: of the message, the same clock's, s; NaN if it has none.
         same: whether its numbers are those of the last one.
-        verdict: what is wrong with them, an index into VERDICTS.
-        patience: for how long the same numbers may come again, s.
+        verdict: on them, an index into VERDICTS.
+        patience: longest time for which the same numbers may come again, s.
 
     """
     monitor[CAME] = now
@@ -75,7 +77,7 @@ def note(monitor, now, stamp, same, verdict, patience):
 
 @jit
 def is_out(monitor, now):
-    """Update the age of what is used now, s; tell whether the input is out."""
+    """Update the low-passed age of the measurements, s; tell whether the input is out."""
     stale, late = now - monitor[BELIEVED] > STALE, False
     if stale:
         # What comes after a gap is as old as it is, whatever was before.
@@ -102,7 +104,7 @@ class InputMonitor:
     Attributes:
         name: of the input.
         numbers: see BELIEVED and what follows it.
-        other: what is wrong with messages that no check could read.
+        other: fault of messages that no check could read.
 
     """
 
@@ -190,7 +192,7 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
             'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
             'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed',
             'the same numbers again and again', '', '')
-#: Numbers of the last ones: REPEATED: the same values; MISSTAMPED: a stamp far from now;
+#: Indices of the last verdicts. REPEATED: the same values; MISSTAMPED: a stamp far from the clock;
 #: UNREADABLE: another layout.
 REPEATED, MISSTAMPED, UNREADABLE = 11, 12, 13
 #: UNIT: largest difference of a quaternion's length from 1; FASTEST: largest angular velocity,

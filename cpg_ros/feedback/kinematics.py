@@ -139,14 +139,14 @@ def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
 
 @jit
 def from_leg(leg, x, y, z):
-    """Return a vector of a leg's frame in that of the base."""
+    """Return a vector, given in a leg's frame, in the frame of the base."""
     return (leg[14] * x + leg[15] * y + leg[16] * z, leg[17] * x + leg[18] * y + leg[19] * z,
             leg[20] * x + leg[21] * y + leg[22] * z)
 
 
 @jit
 def to_leg(leg, x, y, z):
-    """Return a vector of the base's frame in that of a leg."""
+    """Return a vector, given in the frame of the base, in a leg's frame."""
     return (leg[14] * x + leg[17] * y + leg[20] * z, leg[15] * x + leg[18] * y + leg[21] * z,
             leg[16] * x + leg[19] * y + leg[22] * z)
 

@@ -15,7 +15,7 @@
 """The core of the pattern in C: structs of ``c/host.h`` and functions of ``c/host.c``.
 
 It is compiled of the parts that an export is made of, once for all robots and networks; each
-network's own library steps it (integration.c_kernel). All memory is that of arrays here. Functions
+network's own library steps it (integration.c_kernel). Arrays here own all memory. Functions
 hold the interpreter's lock: they take some microseconds, and other threads write what they read.
 """
 

@@ -400,7 +400,7 @@ def numbers(text: str, count: int, finite: bool = True) -> tuple[float, ...]:
     Args:
         text: numbers with spaces between them.
         count: how many there should be.
-        finite: count what is infinite as no number.
+        finite: whether infinite values count as missing.
 
     """
     try:
@@ -455,7 +455,7 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     shapes: list[CollisionShape] = []
     for part in element.iterfind('inertial/mass'):
         mass = sum(numbers(part.get('value', ''), 1))
-    # Where nothing collides, what is seen tells where a link ends.
+    # Without collision shapes, visual ones show where a link ends.
     for collision in element.findall('collision') or element.findall('visual'):
         origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
         place = {} if origin is None else origin.attrib

@@ -67,9 +67,11 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
         period = f'period of {orbit.period:.3g} model time units'
         return Obstacle(f'has a {period}, too short for steps of {orbit.network.step}: at least '
                         f'{shortest:g} is needed', f'its {period} is below {shortest:g}')
-    if judged.flaw:
-        return Obstacle(f'exists at these parameters but does not attract: {judged.flaw}',
-                        f'it does not attract: {judged.flaw}')
+    if judged.reason:
+        verdict = ('may not attract' if judged.reason.startswith('cannot tell') else
+                   'does not attract')
+        return Obstacle(f'exists at these parameters but {verdict}: {judged.reason}',
+                        f'it {verdict}: {judged.reason}')
     try:
         joint_readout(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
     except NoPhase as error:
@@ -254,10 +256,10 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     found = coexisting_orbits(network, preset.gait, known, starts=False, everything=False)
     orbit = found.orbits[0]
     judged = stability(orbit)
-    if judged.flaw and found.searched:
+    if judged.reason and found.searched:
         count = len(found.orbits)
         whole = 'this is the only orbit' if count == 1 else f'none of {count} orbits attracts'
-        judged = replace(judged, flaw=f'{judged.flaw}; {whole}, {found.searched}')
+        judged = replace(judged, reason=f'{judged.reason}; {whole}, {found.searched}')
     return orbit, judged
 
 

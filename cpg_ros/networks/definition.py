@@ -27,42 +27,28 @@ from typing import Any, ClassVar, Literal, TypeVar, Union
 
 from cpg_ros.common.errors import InputError
 
-# Terms of the equations, which are recorded as text.
-
-#: Operands of an equation.
+#: What may stand in an equation.
 Number = Union['Term', float]
+
+
+def _operators(sign: str) -> tuple[Callable[['Term', Number], 'Term'],
+                                   Callable[['Term', Number], 'Term']]:
+    """Return a binary operator of terms, and the same with exchanged operands."""
+    return (lambda term, other: Term(f'({term.text} {sign} {_text(other)})'),
+            lambda term, other: Term(f'({_text(other)} {sign} {term.text})'))
 
 
 class Term:
     """A part of an equation, as text that sympy reads."""
 
+    __add__, __radd__ = _operators('+')
+    __sub__, __rsub__ = _operators('-')
+    __mul__, __rmul__ = _operators('*')
+    __truediv__, __rtruediv__ = _operators('/')
+
     def __init__(self, text: str) -> None:
         """Wrap a text."""
         self.text = text
-
-    def __add__(self, other: Number) -> 'Term':
-        return Term(f'({self.text} + {_text(other)})')
-
-    def __radd__(self, other: Number) -> 'Term':
-        return Term(f'({_text(other)} + {self.text})')
-
-    def __sub__(self, other: Number) -> 'Term':
-        return Term(f'({self.text} - {_text(other)})')
-
-    def __rsub__(self, other: Number) -> 'Term':
-        return Term(f'({_text(other)} - {self.text})')
-
-    def __mul__(self, other: Number) -> 'Term':
-        return Term(f'({self.text} * {_text(other)})')
-
-    def __rmul__(self, other: Number) -> 'Term':
-        return Term(f'({_text(other)} * {self.text})')
-
-    def __truediv__(self, other: Number) -> 'Term':
-        return Term(f'({self.text} / {_text(other)})')
-
-    def __rtruediv__(self, other: Number) -> 'Term':
-        return Term(f'({_text(other)} / {self.text})')
 
     def __pow__(self, power: int) -> 'Term':
         return Term(f'({self.text} ** {power!r})')
@@ -75,38 +61,16 @@ def _text(value: Number) -> str:
     return value.text if isinstance(value, Term) else repr(value)
 
 
-def tanh(x: Number) -> Term:
-    """Hyperbolic tangent."""
-    return Term(f'tanh({_text(x)})')
+def _function(name: str) -> Callable[[Number], Term]:
+    return lambda x: Term(f'{name}({_text(x)})')
 
 
-def cosh(x: Number) -> Term:
-    """Hyperbolic cosine."""
-    return Term(f'cosh({_text(x)})')
-
-
-def exp(x: Number) -> Term:
-    """Exponential."""
-    return Term(f'exp({_text(x)})')
-
-
-def sin(x: Number) -> Term:
-    """Sine."""
-    return Term(f'sin({_text(x)})')
-
-
-def cos(x: Number) -> Term:
-    """Cosine."""
-    return Term(f'cos({_text(x)})')
-
-
-def sqrt(x: Number) -> Term:
-    """Square root."""
-    return Term(f'sqrt({_text(x)})')
+#: Functions of terms, by the names that they have in mathematics.
+tanh, cosh, exp, sin, cos, sqrt = map(_function, ('tanh', 'cosh', 'exp', 'sin', 'cos', 'sqrt'))
 
 
 def positive(x: Number) -> Term:
-    """max(0, x): differentiable but at 0, where a network that has it states a kink."""
+    """max(0, x): differentiable except at 0, where the network has a kink."""
     return Term(f'(({_text(x)} + Abs({_text(x)})) / 2)')
 
 
@@ -199,42 +163,40 @@ class NetworkDefinition(ABC):
 
     Attributes:
         name: by which it is chosen.
-        cells: how many.
-        states: names of each cell's variables, the one that legs read first.
-        variables: how many these are.
-        readout: what joints follow: the waveform itself of cells that swing as smoothly as joints
-            can, or the phase, which two variables of a cell tell, of cells that jump.
-        delay_parameter: the one that is the delay, '' for an ordinary differential equation.
-        longest_delay: that may be set at run time, model time.
-        needed: parameter that must not be 0 -> what would be lost.
+        cells: number of cells.
+        states: names of each cell's variables; legs read the first.
+        variables: number of these.
+        readout: signal that joints follow: the waveform of cells that are as smooth as joints, or
+            the phase, from two variables of a cell, of cells that jump.
+        delay_parameter: name of the delay, '' for an ordinary differential equation.
+        longest_delay: largest value of the delay at run time, model time.
+        needed: parameter that must not be 0 -> the consequence of 0.
         step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
         ranges: parameter -> range in which it may be set at run time.
         legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
             gives the leg's phase; the first assignment is the usual one.
-        family: of a network made for another number of legs, the one it is made after.
-        sides: leg -> left or right; where it is not given, robot files give it.
-        girdles: leg -> fore, middle or hind, the same; of two legs neither.
-        muscles: name -> cell from 1, where cells drive muscles: phases are reported for each, and
-            diagrams draw when it is active. Otherwise both are of legs, which stand while their
-            first cell falls.
-        groups: name -> parameters that can be set together under it.
-        own_of_cells: name in the equations -> the parameter that each cell has for it, where
-            they are not to be set together as a group is.
+        family: network from which one for another number of legs is made.
+        sides: leg -> left or right; robot files may give it instead.
+        girdles: leg -> fore, middle or hind; robot files may give it instead.
+        muscles: name -> cell from 1, where cells drive muscles, for reports and diagrams; these
+            are of legs otherwise, which stand while their first cell falls.
+        groups: name -> parameters that are set together under it.
+        own_of_cells: name in the equations -> the parameter of each cell, where these are not set
+            together as a group.
         kinks: variables at whose zeros the rates have a kink.
         couplings: parameters without which the cells are uncoupled.
-        offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
-            are a gait and no symmetry tells them.
-        unnamed: the gait whose phases have no name, of such a network.
+        offsets: leg -> parameter with its lead in cycles, where any phases are a gait.
+        unnamed: name of a gait of such a network whose phases have no name.
         rests: whether a cell without input has an equilibrium, from which gaits emerge.
-        usual_gait: that it starts with; a gait's own name is that of its usual preset.
-        usual_robot: file that it starts with, or name of a shipped one.
-        free: parameters or groups that are usually fitted to a recording.
-        line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.
-        span: how far, or None: up to a multiple of the delay.
-        searched: parameter or group -> bounds within which weights are usually looked for; those
-            with equal bounds are given. Empty: nothing can be looked for.
+        usual_gait: default gait; its default preset has the same name.
+        usual_robot: default robot, a file or the name of a shipped one.
+        free: parameters or groups that are fitted to a recording by default.
+        line: default line of parameters for Hopf points and branches, as ParameterLine reads it.
+        span: range of values on it, or None for multiples of the delay.
+        searched: parameter or group -> bounds of a search for weights; equal bounds fix it. Empty:
+            no search.
         typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
-            that search starts.
+            the search starts.
 
     """
 

@@ -15,7 +15,7 @@
 """Numpy code for a network's rates and their derivatives, derived by sympy."""
 
 from collections.abc import Iterable, Sequence
-from itertools import combinations_with_replacement, product
+from itertools import combinations_with_replacement, islice, product
 from typing import Any, Protocol
 
 from cpg_ros.networks.definition import Argument
@@ -36,7 +36,7 @@ class EquationTexts(Protocol):
 
 
 def print_float(printer: Any, value: Any) -> str:
-    """Print a number to the last digit: sympy leaves out two of them."""
+    """Print a number to the last digit; sympy omits two of them."""
     return repr(float(value))
 
 
@@ -57,16 +57,15 @@ def expressions(equations: EquationTexts) -> tuple[list[Any], list[Any]]:
 
 
 def _function(name: str, symbols: Sequence[Any], parts: Sequence[Sequence[Any]]) -> str:
-    """Return code of a function that returns expressions; common parts are computed once."""
-    shared, reduced = sympy.cse([one for part in parts for one in part],
+    """Write a function that returns expressions and computes common subexpressions once."""
+    shared, reduced = sympy.cse([value for part in parts for value in part],
                                 sympy.numbered_symbols('s'))
     lines = [f'def {name}({", ".join(map(str, symbols))}):']
     lines += [f'    {symbol} = {_PRINTER.doprint(value)}' for symbol, value in shared]
-    written, place = [], 0
+    written, results = [], iter(reduced)
     for part in parts:
-        mine = reduced[place:place + len(part)]
-        written.append(f'({"".join(f"{_PRINTER.doprint(one)}, " for one in mine)})')
-        place += len(part)
+        texts = (f'{_PRINTER.doprint(value)}, ' for value in islice(results, len(part)))
+        written.append(f'({"".join(texts)})')
     lines.append(f'    return {written[0] if len(parts) == 1 else ", ".join(written)}')
     return '\n'.join(lines)
 
@@ -99,7 +98,7 @@ def first(equations: EquationTexts) -> str:
 
 
 def _smooth(part: Any) -> Any:
-    """Drop terms that differ from 0 at a kink alone: derivatives are those beside it."""
+    """Leave out delta functions at kinks: derivatives are those beside the kink."""
     return part.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
 
 
@@ -109,15 +108,15 @@ def higher(equations: EquationTexts) -> str:
     count = len(equations.arguments)
     texts, tables = [], []
     for name, order in (('second', 2), ('third', 3)):
-        places, entries = _nonzero(
+        indices, entries = _nonzero(
             ((v, *ks), _smooth(sympy.diff(rate, *(symbols[k] for k in ks)))) for (v, rate), ks
             in product(enumerate(rates), combinations_with_replacement(range(count), order)))
-        tables.append(f'{name.upper()} = {places!r}')
+        tables.append(f'{name.upper()} = {indices!r}')
         texts.append(_function(name, symbols, [entries]))
-    places, entries = _nonzero(
+    indices, entries = _nonzero(
         ((v, r, k), _smooth(sympy.diff(rate, symbols[count + r], symbols[k])))
         for (v, rate), r, k
         in product(enumerate(rates), range(len(equations.rows)), range(count)))
-    tables.append(f'MIXED = {places!r}')
+    tables.append(f'MIXED = {indices!r}')
     texts.append(_function('mixed', symbols, [entries]))
     return _source('\n'.join(tables), *texts)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A network's equations as functions on arrays, with exact derivatives, kept on disk.
+"""A network's equations, and functions on arrays from them.
 
 Every cell obeys the same equations, in which other cells are inputs, now or a delay ago. They are
-written once for a cell (``Network.equations``); here they are read as texts, and sympy derives the
-rates and their derivatives, exactly, as numpy code that is kept on disk.
+written once for a cell (``Network.equations``). This module reads them as texts; sympy derives the
+exact rates and derivatives as numpy code, which is kept on disk.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -43,10 +43,10 @@ _COMPILED = ('networks', 'dynamics', 'motion', 'feedback')
 
 
 def folder(key: str = 'package') -> Path | None:
-    """Return where code is kept: of the package, or what follows from a network's equations.
+    """Return the folder of compiled code: of the package, or of a network's equations.
 
-    Its name has a digest of the sources. numba's own cache watches only the file that a kernel
-    stands in, not those of the functions it calls; here any edit leads to another folder.
+    Its name has a digest of the sources, so any edit leads to another folder. numba's own cache
+    watches only the file of a kernel, not those of the functions it calls.
 
     Args:
         key: of the equations, see Equations.key.
@@ -164,8 +164,8 @@ class Equations:
     def slopes(self, x: Sequence[Any], p: Sequence[Any]
                ) -> tuple[list[Any], dict[tuple[int, int], Any]]:
         """Return the rates, and (variable, argument) -> derivative, those not identically 0."""
-        rates, found = self._first.slopes(*x, *p)
-        return list(rates), dict(zip(self._first.SLOPES, found, strict=True))
+        rates, slopes = self._first.slopes(*x, *p)
+        return list(rates), dict(zip(self._first.SLOPES, slopes, strict=True))
 
     def by_parameter(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int], Any]:
         """Return (variable, row) -> derivative of the rate, those not identically 0."""
@@ -180,8 +180,7 @@ class Equations:
         """Return (variable, argument, argument) -> second derivative, arguments rising."""
         return dict(zip(self._higher.SECOND, self._higher.second(*x, *p), strict=True))
 
-    def third(self, x: Sequence[Any], p: Sequence[Any]
-              ) -> dict[tuple[int, int, int, int], Any]:
+    def third(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int, int, int], Any]:
         """Return (variable, three arguments) -> third derivative, arguments rising."""
         return dict(zip(self._higher.THIRD, self._higher.third(*x, *p), strict=True))
 
@@ -195,8 +194,8 @@ def multilinear(derivatives: Mapping[Any, Any], sets: Sequence[Any]) -> dict[int
 
     """
     out: dict[int, Any] = {}
-    for (v, *places), value in derivatives.items():
-        for order in set(permutations(places)):
+    for (v, *indices), value in derivatives.items():
+        for order in set(permutations(indices)):
             out[v] = out.get(v, 0.0) + value * prod(
                 vectors[k] for vectors, k in zip(sets, order, strict=True))
     return out
@@ -234,7 +233,7 @@ class Field(Generic[AnyDefinition]):
     Attributes:
         size: cells that are left.
         kept: components of the network that stand for all, shape (d,).
-        place: where each component of the network finds its value among these.
+        columns: index among these of each component of the network, shape (components,).
 
     """
 
@@ -253,12 +252,11 @@ class Field(Generic[AnyDefinition]):
         blocks = np.arange(variables)[:, None]
         self.network, self.size = network, first.size
         self.kept = (first + blocks * cells).ravel()
-        self.place = (classes + blocks * self.size).ravel()
+        self.columns = (classes + blocks * self.size).ravel()
         self._equations = equations_of(type(network))
-        own = np.arange(cells)
-        #: For each argument, where the kept cells find it.
-        self._inputs = [self.place[argument.variable * cells + np.asarray(
-            own if argument.source is None else argument.source)[first]]
+        #: For each argument, its columns for the kept cells.
+        self._inputs = [self.columns[argument.variable * cells + np.asarray(
+            range(cells) if argument.source is None else argument.source)[first]]
             for argument in self._equations.arguments]
         self._p = [value[first] if value.ndim else value for value in values_of(network)]
         columns = list(network.parameters())
@@ -316,14 +314,14 @@ class Field(Generic[AnyDefinition]):
         find = self._equations.second if len(sets) == 2 else self._equations.third
         out = np.zeros(sets[0][0].shape, dtype=complex)
         for v, rate in multilinear(find(self._arguments(*at), self._p),
-                                   [self._arguments(*one) for one in sets]).items():
+                                   [self._arguments(*states) for states in sets]).items():
             out[..., v * self.size:(v + 1) * self.size] = rate
         return out
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Return the rates' derivative by the network's parameters, shape (..., d, parameters).
 
-        What the delay does is not in it: that depends on the slope of the past.
+        It excludes the effect of the delay, which depends on the slope of the past.
         """
         out = np.zeros((*now.shape, len(self.network.parameters())))
         i = np.arange(self.size)

@@ -14,11 +14,11 @@
 
 """Networks for other numbers of legs: ``delayed6`` is the delayed network for six legs.
 
-A network that takes any even number of legs says by a rule what changes with it (``fitted``);
-from that rule a class of networks is made for each number requested, with the name of its
-family and the number: a network like any other, with parameters, gaits and presets of its own.
+A network for any even number of legs states by a rule what changes with that number (``fitted``).
+The rule makes a class of networks for each requested number, named after its family and the
+number, with parameters, gaits and presets of its own.
 
-Legs are named for where they are. Two: left and right. Four: left and right, hind and fore (lh,
+Legs are named by their position. Two: left and right. Four: left and right, hind and fore (lh,
 rh, lf, rf); six have a middle pair, lm and rm, between them. More are counted on each side from
 the foremost, l1 r1 l2 r2 ..., as arachnologists do.
 """
@@ -70,8 +70,8 @@ def leg_names(legs: int) -> tuple[str, ...]:
     return BIPED if legs == 2 else tuple(side + pair for pair in girdles for side in 'lr')
 
 
-def places(legs: int) -> dict[str, Any]:
-    """Return ``sides`` and ``girdles`` of the legs and ``usual_robot``, as a network states them.
+def leg_positions(legs: int) -> dict[str, Any]:
+    """Return a network's ``sides``, ``girdles`` and ``usual_robot`` for a number of legs.
 
     Raises:
         InputError: as of pairs.
@@ -88,7 +88,7 @@ def places(legs: int) -> dict[str, Any]:
 
 
 def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
-    """Return the network of the same family for another number of legs.
+    """Return a network's class for another number of legs.
 
     Raises:
         InputError: the network takes no such number.
@@ -108,9 +108,9 @@ def _made(family: type[Any], legs: int) -> type[Any]:
 
 
 def for_legs(legs: int) -> Callable[[type[Any]], type[Any]]:
-    """Make a class the dataclass of a network for a number of legs, as its ``fitted`` states it.
+    """Make a class the dataclass of a network for a number of legs, by its ``fitted``.
 
-    What the class states itself stays.
+    The class's own attributes take precedence.
 
     Raises:
         InputError: the network takes no such number.
@@ -127,14 +127,13 @@ def for_legs(legs: int) -> Callable[[type[Any]], type[Any]]:
     return decorate
 
 
-def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
-             ) -> AnyDefinition:
+def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]) -> AnyDefinition:
     """Return a network from its family, number of legs and parameters: what pickle calls."""
     return with_legs(family, legs)(*values)
 
 
 def split_name(name: str) -> tuple[str, int] | None:
-    """Split a name such as 'delayed6' into that of the family and the number of legs."""
+    """Split a name such as 'delayed6' into the family's name and the number of legs."""
     match = _NUMBERED.fullmatch(name)
     return (match['family'], int(match['legs'])) if match and len(match['legs']) < 4 else None
 
@@ -149,6 +148,5 @@ def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mappi
     listed = list(legs)[::-1]
     rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
     right = [sides.get(leg) == 'right' for leg in listed]
-    key = list(zip(right, rank, strict=True) if len(listed) > 4 else
-               zip(rank, right, strict=True))
+    key = list(zip(right, rank, strict=True) if len(listed) > 4 else zip(rank, right, strict=True))
     return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]

@@ -14,7 +14,7 @@
 
 """The base class of networks: rates, presets, symmetries of gaits, and their defaults.
 
-The statement of its parameters, cells and equations is in definition.
+The definition of parameters, cells and equations is in ``networks.definition``.
 """
 
 from abc import abstractmethod
@@ -48,10 +48,7 @@ class LeastCoupling(NamedTuple):
 
 
 class Network(NetworkDefinition):
-    """Parameters of a network, as a frozen dataclass of floats; see NetworkDefinition, too.
-
-    What tells one network from another stands in these two; everything else asks.
-    """
+    """Parameters of a network, as a frozen dataclass of floats; see also NetworkDefinition."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -142,7 +139,7 @@ class Network(NetworkDefinition):
 
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
-        """Parameters that a gait's symmetry carries into one another, and so has to find equal."""
+        """Parameters that a gait's symmetry makes equal."""
         return tuple((name,) for name in cls.parameters())
 
     def sufficient_gain(self, rate: float) -> float | None:
@@ -214,10 +211,6 @@ def known(gait: str, gaits: tuple[str, ...]) -> str:
     return gait
 
 
-# A line in a network's parameter space: parameters that move together, each with a sign.
-
-
-
 @dataclass(frozen=True)
 class ParameterLine:
     """Parameters that are set to plus or minus one value; written ``alpha=-beta``.
@@ -241,13 +234,13 @@ class ParameterLine:
         """
         names: list[str] = []
         signs: list[float] = []
-        for part in text.split('='):
-            name = part.strip().removeprefix('-')
+        for term in text.split('='):
+            name = term.strip().removeprefix('-')
             members = network.members(name)
             for member in members:
                 if member in names:
                     raise InputError(f"'{text}' names {member} twice")
-            sign = -1.0 if part.strip().startswith('-') else 1.0
+            sign = -1.0 if term.strip().startswith('-') else 1.0
             if not names and sign < 0.0:
                 raise InputError(f"'{text}' must not begin with a minus")
             names.extend(members)
@@ -264,7 +257,7 @@ class ParameterLine:
                         for name, sign in zip(self.names, self.signs, strict=True))
 
     def value(self, network: Network) -> float:
-        """Return the network's value on the line, that of its first parameter."""
+        """Return the network's value on the line, which is its first parameter's."""
         return network.as_dict()[self.names[0]]
 
     def direction(self, network: Network) -> np.ndarray:

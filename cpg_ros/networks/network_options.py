@@ -15,7 +15,6 @@
 """The options --network, --presets, --preset and --set: a network and its parameters."""
 
 from argparse import ArgumentParser, Namespace
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,7 @@ from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 import numpy as np
 
-#: LARGEST: largest parameter; beyond it, arithmetic fails before it shows anything.
+#: Largest absolute value of a parameter.
 LARGEST = 1e6
 DEFAULT = 'delayed'
 
@@ -49,7 +48,7 @@ def add_network_options(parser: ArgumentParser) -> None:
 
 
 def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
-    """Return the network, the presets to choose from, and the name of the default one or ''."""
+    """Return the network, its presets, and the name of the default preset or ''."""
     name, file = args.network or DEFAULT, args.presets
     reader = None if file is None else YamlReader(file, 'preset file', PresetError, LARGEST)
     tree = reader.tree() if reader else {}
@@ -71,7 +70,7 @@ def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
 
 
 def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Preset]:
-    """Return what a parameter file of the generator, as inversion writes it, runs: one gait."""
+    """Return the preset in a parameter file of the generator, as inversion writes it."""
     inner = reader.keys(tree, '/**', {'ros__parameters'})['ros__parameters']
     where = '/**.ros__parameters'
     inner = reader.keys(inner, where, {'gait', kind.name},
@@ -89,10 +88,10 @@ def chosen_network(args: Namespace) -> Network:
 
 
 def chosen_preset(args: Namespace) -> tuple[Preset, Network]:
-    """Return the preset that the options choose, and its parameters, some of them changed.
+    """Return the preset that the options choose, and the network with the values of --set.
 
     Raises:
-        InputError: an unknown name, or a value that makes no sense; the message says which.
+        InputError: an unknown name or an invalid value; the message says which.
         PresetError: the file of --presets cannot be used.
 
     """
@@ -103,19 +102,17 @@ def chosen_preset(args: Namespace) -> tuple[Preset, Network]:
         raise InputError(f'--preset: {wrong} {", ".join(presets)}')
     preset = presets[name]
     network = preset.network
-    refuse_repeated('--set', [member for key, _ in args.set
-                              for member in kind.groups.get(key, (key,))])
-    for key, value in args.set:
-        if key not in (*kind.parameters(), *kind.groups):
-            names = ', '.join((*kind.groups, *kind.parameters()))
+    for key, _ in args.set:
+        if key not in (names := (*kind.groups, *kind.parameters())):
             raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "
-                             f'{names}')
+                             f'{", ".join(names)}')
+    refuse_repeated('--set', [member for key, _ in args.set for member in kind.members(key)])
+    for key, value in args.set:
         if not np.isfinite(value):
             raise InputError(f'--set: {key} is {value:g}, it must be finite')
         if abs(value) > LARGEST:
             raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
-        members = kind.groups.get(key, (key,))
-        network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
+        network = network.replace(**{key: value})
     delay = kind.delay_parameter
     if delay and network.delay <= 0.0:
         raise InputError(f'--set: {delay} is {network.delay:g}, a delay must be positive')

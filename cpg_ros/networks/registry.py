@@ -38,15 +38,13 @@ from cpg_ros.networks.leg_numbers import GIRDLES, split_name, with_legs
 from cpg_ros.networks.library import shipped
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 
-# Checks of the attributes of networks that do not come with the package.
-
-#: STATED: attributes that every network has to state.
+#: Attributes that every network has.
 STATED = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs', 'usual_gait', 'free',
           'line')
 
 
-def flaw(network: type[Network]) -> str:
-    """Return what is wrong with the attributes of a network, one line, or ''.
+def definition_error(network: type[Network]) -> str:
+    """Return the first error in a network's definition, one line, or ''.
 
     Raises:
         ValueError: its presets cannot be read, or its line is none.
@@ -194,12 +192,12 @@ class _Networks(Mapping[str, type[Network]]):
             KeyError: there is none of this name.
 
         """
-        own = {**SHIPPED, **{network.name: network for network in self.files}}
-        if name in own:
-            return own[name]
-        parts = split_name(name)
-        if name not in self._offered and parts is not None and parts[0] in self:
-            return _numbered(*parts)
+        named = {**SHIPPED, **{network.name: network for network in self.files}}
+        if name in named:
+            return named[name]
+        family = split_name(name)
+        if name not in self._offered and family is not None and family[0] in self:
+            return _numbered(*family)
         return _of_entry_point(self._offered[name])
 
 
@@ -228,7 +226,7 @@ def is_path(name: str) -> bool:
 
 
 def find_network(name: str, folder: Path | None = None) -> type[Network]:
-    """Return a network by its name, or the one that a file defines; from then on it has a name.
+    """Return a network by its name, or the network in a file, which then is known by its name.
 
     Args:
         name: of a network, or path of a file.
@@ -242,10 +240,10 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
     if is_path(name):
         try:
             path = ((folder or Path()) / Path(name).expanduser()).resolve()
-            there = path.is_file()
+            exists = path.is_file()
         except (OSError, RuntimeError, ValueError) as error:
             raise NetworkError(' '.join(f'{name}: {error}'.split())) from error
-        if not there:
+        if not exists:
             raise NetworkError(f'{path}: there is no such file')
         return _of_file(path)
     if name not in NETWORKS:
@@ -268,7 +266,7 @@ def numbered(legs: int) -> tuple[type[Network], ...]:
 
 
 def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]:
-    """Return a network for as many legs, if its family takes that number, or else itself."""
+    """Return a network for a number of legs, or itself if it does not take that number."""
     try:
         return with_legs(network, len(legs))
     except InputError:
@@ -283,7 +281,7 @@ def _numbered(family: str, legs: int) -> type[Network]:
 
 
 def _usable(source: str, load: Callable[[], Entry]) -> Entry:
-    """Run code of others; raise NetworkError with one line on its failure."""
+    """Run code of others; an error becomes one line."""
     try:
         return load()
     except Exception as error:
@@ -292,7 +290,7 @@ def _usable(source: str, load: Callable[[], Entry]) -> Entry:
 
 
 def _checked(source: str, network: type[Network]) -> type[Network]:
-    why = _usable(source, lambda: flaw(network))
+    why = _usable(source, lambda: definition_error(network))
     if why:
         raise NetworkError(f'{source}: {why}')
     return network

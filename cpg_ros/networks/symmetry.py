@@ -144,11 +144,11 @@ class Symmetry(ShortRepr):
     Attributes:
         group: of the network.
         shifts: element name -> shift in cycles, a homomorphism on H.
-        variables: state variables of each cell; a network sees to it that they are its own.
-        odd: whether the network has the symmetry x -> -x, and the gait it with a shift of 1/2:
+        variables: state variables of each cell.
+        odd: whether the network has the symmetry x -> -x, and the gait has it with a shift of 1/2:
             every waveform is its own negative half a cycle later.
-        leads: phase of each cell in cycles as the network's parameters state it, where the
-            group tells none: between different waveforms. Not part of what a symmetry is.
+        leads: phase of each cell in cycles as the network's parameters state it, between different
+            waveforms; ignored by comparisons.
 
     """
 
@@ -205,8 +205,7 @@ class Symmetry(ShortRepr):
     @cached_property
     def turn(self) -> np.ndarray:
         """Return the cells, shape (cells,), with ``x_i(t + T/m) = x_{turn_i}(t)``."""
-        name = next(name for name, shift in self.shifts
-                    if shift == Fraction(1, self.order) % 1)
+        name = next(name for name, shift in self.shifts if shift == Fraction(1, self.order) % 1)
         return np.array(self.group.elements[name])
 
     @cached_property
@@ -273,8 +272,8 @@ class Symmetry(ShortRepr):
     def basis(self) -> np.ndarray:
         """Orthonormal rows that span the gait's class, shape (variables * d, variables * cells).
 
-        It is Fix(K), the states that K leaves alone, which the flow never leaves. With x -> -x
-        an element with the shift 1/2 leaves them alone together with that.
+        It is Fix(K), the states that K fixes, which the flow never leaves. With x -> -x an element
+        with the shift 1/2 fixes them in combination with that.
         """
         still = [(self.group.elements[name], 1.0 if shift == 0 else -1.0)
                  for name, shift in self.shifts
@@ -297,7 +296,7 @@ def _generated(group: Group, shifts: tuple[tuple[str, Fraction | float], ...], v
     return Symmetry(group, tuple(group.generated(exact).items()), variables, odd)
 
 
-# The H/K theorem: every symmetry that a periodic solution of a network can have, generated.
+# The H/K theorem: all symmetries that a periodic solution of a network can have.
 
 #: Names of the elements of a subgroup, in the order in which the group lists them.
 Subgroup = tuple[str, ...]
@@ -374,7 +373,7 @@ def admissible_pairs(group: Group) -> tuple[Pair, ...]:
     pairs = []
     for h, k in product(reversed(subgroups(group)), repeat=2):
         order = len(h) // len(k)
-        # The quotient is cyclic if one element runs through all of it.
+        # The quotient is cyclic if an element generates it.
         if set(k) <= set(h) and any(group.order(name, k) == order for name in h):
             pairs.append(Pair(h, k, order, group.cells // len(h), group.cells // len(k),
                               (label(group, h), label(group, k))))

@@ -189,7 +189,7 @@ SEARCH = 0.05
 class Generator(StartedNode):
     """Parameters, topics and services around one moving pattern."""
 
-    #: A gait loads its preset.
+    #: Parameters that set others: a gait loads its preset.
     SETS_OTHERS = frozenset({'gait'})
 
     def __init__(self) -> None:
@@ -252,7 +252,7 @@ class Generator(StartedNode):
             self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
-        #: What was sent last, rad; of the ticks.
+        #: Angles that the last tick sent, rad.
         self._sent: np.ndarray | None = None
         self._tracking = JointTracking(self, robot, self._measured, self._commanded,
                                        self._lag) if self._measured else None

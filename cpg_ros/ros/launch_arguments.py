@@ -116,7 +116,7 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         file = Path(name_of_file).expanduser()
         if not file.is_file():
             raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
-        # Later ones win: what is only a default gives way to the file.
+        # Later values take precedence: defaults give way to the file.
         asked = {key: one for key, one in parameters.items()
                  if LaunchConfiguration(key).perform(context) != arguments[key][0]}
         layers = [parameters, str(file), {**asked, **(fixed or {})}]

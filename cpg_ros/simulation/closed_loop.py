@@ -171,7 +171,7 @@ class ClosedLoopBatch(BatchPhysics):
                 expected.
             noise: of the sensors.
             goal: way forward at which a run ends, m.
-            keep_senses: whether the outcome has what is measured, and the efforts.
+            keep_senses: whether the outcome has the measurements and the efforts.
 
         """
         model, dt, parts = self.body.model, self.timestep, self.parts

@@ -280,7 +280,7 @@ def _drive(spec: Any, robot: Robot, say: Callable[[str], None]) -> None:
     limits = {motor.target: limit for motor in spec.actuators
               if motor.trntype == mujoco.mjtTrn.mjTRN_JOINT
               and (limit := _limit(motor)) is not None}
-    # A URDF's are those of joints.
+    # In a URDF, limits belong to the joints.
     limits |= {joint.name: list(joint.actfrcrange) for joint in spec.joints
                if joint.name not in limits and joint.actfrcrange[0] < joint.actfrcrange[1]}
     if robot.biped is not None:

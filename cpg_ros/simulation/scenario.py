@@ -77,7 +77,7 @@ class SensorNoise:
         orientation_bias: of roll and pitch, rad; each run draws the signs once.
         gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
         accelerometer_noise, accelerometer_bias: the same, m/s^2.
-        seed: of what is drawn.
+        seed: of the random numbers.
 
     """
 
@@ -110,7 +110,7 @@ class Outcome(ShortRepr):
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
         stiff: 1 while the feedback makes servos stiff, by gains or targets, else 0, the same.
         cost: of transport after BEGINNING, shape (runs,).
-        senses: what was measured before each step, of arrays (runs, steps, ...), if it was kept;
+        senses: measurements before each step, arrays (runs, steps, ...), if they were kept;
             after a run's end it means nothing.
         efforts: of the joints' servos in each step, N m, shape (runs, steps, joints), the same.
 

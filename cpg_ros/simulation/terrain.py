@@ -58,7 +58,7 @@ class Terrain:
         kind: one of KINDS; a course has a height field, a ramp up and down, and boxes.
         size: largest height, m, from 0 to HIGHEST, or that of a step; of a ramp its angle up,
             degrees.
-        seed: of what is random.
+        seed: of random heights.
         across: of a ramp: whether it rises to the left instead of ahead.
 
     Raises:
@@ -163,7 +163,7 @@ def add_ground(spec: Any) -> None:
 def lay(model: Any, terrain: Terrain) -> None:
     """Replace the floor by a terrain, in a model that ``add_ground`` has prepared."""
     mujoco = engine()
-    # The tree of bounding boxes, and marks of what is where its body is, no longer hold.
+    # Geoms have moved: the tree of bounding boxes and the flags of fixed geoms no longer hold.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     place, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE

@@ -98,7 +98,7 @@ def moments(matrix: np.ndarray) -> np.ndarray:
 
 
 def possible(matrix: np.ndarray, mass: float) -> tuple[np.ndarray, str]:
-    """Return the nearest inertia that a body can have, and what was wrong with this one.
+    """Return the nearest inertia that a body can have, and the fault of this one.
 
     Args:
         matrix: about the centre of mass, kg m^2, shape (3, 3), symmetric.

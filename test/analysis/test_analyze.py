@@ -22,6 +22,8 @@ import sys
 
 from cpg_ros.analysis import optimize
 from cpg_ros.analysis.analyze import main
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.fourier.floquet import EXACT
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.networks.library.biped import Biped
@@ -144,7 +146,7 @@ def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):
 def test_multipliers_that_are_unsure_are_said_to_be(capsys, monkeypatch):
     # One polynomial for a delay of two periods is far too coarse.
     monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.SPAN', 100.0)
-    monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.HALVINGS', 1)
+    monkeypatch.setattr(multipliers, '__defaults__', (0.0, EXACT._replace(halvings=1)))
     assert main(['--network', 'delayed', '--set', 'tau=3']) == 0
     assert 'instead of 1; the others are no better' in capsys.readouterr().out
 

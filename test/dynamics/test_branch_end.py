@@ -83,7 +83,7 @@ def test_a_fold_at_a_point_of_the_branch_is_no_obstacle():
     assert branch.ends[0].why == 'period' and branch.ends[1].why == 'rest'
     assert branch.folds
     for fold in branch.folds:
-        assert abs(fold.place.rate) < 1e-6
+        assert abs(fold.curve_point.rate) < 1e-6
 
 
 @pytest.mark.parametrize('lines', [25, *in_depth(100)])

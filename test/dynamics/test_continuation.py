@@ -22,9 +22,12 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.continuation import continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.fourier import solve
+from cpg_ros.dynamics.hopf import hopf_at, HopfPoint
 from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.isotypic import block_of, Expansion
 from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
+from cpg_ros.dynamics.stability import stability
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -65,6 +68,12 @@ def hopf(network, mode, sign, n):
             -(tau * (network.b + network.d * turn + late) / q).real)
 
 
+def hopf_point(network, mode, omega, tau):
+    network = replace(network, tau=tau)
+    block = block_of(Expansion(network, np.zeros(1)), mode)
+    return HopfPoint(network, TAU, tau, block, omega, np.zeros(1))
+
+
 def gap_of_the_delay_equations(orbit):
     """Largest residual of eq. 1.1, written out, between the nodes."""
     times = np.random.default_rng(2).uniform(-2.0, 2.0, 150) * orbit.period
@@ -92,17 +101,17 @@ def check_in_order(branch):
         assert branch.along.value(orbit.network) == point.value
         top = orbit.waveform(np.linspace(0.0, 1.0, 2001)).max()
         assert top <= float(orbit.waveform(np.array(0.0))) + 1e-7 * point.amplitude
-    rates = np.array([point.place.rate for point in branch.points])
+    rates = np.array([point.curve_point.rate for point in branch.points])
     rising = np.diff(branch.values) > 0.0
     assert (rates[1:][rising] > -1e-8).all() and (rates[:-1][~rising] < 1e-8).all()
     for fold in branch.folds:
-        assert abs(fold.place.rate) < 1e-8
+        assert abs(fold.curve_point.rate) < 1e-8
 
 
 @cache
 def subcritical(name):
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL[name], hopf(*SUBCRITICAL[name])
-    return continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau)
+    return continue_from_hopf(hopf_point(network, mode, omega, tau), TAU, 0.5 * tau, 1.2 * tau)
 
 
 @cache
@@ -130,7 +139,7 @@ def test_a_supercritical_branch_of_the_delayed_network(gait):
         assert point.amplitude == pytest.approx(there.peak, abs=1e-8)
         assert np.allclose(point.orbit.d_period, there.d_period, 1e-5, 1e-8)
     # The same branch, begun where it begins.
-    grown = continue_from_hopf(replace(EXAMPLE, tau=tau), mode, omega, TAU, 0.1, 0.7)
+    grown = continue_from_hopf(hopf_point(EXAMPLE, mode, omega, tau), TAU, 0.1, 0.7)
     assert grown.points[-1].orbit.period == pytest.approx(branch.periods[-1], rel=1e-11)
     slope = (grown.values[0] - tau) / grown.amplitudes[0]**2
     assert slope == pytest.approx(-k2 / (4.0 * k1), rel=5e-3)
@@ -160,7 +169,7 @@ def test_a_subcritical_hopf_point_of_the_delayed_network_has_a_fold(name):
     assert fold.value == branch.values.min() < tau
     # amplitude^2 is linear in mu at the Hopf point, with the slope of the normal form, ...
     network, mode, _, _ = SUBCRITICAL[name]
-    near = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau,
+    near = continue_from_hopf(hopf_point(network, mode, omega, tau), TAU, 0.5 * tau, 1.2 * tau,
                               amplitude=4e-3, most=1).points[0]
     assert (near.value - tau) / near.amplitude**2 == pytest.approx(-k2 / (4.0 * k1), rel=1e-3)
     # ... and (amplitude - that of the fold)^2 in the distance from the fold.
@@ -180,7 +189,7 @@ def test_a_branch_from_one_hopf_point_to_another():
     network, mode = Delayed(-6.0, -0.5, 7.7, -8.6, 1.0), Mode(1, 1)
     omega, tau, k1, k2 = hopf(network, mode, -1, 0)
     assert k1 < 0.0 and k2 < 0.0
-    branch = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.01, 2.0)
+    branch = continue_from_hopf(hopf_point(network, mode, omega, tau), TAU, 0.01, 2.0)
     check_in_order(branch)
     other, first, _, _ = hopf(network, mode, 1, 0)
     assert [end.why for end in branch.ends] == ['rest', 'rest']
@@ -228,8 +237,11 @@ def test_pace_has_a_fold_beside_its_subcritical_hopf_point():
     assert [end.why for end in branch.ends] == ['rest', 'bound']
     assert branch.ends[0].value == pytest.approx(value, abs=1e-8)
     assert branch.ends[0].period == pytest.approx(2.0 * np.pi / root.imag, rel=1e-8)
-    grown = continue_from_hopf(network, network.symmetry('pace'), root.imag, branch.along, 0.0,
-                               0.25, rest=state, vector=vector)
+    point = hopf_at(network, branch.along, (0, 1), root.imag)
+    assert point.state == pytest.approx(state, abs=1e-10)
+    turned = point.eigenvector / point.eigenvector[0]
+    assert turned == pytest.approx(vector / vector[0], abs=1e-8)
+    grown = continue_from_hopf(point, branch.along, 0.0, 0.25)
     check_in_order(grown)
     assert grown.folds[0].value == pytest.approx(fold.value, rel=1e-9)
     assert grown.folds[0].orbit.period == pytest.approx(fold.orbit.period, rel=1e-7)
@@ -244,6 +256,8 @@ def test_pace_has_a_fold_beside_its_subcritical_hopf_point():
     # The multipliers pass 1 at the fold.
     leading = [multipliers(orbit).within.real.max() for orbit in (low, fold.orbit, high)]
     assert leading[0] > 1.0 > leading[2] and leading[1] == pytest.approx(1.0, abs=1e-5)
+    reasons = [stability(orbit).reason for orbit in (low, fold.orbit, high)]
+    assert 'grows' in reasons[0] and reasons[1].startswith('cannot tell') and not reasons[2]
 
 
 def test_what_is_below_and_above_the_fold_of_pace():
@@ -328,20 +342,11 @@ def test_a_branch_ends_where_its_period_has_grown():
 def test_a_waveform_too_steep_ends_the_branch(monkeypatch):
     monkeypatch.setattr(solve, 'MOST_NODES', 255)
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL['pace'], hopf(*SUBCRITICAL['pace'])
-    branch = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5, 5.0)
+    branch = continue_from_hopf(hopf_point(network, mode, omega, tau), TAU, 0.5, 5.0)
     assert branch.ends[1].why == 'steep' and branch.points[-1].orbit.values.size == 255
 
 
-def test_a_hopf_point_needs_its_eigenvector():
-    network, state, root, vector = stand_of_pace(0.2448)
-    line = ParameterLine.parse('alpha=beta', Quadruped)
-    for gait, wrong, words in (('bound', vector, 'does not have the symmetry: '),
-                               ('pace', None, 'needs the stand and the eigenvector')):
-        with pytest.raises(ValueError, match=words):
-            continue_from_hopf(network, network.symmetry(gait), root.imag, line, 0.0, 0.3,
-                               rest=state, vector=wrong)
-    # Far from any Hopf point there is no small orbit.
-    network = replace(EXAMPLE, tau=0.05)
+def test_far_from_any_hopf_point_there_is_no_small_orbit():
+    point = hopf_point(EXAMPLE, EXAMPLE.symmetry('trot'), 6.3, 0.05)
     with pytest.raises(NoOrbit, match=r'no orbit of amplitude 0.02 was found near tau 0.05'):
-        continue_from_hopf(network, network.symmetry('trot'), 6.3,
-                           ParameterLine.parse('tau', Delayed), 0.0, 0.1)
+        continue_from_hopf(point, TAU, 0.0, 0.1)

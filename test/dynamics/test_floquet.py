@@ -17,7 +17,7 @@
 from functools import cache
 
 from cpg_ros.dynamics.continuation import continue_orbit
-from cpg_ros.dynamics.floquet import multipliers, smallest_gain
+from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain, stable
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.mesh.floquet import eigenvalues
 from cpg_ros.dynamics.solve_orbit import solve_preset
@@ -125,7 +125,7 @@ def test_small_disturbances_grow_by_the_multipliers(network, name):
 @EVERY
 def test_shipped_gaits_attract(network, name):
     orbit, mine, judged = solved(network, name)
-    assert judged.flaw == '' and multipliers(orbit, judged.lock_gain).leading < 1.0
+    assert judged.reason == '' and multipliers(orbit, judged.lock_gain).leading < 1.0
     # The gain chosen lets what is transverse decay by RATE at least, and none is spent beyond.
     gain = judged.lock_gain
     slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - gain
@@ -181,7 +181,7 @@ def test_an_orbit_that_does_not_attract_is_told():
     (within,) = multipliers(orbit).within
     assert grown[-1] / grown[-2] == pytest.approx(within.real, rel=1e-3)
     assert within.real == pytest.approx(1.5715, abs=1e-4)
-    assert stability(orbit).flaw.endswith('own symmetry class grows 1.571 times a stride')
+    assert stability(orbit).reason.endswith('own symmetry class grows 1.571 times a stride')
 
 
 def test_a_gait_attracts_only_if_disturbances_outside_its_class_decay_too():
@@ -191,6 +191,18 @@ def test_a_gait_attracts_only_if_disturbances_outside_its_class_decay_too():
     assert not alone.attracts
     locked = multipliers(orbit, stability(orbit).lock_gain)
     assert np.abs(locked.transverse).max() < 1.0 and locked.attracts
+
+
+def test_a_verdict_says_where_the_multiplier_cannot_be_told_from_1():
+    for modulus, error, verdict in ((0.999, 0.0, True), (1.001, 0.0, False), (1.0, 0.0, None),
+                                    (1.0 + 5e-8, 0.0, None), (0.999, 0.01, None),
+                                    (1.001, 0.01, None), (0.98, 0.01, True), (1.02, 0.01, False)):
+        assert stable(modulus, error) is verdict
+    # As of uncoupled rings: a shift of one against the other neither grows nor decays.
+    neutral = Multipliers(1.0, 0.0, np.zeros(1), 1.0 + 1e-12, (np.ones(1),))
+    assert neutral.attracts is None and neutral.attracts_within is True
+    fold = Multipliers(1.0, 0.0, np.array([1.0 + 1e-9]), 1.0 + 1e-8)
+    assert fold.attracts_within is None and fold.unstable == 1
 
 
 @pytest.mark.parametrize('change', [{}, *in_depth({'alpha': -0.6}, {'alpha': -0.3})])

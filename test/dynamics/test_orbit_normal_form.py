@@ -16,13 +16,12 @@
 
 from dataclasses import replace
 
-from branch_switching import switch_branch
+from branch_switching import mode, switch_branch
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.mesh.solve import from_path
-from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.orbit_normal_form import orbit_normal_form
 from cpg_ros.dynamics.solve_orbit import solve_from_path, solve_preset
 from cpg_ros.networks.library.biped import Biped
@@ -77,9 +76,9 @@ def point_of(network, preset, line, near):
 
 def disturbance(orbit, point):
     """The disturbance of an orbit near a point, of which the largest component is 1 at most."""
-    mode = orbit_method(orbit.network).floquet.mode(orbit, point.part, point.multiplier)
-    size = np.abs(mode(np.arange(500) / 500)).max()
-    return lambda theta: mode(theta) / size
+    critical = mode(orbit, point.part, point.multiplier)
+    size = np.abs(critical(np.arange(500) / 500)).max()
+    return lambda theta: critical(theta) / size
 
 
 def share_of(orbit, base, mode, cycles):

@@ -23,6 +23,7 @@ from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.phase_response import phase_response
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import stability
+from cpg_ros.networks.equations import Field
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np
@@ -94,6 +95,28 @@ def measured(orbit, times):
     return (8.0 * four - 6.0 * two + one) / 3.0
 
 
+def shifted(orbit, time, motion):
+    """Return the cycles by which a motion of a network's history advances its phase.
+
+    A change of the history alone, dx(t + s) for -tau < s < 0, shifts it by the integral of
+    Z(t + s + tau) B dx, B the Jacobian by the state a delay ago.
+    """
+    network, response = orbit.network, phase_response(orbit)
+
+    def z(times):
+        return response(times).swapaxes(1, 2).reshape(times.size, -1)
+
+    now = float((z(np.array([time])) * motion(np.zeros(1))).sum())
+    if not network.delay:
+        return now
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    times = 0.5 * network.delay * (nodes - 1.0)
+    later = time + times + network.delay
+    by_past = Field(network).linearised(orbit(later), orbit(time + times))[2]
+    kernel = np.einsum('ti,tij->tj', z(later), by_past)
+    return now + (kernel * motion(times)).sum(axis=1) @ weights * 0.5 * network.delay
+
+
 @pytest.mark.parametrize(('network', 'name'), [
     ('delayed', 'walk'), ('quadruped', 'pace'), ('biped', 'skip'), ('phase', 'canter_left'),
     *in_depth(('delayed', 'pronk'), ('delayed', 'goat_trot'), ('delayed', 'jump'),
@@ -123,8 +146,7 @@ def test_a_motion_of_the_whole_history_shifts_the_phase_by_its_adjoint():
               Disturbed(orbit, time, lambda t: -motion(t), lambda t: -slope(t))]
              for time in TIMES]
     found = shifts(orbit, pairs, TIMES, orbit.network.step) / 2.0
-    response = phase_response(orbit)
-    assert found == pytest.approx([response.shift(time, motion) for time in TIMES], rel=1e-5)
+    assert found == pytest.approx([shifted(orbit, time, motion) for time in TIMES], rel=1e-5)
     assert np.abs(found).min() > 1e-7
 
 
@@ -158,9 +180,8 @@ def test_phase_oscillators_have_the_closed_form():
 def test_along_the_orbit_it_is_the_frequency(network):
     for preset in PRESETS[network].values():
         orbit = solve_preset(preset)
-        response = phase_response(orbit)
         for time in TIMES * orbit.period:
-            rate = response.shift(time, lambda t, time=time, orbit=orbit: orbit.derivative(time
+            rate = shifted(orbit, time, lambda t, time=time, orbit=orbit: orbit.derivative(time
                                                                                           + t))
             assert rate * orbit.period == pytest.approx(1.0, abs=1e-9)
 

@@ -81,7 +81,7 @@ def test_six_legs_and_their_gaits():
 def test_every_gait_of_any_number_of_legs_attracts(legs):
     network = find_network(f'delayed{legs}')
     for gait, preset in network.presets().items():
-        assert not stability(solve_preset(preset)).flaw, gait
+        assert not stability(solve_preset(preset)).reason, gait
 
 
 class Less:

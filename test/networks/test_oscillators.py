@@ -63,7 +63,7 @@ def test_every_gait_is_an_orbit_of_the_papers_equations_and_attracts(network, ga
     orbit = solve_preset(preset)
     end = followed(preset.network, orbit(np.zeros(1))[0], orbit.period)
     assert np.abs(end - orbit(np.zeros(1))[0]).max() < 1e-7
-    assert orbit.residual < 1e-9 and stability(orbit).flaw == ''
+    assert orbit.residual < 1e-9 and stability(orbit).reason == ''
     assert multipliers(orbit, stability(orbit).lock_gain).attracts
     assert multipliers(orbit).trivial == pytest.approx(1.0, abs=1e-9)
     # Cell 1 peaks at phase 0, and every cell does what its phase and wave say.

@@ -19,16 +19,64 @@ from fractions import Fraction
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.bifurcation import Bifurcation
 from cpg_ros.dynamics.continuation import Branch, continue_from_disturbance
+from cpg_ros.dynamics.fourier.floquet import mode as fourier_mode
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.mesh import collocation
+from cpg_ros.dynamics.mesh.floquet import Flow, returning
 from cpg_ros.dynamics.orbit import extra_symmetry
-from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
+from numpy.polynomial import polynomial
 
 #: Shares of the disturbance that are tried, and points of a cycle at which symmetry is tested.
 AMPLITUDES, POINTS = (0.02, 0.005, 0.06), 96
 #: What a symmetry may miss by, over the disturbance.
 SAME = 1e-3
+
+
+def mode(orbit, part: int, multiplier: complex):
+    """Return the disturbance with a multiplier as a function of time, of size 1 at most.
+
+    On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells after T/m. So the
+    disturbances w that return as a multiple nu of themselves are those of the map over T/m in the
+    frame that changes places with the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
+
+    Args:
+        orbit: of a network without delay.
+        part: 0 for the gait's class, then the subspaces transverse to it, as in transverse.
+        multiplier: about that of the disturbance over a period, not the trivial one.
+
+    Returns:
+        States, shape (points, components), as a function of times in cycles, shape (points,).
+
+    """
+    if isinstance(orbit, FourierOrbit):
+        return fourier_mode(orbit, part, multiplier)
+    columns, nu, left = returning(orbit, part, multiplier)
+    flow, m = Flow(orbit), orbit.symmetry.order
+    jacobians, answers = flow.solved(columns)
+    change = flow.on(columns)[1]
+    inner = np.einsum('nsij,nj->nsi', answers, left[:-1])
+    slopes = np.einsum('nsij,nsj->nsi', jacobians, inner)
+    coefficients = collocation.power_coefficients(left[:-1], slopes, flow.lengths)
+    size = float(np.abs(left).max())
+
+    def path(theta: np.ndarray) -> np.ndarray:
+        places = np.asarray(theta, dtype=float) * m
+        turns = np.floor(places).astype(int)
+        places = places - turns
+        k = np.clip(np.searchsorted(orbit.mesh, places, side='right') - 1, 0,
+                    orbit.mesh.size - 2)
+        xi = (places - orbit.mesh[k]) / np.diff(orbit.mesh)[k]
+        values = polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
+        out = (nu**turns[:, None] * values).real
+        for turn in np.unique(turns):
+            there = turns == turn
+            out[there] = out[there] @ np.linalg.matrix_power(change, int(turn)).T
+        return out @ columns.T / size
+
+    return path
 
 
 def switch_branch(bifurcation: Bifurcation, along: ParameterLine, low: float, high: float,
@@ -48,8 +96,7 @@ def switch_branch(bifurcation: Bifurcation, along: ParameterLine, low: float, hi
     """
     orbit, doubled = bifurcation.point.orbit, bifurcation.kind == 'period doubling'
     cycles = 2 if doubled else 1
-    disturbance = orbit_method(orbit.network).floquet.mode(orbit, bifurcation.part,
-                                                        -1.0 if doubled else 1.0)
+    disturbance = mode(orbit, bifurcation.part, -1.0 if doubled else 1.0)
     theta = np.arange(POINTS) / POINTS
     symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)
     for amplitude in AMPLITUDES:

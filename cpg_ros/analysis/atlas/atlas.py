@@ -12,10 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``atlas``: a map of where gaits live, over two parameters.
-
-``atlas --network delayed --over c=2:10 tau=0.2:2 --out atlas/`` computes what a coarse grid and
-its refinement need, follows the exact boundaries, and draws the map.
+"""Map where a network's gaits live over two parameters: whether each exists and is stable, with
+what symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined
+where neighbours differ; Hopf points, folds, torus points, period doublings, branch points and the
+places at which a period grows without bound are followed as exact curves and drawn on top, with
+the points at which a second condition holds: Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens
+points, resonances of torus points, cusps.
 """
 
 import argparse
@@ -52,13 +54,6 @@ from cpg_ros.networks.network import known
 from cpg_ros.networks.network_options import add_network_options, chosen_network
 from cpg_ros.networks.registry import reference
 
-DESCRIPTION = """\
-Map where a network's gaits live over two parameters: whether each exists and is stable, with what
-symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
-neighbours differ; Hopf points, folds, torus points, period doublings, branch points and the
-places at which a period grows without bound are followed as exact curves and drawn on top, with
-the points at which a second condition holds: Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens
-points, resonances of torus points, cusps."""
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
 with --interactive. Run the same command again to continue where it stopped.
@@ -74,7 +69,7 @@ def _points(text: str) -> tuple[int, int]:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG)
+    parser = Parser(prog='atlas', description=__doc__, epilog=EPILOG)
     add_network_options(parser)
     parser.add_argument('--over', nargs=2, required=True, metavar='PARAMETER=LOW:HIGH',
                         type=partial(named_interval, name='parameter'),
@@ -175,7 +170,7 @@ def _map(args: argparse.Namespace) -> int:
     counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
                         for gait, sheet in sheets.items())
     special = dict.fromkeys(str(point) for curve in curves for point in curve.codimension_two)
-    say(f'share of the plane in which each gait exists: {counted}\n'
+    say(f'fraction of the plane in which each gait exists: {counted}\n'
         f'boundaries: {", ".join(map(str, curves)) or "none"}\n'
         f'of codimension two: {"; ".join(special) or "none found"}\n'
         f'written: {", ".join(map(str, written))}')

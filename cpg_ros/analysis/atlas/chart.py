@@ -14,7 +14,9 @@
 
 """The plane of an atlas: two lines of parameters, their ranges, and the grid on them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 import math
 from typing import Any
 
@@ -22,6 +24,7 @@ from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.registry import find_network, reference
 import numpy as np
+from numpy.typing import ArrayLike
 
 # Points on the boundaries of an atlas at which a second condition holds.
 
@@ -37,13 +40,13 @@ class CodimensionTwo(ShortRepr):
 
     Attributes:
         kind: one of LABELS.
-        gait: whose: of several that share a curve each has its own coefficients.
+        gait: of the curve; gaits that share a curve have coefficients of their own.
         values: on both axes.
-        test: what the function that is zero there is at these values: the first Lyapunov
-            coefficient at a Bautin point, the real part of the other root at a Hopf-Hopf or
-            zero-Hopf point, the largest residual of the defining equations at others.
-        omega: of the curve's own critical root, rad per model time; nan on curves of orbits.
-        other: gaits of the classes of the other roots, '' for a class that no gait has.
+        test: value of the test function: the first Lyapunov coefficient at a Bautin point, the
+            real part of the other root at a Hopf-Hopf or zero-Hopf point, else the largest
+            residual of the defining equations.
+        omega: of the curve's critical root, rad per model time; nan on curves of orbits.
+        other: gaits of the classes of the other roots, '' for a class without a gait.
         other_omega: of the other root; nan where there is none.
 
     """
@@ -80,7 +83,7 @@ def _plain(number: float) -> float | None:
     return None if math.isnan(number) else number
 
 
-#: COARSE: distance of the coarse grid's points on the fine grid, a power of 2.
+#: Stride of the coarse grid, a power of 2.
 COARSE = 8
 
 
@@ -95,8 +98,20 @@ class Axis:
 
     @property
     def values(self) -> np.ndarray:
-        """Evenly from low to high, shape (count,)."""
+        """Evenly spaced from low to high, shape (count,)."""
         return np.linspace(self.low, self.high, self.count)
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+    def indices(self, stride: int) -> list[int]:
+        """Return the indices of a grid of a stride: of the coarse grid, halved."""
+        indices, halved = sorted({*range(0, self.count, COARSE), self.count - 1}), COARSE
+        while halved > stride:
+            indices = sorted({*indices, *((left + right) // 2
+                                          for left, right in pairwise(indices))})
+            halved //= 2
+        return indices
 
 
 @dataclass(frozen=True)
@@ -105,8 +120,8 @@ class ParameterPlane:
 
     Attributes:
         network: name or file, as find_network takes it.
-        base: all parameters, of which those on the axes do not matter.
-        first: the axis whose values make rows.
+        base: all parameters; those on the axes do not matter.
+        first: the axis along the rows of the grid.
         second: the axis along which orbits are continued in a row.
 
     """
@@ -140,9 +155,23 @@ class ParameterPlane:
         first, second = (self.low + fraction * self.size).tolist()
         return first, second
 
+    def fractions_of(self, values: ArrayLike) -> np.ndarray:
+        """Return points given by their values on both axes in fractions, shape (..., 2)."""
+        return np.asarray((np.asarray(values)[..., :2] - self.low) / self.size)
+
     def fraction(self, point: tuple[int, int]) -> np.ndarray:
         """Return a point of the grid, given by row and column, in fractions of the ranges."""
         return np.array(point) / (self.first.count - 1, self.second.count - 1)
+
+    def neighbours(self) -> Iterator[tuple[int, tuple[int, int], tuple[int, int]]]:
+        """Yield the neighbours on the coarse grid: the axis between them, and both points."""
+        rows, columns = self.first.indices(COARSE), self.second.indices(COARSE)
+        for row, below in zip(rows, [*rows[1:], None], strict=True):
+            for column, beside in zip(columns, [*columns[1:], None], strict=True):
+                if beside is not None:
+                    yield 1, (row, column), (row, beside)
+                if below is not None:
+                    yield 0, (row, column), (below, column)
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything in plain types."""
@@ -181,7 +210,7 @@ def chart_of(network: str, base: Network, over: list[tuple[str, tuple[float, flo
         axes.append(Axis(line, low, high, count))
     if set(axes[0].line.names) & set(axes[1].line.names):
         raise InputError(f'{axes[0].line} and {axes[1].line} move the same parameter')
-    # Orbits are continued along the delay, where onsets are known in closed form.
+    # Orbits are continued along the delay, where Hopf points have a closed form.
     if base.delay_parameter in axes[0].line.names:
         axes.reverse()
     return ParameterPlane(reference(type(base).name), base.as_dict(), *axes)

@@ -14,19 +14,19 @@
 
 """Curves of folds and of unbounded periods of a gait's orbits in two parameters, with cusps.
 
-At a fold the second parameter turns round along the branch: its component of the tangent is zero.
-From a fold the next one is found by holding the unknowns in the plane normal to the last tangent
-while the first parameter moves a step, and then going along the branch to where it turns.
+At a fold the component of the tangent along the second parameter is zero. The next fold follows
+from a step of the first parameter with the unknowns in the plane normal to the last tangent, and
+then along the branch to the zero of that component.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import pairwise
+from functools import partial
 from typing import Any
 
-from cpg_ros.analysis.atlas.chart import COARSE, CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition, on_curve
+from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
+from cpg_ros.analysis.atlas.grid import GaitMap
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition
 from cpg_ros.analysis.atlas.orbit_curves import Edge
 from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError
@@ -34,6 +34,7 @@ from cpg_ros.dynamics.arclength import (
     continue_steps,
     CurvePoint,
     fixed_unknown,
+    locate,
     NoOrbit,
     predict_and_correct,
     rate_along,
@@ -41,78 +42,76 @@ from cpg_ros.dynamics.arclength import (
 )
 from cpg_ros.dynamics.continuation import (
     Branch,
-    BranchPoint,
     continue_from_hopf,
     continue_orbit,
     law_of_growth,
 )
 from cpg_ros.dynamics.hopf import hopf_at
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
-# Cusps of fold curves: points at which two folds of a branch meet and vanish.
+# Cusps of fold curves, in which two folds of a branch meet.
 
-#: CUSP_REACHES: distances, as fractions of the first parameter's range, along a branch in which
-#: the second fold is searched for, and beyond the last fold of a curve in which its cusp is.
+#: Distances along a branch at which the second fold is searched, and distances of the cusp beyond
+#: the last fold of a curve, in fractions of the first parameter's range.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
 BEYOND = (0.00125, 0.005, 0.02)
-#: ALONG: tolerance of the extremum along a branch; EXACT: tolerance of the cusp, as a fraction.
+#: Tolerances of the extremum along a branch and of the cusp, in fractions.
 ALONG, EXACT = 1e-7, 1e-13
-#: SMALLEST: amplitude below which orbits end in rest, not in a cusp.
+#: Amplitude of the smallest orbits at a cusp.
 SMALLEST = 0.02
 
 
-def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float, way: float
-                ) -> CodimensionTwo | None:
+def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float,
+                direction: float) -> CodimensionTwo | None:
     """Locate the cusp in which a fold curve ends; None if it ends otherwise.
 
     Args:
         chart: the plane.
-        gait: whose.
+        gait: of the curve.
         fold: the curve's last fold, along the second axis.
         first: value on the first axis there.
-        way: 1 or -1, the direction in which the curve was followed.
+        direction: 1 or -1, in which the curve was followed along the first axis.
 
     """
     if fold.amplitude < SMALLEST:
         return None
     try:
         reach, sign = _pair(fold)
-        middle, _ = _extremum(rate_along(fold), reach, sign)
-        base = predict_and_correct(fold, middle)
+        base = predict_and_correct(fold, _extremum(fold, reach, sign)[0])
         if base.amplitude < SMALLEST:
             return None
 
-        def place(value: float) -> CurvePoint:
+        def branch_at(value: float) -> tuple[float, CurvePoint]:
             curve: Any = base.curve
             moved = replace(curve, network=chart.at(value, base.value))
             point = resolve_point(moved, base.z, base.tangent)
             if point is None:
                 raise NoOrbit('the branch is lost')
-            return point
+            return value, point
 
-        def dip(value: float) -> float:
-            return _extremum(rate_along(place(value)), reach, sign)[1]
+        def least_rate(branch: tuple[float, CurvePoint]) -> float:
+            return _extremum(branch[1], reach, sign)[1]
 
         for fraction in BEYOND:
-            far = first + way * fraction * chart.size[0]
-            if not chart.first.low <= far <= chart.first.high:
+            far = first + direction * fraction * chart.size[0]
+            if far not in chart.first:
                 return None
-            if dip(far) > 0.0 > dip(first):
-                cusp = brentq(dip, *sorted((first, far)), xtol=EXACT * chart.size[0], rtol=1e-15)
-                there = place(cusp)
-                middle, left = _extremum(rate_along(there), reach, sign)
-                point = predict_and_correct(there, middle)
-                if abs(left) > 1e-6 or abs(middle) > 0.9 * reach:
+            if least_rate(branch_at(far)) > 0.0 > least_rate(branch_at(first)):
+                cusp, branch = locate(least_rate, branch_at, min(first, far), max(first, far),
+                                      EXACT * chart.size[0])
+                middle, residual = _extremum(branch, reach, sign)
+                point = predict_and_correct(branch, middle)
+                if abs(residual) > 1e-6 or abs(middle) > 0.9 * reach:
                     return None
-                return CodimensionTwo('cusp', gait, (float(cusp), point.value), abs(left))
+                return CodimensionTwo('cusp', gait, (float(cusp), point.value), abs(residual))
     except (NoOrbit, np.linalg.LinAlgError, ValueError):
         return None
     return None
 
 
 def _pair(fold: CurvePoint) -> tuple[float, float]:
-    """Return how far along the branch another fold is passed, and the sign of the rates beyond.
+    """Return the distance along the branch of another fold, and the sign of the rates beyond.
 
     Raises:
         NoOrbit: there is none so close.
@@ -126,8 +125,9 @@ def _pair(fold: CurvePoint) -> tuple[float, float]:
     raise NoOrbit('no other fold')
 
 
-def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tuple[float, float]:
-    """Return the place at which the rate, with a sign, is least, and its value there."""
+def _extremum(point: CurvePoint, reach: float, sign: float) -> tuple[float, float]:
+    """Return the step from a point at which the rate times a sign is least, and that value."""
+    rate = rate_along(point)
     extremum = minimize_scalar(lambda step: sign * rate(step), method='bounded',
                                bounds=(-reach, reach), options={'xatol': ALONG})
     return float(extremum.x), float(extremum.fun)
@@ -137,12 +137,11 @@ def _extremum(rate: Callable[[float], float], reach: float, sign: float) -> tupl
 
 #: STEP, SHORTEST: longest and shortest step of the first parameter, as fractions of its range.
 STEP, SHORTEST = 1.0 / 24.0, 1.0 / 800.0
-#: SHARES: law of growth -> shares of the largest period at which the second parameter is solved
-#: for.
-SHARES = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
-#: POWERS: powers of 1/T in the series of a saddle-node.
+#: Fractions of the largest period at which the second parameter is solved for, by law.
+FRACTIONS = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
+#: Powers of 1/T in the series of a saddle node.
 POWERS = 0, 2, 3, 4
-#: ROUNDING: difference, as a fraction of the range, up to which the limit has been reached.
+#: Rounding error of the second parameter, in fractions of its range.
 ROUNDING = 1e-11
 
 
@@ -152,7 +151,7 @@ def infinite_periods(chart: ParameterPlane, gait: str, branch: Branch,
 
     Args:
         chart: the plane.
-        gait: whose.
+        gait: of the branch.
         branch: along the second axis.
         first: value on the first axis there.
 
@@ -162,36 +161,32 @@ def infinite_periods(chart: ParameterPlane, gait: str, branch: Branch,
     """
     curves = []
     for end, points in ((branch.ends[0], branch.points[::-1]), (branch.ends[1], branch.points)):
-        if end.why == 'period' and (law := _law(points)):
-            start = points[-1].place
-            ways = [_continue_long_period(chart, start, first, way,
-                                          SHARES[law]) for way in (-1.0, 1.0)]
-            here = _limit(chart, start, first, SHARES[law])
+        law = None if end.why != 'period' else law_of_growth(
+            np.array([point.value for point in points]),
+            np.array([point.orbit.period for point in points]))
+        if law:
+            start, fractions = points[-1].curve_point, FRACTIONS[law]
+            back, ahead = (_continue_long_period(chart, start, first, direction, fractions)
+                           for direction in (-1.0, 1.0))
+            limit = _limit(chart, start, first, fractions)
             curves.append(Boundary(law, (gait,), np.array([
-                *ways[0][::-1], *([] if here is None else [(first, here[0])]), *ways[1]])))
+                *back[::-1], *([] if limit is None else [(first, limit[0])]), *ahead])))
     return [curve for curve in curves if len(curve.points) > 1]
 
 
-def _law(points: tuple[BranchPoint, ...]) -> str | None:
-    return law_of_growth(np.array([point.value for point in points]),
-                         np.array([point.orbit.period for point in points]))
-
-
-def _continue_long_period(chart: ParameterPlane, point: CurvePoint, first: float, way: float,
-                          fractions: tuple[float, ...]
-              ) -> list[tuple[float, float]]:
-    """Follow orbits of one large period from a place on, in a direction of the first parameter."""
-    def advance(here: tuple[float, tuple[float, CurvePoint]], step: float
+def _continue_long_period(chart: ParameterPlane, point: CurvePoint, first: float, direction: float,
+                          fractions: tuple[float, ...]) -> list[tuple[float, float]]:
+    """Follow orbits of a large period in a direction of the first parameter."""
+    def advance(last: tuple[float, tuple[float, CurvePoint]], step: float
                 ) -> tuple[float, tuple[float, CurvePoint]] | None:
-        value = here[0] + way * step * chart.size[0]
-        limit = (_limit(chart, here[1][1], value, fractions)
-                 if chart.first.low <= value <= chart.first.high else None)
+        value = last[0] + direction * step * chart.size[0]
+        limit = _limit(chart, last[1][1], value, fractions) if value in chart.first else None
         return limit and (value, limit)
 
     limits: list[tuple[float, float]] = []
     for value, (limit, _) in continue_steps(advance, (first, (point.value, point)), STEP, SHORTEST,
                                             STEP):
-        if not chart.second.low <= limit <= chart.second.high:
+        if limit not in chart.second:
             break
         limits.append((value, limit))
     return limits
@@ -209,9 +204,9 @@ def _limit(chart: ParameterPlane, start: CurvePoint, first: float, fractions: tu
 
     """
     length = float(start.z[-2])
-    places: list[CurvePoint] = []
+    points: list[CurvePoint] = []
     for fraction in fractions:
-        last = places[-1] if places else start
+        last = points[-1] if points else start
         curve: Any = last.curve
         z = last.z.copy()
         z[-2] = fraction * length
@@ -222,13 +217,13 @@ def _limit(chart: ParameterPlane, start: CurvePoint, first: float, fractions: tu
             return None
         if solved is None:
             return None
-        places.append(solved)
-    return _extrapolated(np.array([point.value for point in places]), np.array(fractions),
-                         ROUNDING * chart.size[1]), places[0]
+        points.append(solved)
+    return _extrapolated(np.array([point.value for point in points]), np.array(fractions),
+                         ROUNDING * chart.size[1]), points[0]
 
 
 def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) -> float:
-    """Return the limit of values at shares of a period, by the law that has as many."""
+    """Return the limit of values at fractions of a period, by the law with as many fractions."""
     if len(values) == len(POWERS):
         return float(np.linalg.solve(fractions[:, None] ** -np.array(POWERS, dtype=float),
                                      values)[0])
@@ -241,30 +236,22 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
 
 #: REACHES: arclengths along a branch within which its fold is searched for, one after another.
 REACHES = (0.01, 0.03, 0.1, 0.3)
-#: REST: amplitude below which an orbit counts as rest.
+#: Amplitude below which an orbit is an equilibrium.
 REST = 5e-3
-#: TRIED: edges of the grid that are tried for a gait; MOST: most points of a branch; SAME:
-#: distance, as a fraction of the ranges, up to which curves are equal.
+#: Edges tried for a gait, points of a branch, and distance of equal curves in fractions.
 TRIED, MOST, SAME = 8, 80, 0.02
 
 
 def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
-    """Return neighbours on the coarse grid, along the second axis, one of which has no orbit."""
-    columns = grid_indices(chart.second.count, COARSE)
-    edges = []
-    for row in grid_indices(chart.first.count, COARSE):
-        for column, other in pairwise(columns):
-            for at, there in (((row, column), (row, other)), ((row, other), (row, column))):
-                if at in sheet.waves and sheet.label[there] == NONE:
-                    edges.append(Edge(chart.fraction(at), chart.fraction(there), *sheet.waves[at]))
-    return edges
+    """Return edges of the coarse grid along the second axis at one end of which is no orbit."""
+    return [Edge(chart.fraction(at), chart.fraction(other), *sheet.waves[at])
+            for axis, left, right in chart.neighbours() if axis == 1
+            for at, other in ((left, right), (right, left))
+            if at in sheet.waves and sheet.label[other] == NONE]
 
 
 def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
-    """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points.
-
-    Where the branch ends in orbits without a period these are followed, too.
-    """
+    """Follow the folds at which a gait is lost over some edges, and its orbits of long period."""
     chart, gait, edges = job
     curves: list[Boundary] = []
     for edge in edges[::max(1, len(edges) // TRIED)]:
@@ -272,10 +259,10 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
             branch = _branch(chart, gait, edge)
         except (CpgError, np.linalg.LinAlgError):
             continue
-        first = chart.first.low + edge.here[0] * chart.size[0]
+        first = chart.first.low + edge.start[0] * chart.size[0]
         for fold in branch.folds:
             if not _known(chart, curves, first, fold.value):
-                curves.append(fold_curve(chart, gait, fold.place, first))
+                curves.append(fold_curve(chart, gait, fold.curve_point, first))
         if any(end.why == 'period' and not _known(chart, curves, first, end.value)
                for end in branch.ends):
             curves += infinite_periods(chart, gait, branch, first)
@@ -283,8 +270,8 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
 
 
 def _known(chart: ParameterPlane, curves: list[Boundary], first: float, second: float) -> bool:
-    point = (np.array([first, second]) - chart.low) / chart.size
-    return any(on_curve(curve, chart, point, SAME) for curve in curves)
+    point = chart.fractions_of((first, second))
+    return any(curve.passes(chart, point, SAME) for curve in curves)
 
 
 def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float) -> Boundary:
@@ -292,18 +279,17 @@ def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float)
 
     Args:
         chart: the plane.
-        gait: whose.
-        fold: a fold along the second axis.
+        gait: of the fold.
+        fold: along the second axis.
         first: value on the first axis there.
 
     """
-    back, ahead = (continue_fold(chart, fold, first, way) for way in (-1.0, 1.0))
-    points = [(value, member.value) for value, member in
-              [*back[::-1], (first, fold), *ahead]]
+    back, ahead = (continue_fold(chart, fold, first, direction) for direction in (-1.0, 1.0))
+    points = [(value, member.value) for value, member in [*back[::-1], (first, fold), *ahead]]
     ends = [(back or [(first, fold)])[-1], (ahead or [(first, fold)])[-1]]
-    cusps = [cusp_beyond(chart, gait, member, value, way)
-             for (value, member), way in zip(ends, (-1.0, 1.0), strict=True)]
-    # A cusp is the last point of its curve.
+    cusps = [cusp_beyond(chart, gait, member, value, direction)
+             for (value, member), direction in zip(ends, (-1.0, 1.0), strict=True)]
+    # A cusp ends its curve.
     return Boundary('fold', (gait,), np.array([
         *(cusp.values for cusp in cusps[:1] if cusp), *points,
         *(cusp.values for cusp in cusps[1:] if cusp)]), tuple(filter(None, cusps)))
@@ -311,20 +297,19 @@ def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float)
 
 def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
     """Return the branch in the row of an edge."""
-    orbit = solve_from_wave(chart.at_fractions(edge.here), gait, edge.wave, edge.period)
-    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
-                          most=MOST)
+    orbit = solve_from_wave(chart.at_fractions(edge.start), gait, edge.wave, edge.period)
+    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high, most=MOST)
 
 
-def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, way: float
-             ) -> list[tuple[float, CurvePoint]]:
-    """Follow folds from one on in a direction of the first parameter.
+def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, direction: float
+                  ) -> list[tuple[float, CurvePoint]]:
+    """Follow folds in a direction of the first parameter.
 
     Args:
         chart: the plane.
         fold: a fold along the second axis.
         first: value on the first axis there.
-        way: 1 or -1, the direction.
+        direction: 1 or -1.
 
     Returns:
         The value on the first axis and the fold, of each.
@@ -332,25 +317,25 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, way: fl
     """
     path = [(first, fold)]
 
-    def advance(here: tuple[float, CurvePoint], step: float) -> tuple[float, CurvePoint] | None:
-        (value, last), guess = here, here[1].z
-        new = value + way * step * chart.size[0]
-        if not chart.first.low <= new <= chart.first.high:
+    def advance(before: tuple[float, CurvePoint], step: float) -> tuple[float, CurvePoint] | None:
+        (value, last), guess = before, before[1].z
+        new = value + direction * step * chart.size[0]
+        if new not in chart.first:
             return None
         if len(path) > 1 and path[-2][1].z.size == guess.size:
             guess = guess + (guess - path[-2][1].z) * (new - value) / (value - path[-2][0])
         ahead = _next(chart, last, new, guess)
-        # Beyond a Bautin point the Hopf point remains, where branches turn, too. A fold off the
-        # course is another one of the branch.
+        # Beyond a Bautin point branches turn at their Hopf point. A fold off the course is
+        # another fold of the branch.
         if ahead is None or ahead.amplitude < REST or not _on_course(
                 chart, [*path[1:][-2:], (new, ahead)], step):
             return None
         return new, ahead
 
-    for here in continue_steps(advance, (first, fold), STEP, SHORTEST, STEP):
-        if not chart.second.low <= here[1].value <= chart.second.high:
+    for point in continue_steps(advance, (first, fold), STEP, SHORTEST, STEP):
+        if point[1].value not in chart.second:
             break
-        path.append(here)
+        path.append(point)
     return path[1:]
 
 
@@ -358,9 +343,9 @@ def _on_course(chart: ParameterPlane, last: list[tuple[float, CurvePoint]], step
     """Tell whether a fold lies close to the extrapolation of the two folds before it."""
     if len(last) < 3:
         return True
-    (a, one), (b, two), (c, three) = last
-    ahead = two.value + (two.value - one.value) * (c - b) / (b - a)
-    return bool(abs(three.value - ahead) < 0.5 * step * chart.size[1])
+    (a, first), (b, second), (c, third) = last
+    ahead = second.value + (second.value - first.value) * (c - b) / (b - a)
+    return bool(abs(third.value - ahead) < 0.5 * step * chart.size[1])
 
 
 def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
@@ -375,7 +360,8 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
         rate = rate_along(near)
         for reach in REACHES:
             if rate(-reach) * rate(reach) < 0.0:
-                return predict_and_correct(near, brentq(rate, -reach, reach, xtol=1e-11))
+                return locate(lambda point: point.rate, partial(predict_and_correct, near),
+                              -reach, reach, 1e-11)
     except (NoOrbit, np.linalg.LinAlgError):
         return None
     return None
@@ -383,21 +369,20 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: BESIDE: distances from the Bautin point, as fractions of the ranges, at which a branch starts;
-#: AMPLITUDE: of its first orbit; LONGEST: its longest step; MOST_POINTS: its most points.
+#: Distances from the Bautin point, in fractions of the ranges, at which branches start, the
+#: amplitude of their first orbit, their longest step, and points at most.
 BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: NEAR: largest distance of a fold from its Hopf point, as a fraction; END: largest distance of a
-#: curve's end from the Bautin point at which it ends there.
+#: Largest distance of the fold from its Hopf point, and of the curve's end from the Bautin point,
+#: in fractions.
 NEAR, END = 0.2, 0.02
-#: SAME_CURVE: distance, as a fraction, up to which two curves are one.
+#: Distance of equal curves in fractions.
 SAME_CURVE = 3e-3
 
 
 def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
-    """Follow the fold curves that are born at the Bautin points of a curve of Hopf points.
+    """Follow the fold curves that begin at the Bautin points of a curve of Hopf points.
 
-    Each begins with the Bautin point. Of one that cannot be started there is none, as where the
-    branch does not turn within the plane.
+    A curve whose branch does not turn within the plane is left out.
     """
     chart, curve = job
     curves = []
@@ -410,21 +395,21 @@ def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
 
 
 def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary]:
-    """Leave out fold curves that run along one before them, which may have been met elsewhere."""
+    """Leave out fold curves that run along one before them."""
     kept: list[Boundary] = []
     for curve in curves:
-        fractions = curve.fractions(chart)
+        fractions = chart.fractions_of(curve.points)
         some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
         if curve.kind != 'fold' or not any(
                 other.kind == 'fold' and other.gaits == curve.gaits
-                and all(on_curve(other, chart, fraction, SAME_CURVE) for fraction in some)
+                and all(other.passes(chart, fraction, SAME_CURVE) for fraction in some)
                 for other in kept):
             kept.append(curve)
     return kept
 
 
 def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:
-    fraction = np.append((np.array(point.values) - chart.low) / chart.size, point.omega)
+    fraction = np.append(chart.fractions_of(point.values), point.omega)
     condition = condition_of(chart, point.gait, fraction)
     tangent = condition.tangent(fraction)
     if abs(tangent[0]) < abs(tangent[1]):
@@ -435,8 +420,7 @@ def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:
     for fold, first in _folds(condition, fraction, tangent):
         whole = fold_curve(chart, point.gait, fold, first)
         points = whole.points
-        gaps = [(np.abs(end - point.values) / chart.size).max()
-                for end in (points[0], points[-1])]
+        gaps = [(np.abs(end - point.values) / chart.size).max() for end in (points[0], points[-1])]
         if min(gaps) > END:
             continue
         if gaps[1] < gaps[0]:
@@ -457,22 +441,20 @@ def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
     chart, mode = condition.chart, condition.mode
     line = chart.second.line
     for beside in BESIDE:
-        for way in (-1.0, 1.0):
-            place = condition.corrected(fraction + way * beside * tangent, tangent)
-            if place is None:
+        for direction in (-1.0, 1.0):
+            point = condition.corrected(fraction + direction * beside * tangent, tangent)
+            if point is None:
                 continue
-            one, other = chart.values_at(place[:2])
-            if not (chart.first.low <= one <= chart.first.high
-                    and chart.second.low <= other <= chart.second.high):
+            first, second = chart.values_at(point[:2])
+            if first not in chart.first or second not in chart.second:
                 continue
             try:
-                hopf = hopf_at(chart.at(one, other), line, mode, float(place[2]))
+                hopf = hopf_at(chart.at(first, second), line, mode, float(point[2]))
                 branch = continue_from_hopf(
-                    hopf.network, hopf.block.symmetry, hopf.omega, line, chart.second.low,
-                    chart.second.high, rest=hopf.state, vector=hopf.eigenvector,
-                    amplitude=AMPLITUDE, longest_step=LONGEST, most=MOST_POINTS)
+                    hopf, line, chart.second.low, chart.second.high, amplitude=AMPLITUDE,
+                    longest_step=LONGEST, most=MOST_POINTS)
             except (CpgError, np.linalg.LinAlgError):
                 continue
             for fold in branch.folds[:1]:
-                if abs(fold.value - other) < NEAR * chart.size[1]:
-                    yield fold.place, one
+                if abs(fold.value - second) < NEAR * chart.size[1]:
+                    yield fold.curve_point, first

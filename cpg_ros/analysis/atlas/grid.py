@@ -14,8 +14,8 @@
 
 """Refinement of a grid: points between neighbours that differ are computed.
 
-Between neighbours that agree for a gait in everything that is named (whether it exists and how
-stable it is) they are filled in, bilinearly. What is computed does not depend on the workers.
+Between neighbours at which a gait exists, or not, with the same stability, points are interpolated
+bilinearly. The result does not depend on the workers.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -24,25 +24,24 @@ import itertools
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import COARSE, ParameterPlane
-from cpg_ros.analysis.atlas.hopf_curves import Boundary, ChartLine, on_curve
+from cpg_ros.analysis.atlas.hopf_curves import Boundary, ChartLine
 from cpg_ros.analysis.atlas.row_job import AtlasRow, NONE
 from cpg_ros.common.errors import ShortRepr
 import numpy as np
 
-#: CLOSE: number of known orbits from which a point is reached; then the numbers that are filled in
-#: between points that agree.
+#: Orbits from which a point is reached, and numbers of a point.
 CLOSE = 2
 NUMBERS = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
 
 
 @dataclass(eq=False, repr=False)
 class GaitMap(ShortRepr):
-    """One gait on the grid, as far as it is known.
+    """One gait on the grid.
 
     Attributes:
         shape: rows and columns.
-        label: shape (rows, columns); -1 where nothing is known yet.
-        computed: whether it was computed, the same shape.
+        label: shape (rows, columns); -1 where there is none yet.
+        computed: whether a point was computed, the same shape.
         numbers: name -> values, nan where there are none.
         waves: (row, column) -> waveforms and period.
 
@@ -60,7 +59,7 @@ class GaitMap(ShortRepr):
         self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
 
     def take(self, points: Iterable[dict[str, Any]]) -> None:
-        """Enter the points of a job, where they are better than those known."""
+        """Enter the points of a job where they are better than those before."""
         for point in points:
             at = point['row'], point['column']
             if self.computed[at] and point['label'] <= self.label[at]:
@@ -73,30 +72,17 @@ class GaitMap(ShortRepr):
                 self.waves[at] = point['wave'], point['period']
 
     def fill(self, at: tuple[int, int], corners: list[tuple[int, int]]) -> None:
-        """Fill in a point from those around it, which agree."""
+        """Interpolate a point from those around it, which agree."""
         self.label[at] = self.label[corners[0]]
         for values in self.numbers.values():
             values[at] = np.mean([values[corner] for corner in corners])
 
 
-def grid_indices(count: int, stride: int) -> list[int]:
-    """Return the indices of a grid of this stride: the coarse one with the last index, halved."""
-    indices, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
-    while halved > stride:
-        indices = sorted({*indices, *((left + right) // 2
-                                     for left, right in itertools.pairwise(indices))})
-        halved //= 2
-    return indices
-
-
 def coarse_rows(chart: ParameterPlane, gaits: tuple[str, ...],
                 curves: Iterable[Boundary]) -> Iterator[AtlasRow]:
-    """Yield the jobs of the coarse grid, and of rows between its own that cross Hopf curves.
-
-    Branches are searched in rows: a steep curve between two rows would have none.
-    """
-    columns = tuple(grid_indices(chart.second.count, COARSE))
-    rows = {gait: set(grid_indices(chart.first.count, COARSE)) for gait in gaits}
+    """Yield the jobs of the coarse grid, and of rows through Hopf curves between its own rows."""
+    columns = tuple(chart.second.indices(COARSE))
+    rows = {gait: set(chart.first.indices(COARSE)) for gait in gaits}
     for curve in curves:
         low, high = np.interp([curve.points[:, 0].min(), curve.points[:, 0].max()],
                               chart.first.values, np.arange(chart.first.count))
@@ -111,38 +97,37 @@ def coarse_rows(chart: ParameterPlane, gaits: tuple[str, ...],
 
 def worse_points(chart: ParameterPlane, gait: str, sheet: GaitMap,
                  before: np.ndarray) -> list[AtlasRow]:
-    """Return jobs for points of the coarse grid that are worse than one beside them.
+    """Return jobs for points of the coarse grid that are worse than a neighbour.
 
-    An orbit may reach where no branch from a Hopf point of its row does.
+    A neighbour's orbit may reach a point that no branch from a Hopf point of its row reaches.
 
     Args:
         chart: the plane.
-        gait: whose.
-        sheet: what is known now.
-        before: labels at the previous call; points that have not changed are not tried again.
+        gait: of the map.
+        sheet: the map.
+        before: labels at the previous call; only points that have changed since are used.
 
     """
     jobs = []
     new = [at for at in sheet.waves if sheet.label[at] != before[at]]
-    for row in grid_indices(chart.first.count, COARSE):
-        some: list[int] = []
+    for row in chart.first.indices(COARSE):
+        columns: list[int] = []
         near: set[tuple[int, int]] = set()
-        for column in grid_indices(chart.second.count, COARSE):
+        for column in chart.second.indices(COARSE):
             close = {at for at in new if max(abs(at[0] - row), abs(at[1] - column)) <= COARSE
                      and sheet.label[at] > sheet.label[row, column]}
             if close:
-                some.append(column)
+                columns.append(column)
                 near |= close
-        if some:
-            jobs.append(AtlasRow(chart, gait, row, tuple(some), tuple(
+        if columns:
+            jobs.append(AtlasRow(chart, gait, row, tuple(columns), tuple(
                 (*at, *sheet.waves[at]) for at in sorted(near)), basin=True, again=True))
     return jobs
 
 
 def refine_once(chart: ParameterPlane, gait: str, sheet: GaitMap, stride: int) -> list[AtlasRow]:
-    """Halve the grid of a stride: fill in points that are clear; return jobs for the others."""
-    rows, columns = grid_indices(chart.first.count, stride), grid_indices(chart.second.count,
-                                                                          stride)
+    """Halve the stride of the grid: interpolate clear points; return jobs for the others."""
+    rows, columns = chart.first.indices(stride), chart.second.indices(stride)
     points: set[tuple[int, int]] = set()
     fillable: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for top, bottom in itertools.pairwise(rows):
@@ -162,41 +147,34 @@ def refine_once(chart: ParameterPlane, gait: str, sheet: GaitMap, stride: int) -
     by_row: dict[int, list[int]] = {}
     for row, column in sorted(points):
         by_row.setdefault(row, []).append(column)
-    return [AtlasRow(chart, gait, row, tuple(some), tuple(_near(sheet, row, some, stride)))
-            for row, some in by_row.items()]
+    return [AtlasRow(chart, gait, row, tuple(columns), tuple(_near(sheet, row, columns, stride)))
+            for row, columns in by_row.items()]
 
 
 def uncrossed_edges(chart: ParameterPlane, gait: str, sheet: GaitMap, curves: Iterable[Boundary]
                     ) -> Iterator[ChartLine]:
-    """Yield edges of the coarse grid at whose ends verdicts differ though no known curve is there.
+    """Yield edges of the coarse grid at whose ends labels differ and that no curve crosses.
 
     Args:
         chart: the plane.
-        gait: whose.
-        sheet: its verdicts.
-        curves: the known ones.
+        gait: of the map.
+        sheet: the map.
+        curves: boundaries that have been followed.
 
     """
-    own = [curve for curve in curves if gait in curve.gaits]
-    rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
-                                                                          COARSE)
-    pairs = [*((0, (left, column), (right, column)) for column in columns
-               for left, right in itertools.pairwise(rows)),
-             *((1, (row, left), (row, right)) for row in rows
-               for left, right in itertools.pairwise(columns))]
-    for axis, left, right in pairs:
-        here, there = chart.fraction(left), chart.fraction(right)
-        middle, reach = 0.5 * (here + there), float(np.abs(here - there).max())
+    crossing = [curve for curve in curves if gait in curve.gaits]
+    for axis, left, right in chart.neighbours():
+        ends = chart.fraction(left), chart.fraction(right)
         if sheet.label[left] != sheet.label[right] and not any(
-                on_curve(curve, chart, middle, reach) for curve in own):
-            low, high = ((chart.low + fraction * chart.size).tolist() for fraction in (here,
-                                                                                       there))
+                curve.passes(chart, 0.5 * (ends[0] + ends[1]),
+                             float(np.abs(ends[0] - ends[1]).max())) for curve in crossing):
+            low, high = (chart.values_at(end) for end in ends)
             yield ChartLine(chart, (gait,), axis, low[1 - axis], low[axis], high[axis])
 
 
 def _middles(top: int, bottom: int, left: int, right: int, corners: list[tuple[int, int]]
              ) -> Iterator[tuple[tuple[int, int], list[tuple[int, int]]]]:
-    """Points between the corners of a cell, each with those that it is in the middle of."""
+    """Yield the midpoints of a cell's edges and its centre, with the corners around each."""
     row, column = (top + bottom) // 2, (left + right) // 2
     yield (top, column), corners[:2]
     yield (bottom, column), corners[2:]
@@ -207,7 +185,7 @@ def _middles(top: int, bottom: int, left: int, right: int, corners: list[tuple[i
 
 def _near(sheet: GaitMap, row: int, columns: list[int], stride: int
           ) -> Iterator[tuple[int, int, list[list[float]], float]]:
-    """Known orbits around the points of a row: of each the closest ones."""
+    """Yield the closest orbits around each point of a row."""
     seen = set()
     for column in columns:
         close = sorted((abs(r - row) + abs(c - column), r, c)

@@ -27,21 +27,26 @@ pair meets in 0 (Bogdanov-Takens), or where the equilibrium folds (zero-Hopf).
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from itertools import chain, pairwise
 import math
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
 from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import continue_along_tangents, derivatives, newton, offsets
+from cpg_ros.dynamics.arclength import (
+    continue_along_tangents,
+    derivatives,
+    locate,
+    newton,
+    on_curve,
+)
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
 from cpg_ros.dynamics.hopf import hopf_points, HopfPoint, ON_AXIS, SPARE, tracked_roots
 from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-from scipy.optimize import brentq
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
@@ -54,7 +59,7 @@ class HopfCondition:
     """Two real equations in (p1, p2, omega), the parameters in fractions of their ranges."""
 
     def __init__(self, chart: ParameterPlane, mode: tuple[int, ...]) -> None:
-        """Prepare for a plane and the class whose root crosses."""
+        """Take the plane and the critical class."""
         self.chart, self.mode = chart, mode
 
     def values(self, fraction: np.ndarray) -> np.ndarray:
@@ -80,23 +85,21 @@ class HopfCondition:
 
 
 def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> HopfCondition:
-    """Return the condition of a gait's class at a Hopf point, of a wave's senses that which holds.
+    """Return the condition of a gait's class at a Hopf point, for the direction of its wave.
 
     Args:
         chart: the plane.
-        gait: whose.
+        gait: of the Hopf point.
         fraction: (p1, p2, omega), the parameters in fractions of their ranges.
 
     """
     network = chart.at_fractions(fraction[:2])
     conditions = [HopfCondition(chart, block.mode)
                   for block in blocks(network, equilibrium(network)) if block.gait == gait]
-    return min(conditions, key=lambda one: float(np.abs(one.values(fraction)).max()))
+    return min(conditions, key=lambda each: float(np.abs(each.values(fraction)).max()))
 
 
-# Hopf points on lines across the plane of an atlas, from which curves are followed.
-
-#: LINES: number of lines along each axis on which Hopf points are searched for.
+#: Lines along each axis on which the starts of curves are searched.
 LINES = 41
 
 
@@ -107,7 +110,7 @@ class ChartLine(ShortRepr):
     Attributes:
         chart: the plane.
         gaits: whose Hopf points are searched on it.
-        axis: along which: 0 or 1.
+        axis: 0 or 1.
         fixed: value on the other axis.
         low: least value on this one.
         high: greatest value.
@@ -121,7 +124,7 @@ class ChartLine(ShortRepr):
     low: float
     high: float
 
-    def place(self, value: float) -> tuple[float, float]:
+    def values_at(self, value: float) -> tuple[float, float]:
         """Return the values on both axes."""
         return (value, self.fixed) if self.axis == 0 else (self.fixed, value)
 
@@ -153,7 +156,7 @@ def lines_across(chart: ParameterPlane, gaits: tuple[str, ...]) -> Iterator[Char
 def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     """Return the Hopf points of some gaits on a line across the plane."""
     chart = segment.chart
-    network = chart.at(*segment.place(segment.low))
+    network = chart.at(*segment.values_at(segment.low))
     if not network.rests:
         return []
     line = (chart.first, chart.second)[segment.axis].line
@@ -166,15 +169,15 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     for point in points:
         gait = gaits.get(frozenset(point.block.symmetry.shifts))
         if gait is not None:
-            fraction = (np.array(segment.place(point.value)) - chart.low) / chart.size
+            fraction = chart.fractions_of(segment.values_at(point.value))
             starts.append(HopfStart(gait, point.mode, np.append(fraction, point.omega)))
     return starts
 
 
 #: FIRST, LONGEST, SHORTEST: steps along a curve, as fractions of the ranges; MOST: most points.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: SAME: distance, as a fraction, up to which a start lies on a known curve. Two classes share a
-#: curve if CHECKED points on it are solutions of both to SHARED.
+#: Distance from a curve below which a start lies on it, error of points that two classes share, in
+#: fractions of the ranges, and number of points at which that is checked.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 
 
@@ -185,11 +188,10 @@ class Boundary(ShortRepr):
     Attributes:
         kind: 'Hopf', 'torus', 'period doubling', 'branch point', 'fold', or where the period grows
             without bound, 'homoclinic' or 'SNIC'.
-        gaits: whose: several, where classes with the same eigenvalues share it.
-        points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
+        gaits: that it bounds; classes with the same eigenvalues share a curve.
+        points: values on both axes, and omega for Hopf points, shape (n, 2 or 3).
         codimension_two: points on it where a second condition holds.
-        losses: whether the loss is supercritical at points on it where a multiplier of
-            stable orbits crosses the unit circle, other than by a fold.
+        losses: normal forms at points on it where stable orbits lose their stability.
 
     """
 
@@ -199,9 +201,9 @@ class Boundary(ShortRepr):
     codimension_two: tuple[CodimensionTwo, ...] = ()
     losses: tuple[LossOnCurve, ...] = ()
 
-    def fractions(self, chart: ParameterPlane) -> np.ndarray:
-        """Return the points in fractions of the ranges of a plane, shape (n, 2)."""
-        return np.asarray((self.points[:, :2] - chart.low) / chart.size)
+    def passes(self, chart: ParameterPlane, point: np.ndarray, reach: float) -> bool:
+        """Whether the curve passes a point within a distance, both in fractions of a plane."""
+        return on_curve(chart.fractions_of(self.points), point, reach)
 
     def __str__(self) -> str:
         met = [name for name, soft in (('supercritical', True), ('subcritical', False))
@@ -215,13 +217,13 @@ def _inside(fraction: np.ndarray) -> bool:
                 and fraction[2] > 1e-4)
 
 
-def _continue_hopf(condition: HopfCondition, start: np.ndarray, way: float) -> list[np.ndarray]:
+def _continue_hopf(condition: HopfCondition, start: np.ndarray, direction: float
+                   ) -> list[np.ndarray]:
     def correct(guess: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         point = condition.corrected(guess, tangent)
-        return (None if point is None or not _inside(point) else
-                (point, condition.tangent(point)))
+        return (None if point is None or not _inside(point) else (point, condition.tangent(point)))
 
-    return [*continue_along_tangents(correct, start, way * condition.tangent(start),
+    return [*continue_along_tangents(correct, start, direction * condition.tangent(start),
                                      (FIRST, SHORTEST, LONGEST), aligned=0.95, most=MOST)]
 
 
@@ -232,8 +234,9 @@ class _HopfCurve:
     fractions: np.ndarray
 
     def holds(self, chart: ParameterPlane, start: HopfStart) -> bool:
-        """Whether a point lies on the curve, as one of a class that has all of the curve."""
-        if not _on(self.fractions, start.fraction):
+        """Whether a point lies on the curve, and its class shares all of the curve."""
+        scale = np.array([1.0, 1.0, max(1.0, abs(start.fraction[2]))])
+        if not on_curve(self.fractions / scale, start.fraction / scale, SAME):
             return False
         if start.mode not in self.modes:
             condition = HopfCondition(chart, start.mode)
@@ -248,7 +251,7 @@ class _HopfCurve:
 
 
 def curves_from(chart: ParameterPlane, starts: Iterable[HopfStart]) -> list[Boundary]:
-    """Follow the curves of Hopf points through some; each is listed once, with all its gaits."""
+    """Follow the curves through some Hopf points; each appears once, with all its gaits."""
     curves: list[_HopfCurve] = []
     for start in starts:
         if any(curve.holds(chart, start) for curve in curves):
@@ -257,7 +260,7 @@ def curves_from(chart: ParameterPlane, starts: Iterable[HopfStart]) -> list[Boun
         exact = condition.corrected(start.fraction, condition.tangent(start.fraction))
         if exact is None:
             continue
-        back, ahead = (_continue_hopf(condition, exact, way) for way in (-1.0, 1.0))
+        back, ahead = (_continue_hopf(condition, exact, direction) for direction in (-1.0, 1.0))
         curves.append(_HopfCurve([start.gait], {start.mode},
                                  np.array([*back[::-1], exact, *ahead])))
     low, size = np.append(chart.low, 0.0), np.append(chart.size, 1.0)
@@ -266,36 +269,24 @@ def curves_from(chart: ParameterPlane, starts: Iterable[HopfStart]) -> list[Boun
 
 def hopf_curves(chart: ParameterPlane, gaits: tuple[str, ...],
                 run: Callable[..., Iterable[list[HopfStart]]] = map) -> list[Boundary]:
-    """Follow all curves of Hopf points of some gaits that a few lines across the plane meet.
+    """Follow all curves of Hopf points of some gaits that cross a few lines.
 
     Args:
         chart: the plane.
         gaits: of its network.
-        run: applies a function to jobs, as ``map`` does, or ``Fleet.map``.
+        run: applies a function to jobs, as ``map`` does.
 
     """
     return curves_from(chart, chain(*run(hopf_starts, [*lines_across(chart, gaits)])))
 
 
-def on_curve(curve: Boundary, chart: ParameterPlane, point: np.ndarray, reach: float) -> bool:
-    """Whether a point lies on a curve, up to a distance; both in fractions of the ranges."""
-    return bool((np.abs(offsets(curve.fractions(chart), point)).max(axis=1) < reach).any())
+# Bogdanov-Takens and zero-Hopf points, in which a curve of Hopf points ends inside the plane.
 
-
-def _on(curve: np.ndarray, start: np.ndarray) -> bool:
-    """Whether a Hopf point, (p1, p2, omega), lies on a curve, between its points."""
-    gap = np.abs(offsets(curve, start))
-    gap[:, 2] /= max(1.0, abs(start[2]))
-    return bool((gap.max(axis=1) < SAME).any())
-
-
-# Ends of curves of Hopf points inside the plane: Bogdanov-Takens and zero-Hopf points.
-
-#: REACH: largest distance of an end from the curve's last point, as a fraction of the ranges.
+#: Largest distance of a curve's end from its last point, in fractions of the ranges.
 REACH = 0.03
-#: END_NEWTON: most steps of Newton's method at the end of a curve; LEFT: largest residual there.
-END_NEWTON, LEFT = 30, 1e-9
-#: SLIGHT: imaginary part of the root at which the derivative of a real determinant is evaluated.
+#: Steps of Newton's method at the end of a curve, and the largest residual there.
+END_NEWTON, RESIDUAL = 30, 1e-9
+#: Imaginary part of the root at which the derivative of a real determinant is taken.
 SLIGHT = 1e-6
 
 Equations = Callable[[np.ndarray], np.ndarray]
@@ -347,10 +338,10 @@ def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float]
     try:
         solution = newton(equations, start, steps=END_NEWTON, tolerance=EXACT,
                           difference=DIFFERENCE, longest=1.0)
-        left = math.inf if solution is None else float(np.abs(equations(solution)).max())
+        residual = math.inf if solution is None else float(np.abs(equations(solution)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
         return None
-    return None if solution is None or not left < LEFT else (solution, left)
+    return None if solution is None or not residual < RESIDUAL else (solution, residual)
 
 
 def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
@@ -359,8 +350,8 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
 
     Args:
         chart: the plane.
-        gait: whose.
-        mode: the class of the critical root.
+        gait: of the curve.
+        mode: of the critical class.
         fractions: points of the curve, (p1, p2, omega), the parameters in fractions, shape (n, 3).
 
     """
@@ -393,43 +384,41 @@ def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
                 and np.abs(fraction - last[:2]).max() < REACH)
 
 
-#: BRACKET: tolerance of a zero, as a fraction of the way between two points of a curve.
+#: Tolerance of a zero, as a fraction of the way between two points of a curve.
 BRACKET = 1e-14
-#: VANISHED: value of a test function, relative to both sides, below which a sign change is a zero
-#: and not a pole.
+#: Size of a test function at a zero, relative to its neighbours; at a pole it is larger.
 VANISHED = 1e-5
-#: ROUNDING: Lyapunov coefficient, relative to the curve's largest, up to which it is 0.
+#: Rounding error of a Lyapunov coefficient, relative to the curve's largest.
 ROUNDING = 1e-9
-#: SAME_POINT: distance, as a fraction of the ranges, and relative difference of the frequencies,
-#: up to which two points are one.
+#: Difference of equal points in fractions of the ranges, and of equal frequencies.
 SAME_POINT = 1e-7
-#: REAL: imaginary part, relative to omega, up to which a root is real.
+#: Imaginary part of a real root, over omega.
 REAL = 1e-6
 
 Test = Callable[[np.ndarray], float]
 
 
 class _Curve:
-    """A curve of Hopf points of one class, solved at each place once."""
+    """A curve of Hopf points of a class; each point is solved once."""
 
     def __init__(self, condition: HopfCondition, fractions: np.ndarray) -> None:
         self.condition, self.fractions = condition, fractions
         self.chart = condition.chart
-        self._known: dict[bytes, tuple[HopfPoint, tuple[Block, ...]]] = {}
+        self._solved: dict[bytes, tuple[HopfPoint, tuple[Block, ...]]] = {}
 
     def at(self, fraction: np.ndarray) -> tuple[HopfPoint, tuple[Block, ...]]:
         """Return the Hopf point at (p1, p2, omega), and the blocks of all classes."""
         key = fraction.tobytes()
-        if key not in self._known:
+        if key not in self._solved:
             network, line = self.chart.at_fractions(fraction[:2]), self.chart.second.line
             rest = equilibrium(network)
             split = blocks(network, rest)
             block = next(block for block in split if block.mode == self.condition.mode)
-            self._known[key] = HopfPoint(network, line, line.value(network), block,
-                                         float(fraction[2]), rest), split
-        return self._known[key]
+            self._solved[key] = HopfPoint(network, line, line.value(network), block,
+                                          float(fraction[2]), rest), split
+        return self._solved[key]
 
-    def between(self, left: np.ndarray, right: np.ndarray, way: float) -> np.ndarray:
+    def between(self, left: np.ndarray, right: np.ndarray, fraction: float) -> np.ndarray:
         """Return the curve's point at a fraction of the way between two of its points.
 
         Raises:
@@ -437,29 +426,27 @@ class _Curve:
 
         """
         tangent = (right - left) / np.linalg.norm(right - left)
-        point = self.condition.corrected(left + way * (right - left), tangent)
+        point = self.condition.corrected(left + fraction * (right - left), tangent)
         if point is None:
             raise ArithmeticError('the curve is lost')
         return point
 
     def zeros(self, test: Test, small: float) -> Iterator[np.ndarray]:
-        """Yield the places at which a test function changes its sign through 0.
+        """Yield the points at which a test function changes its sign through 0.
 
         Args:
-            test: of a place.
-            small: values that are 0 but for rounding: such a point is passed over, so that its
-                neighbours bracket what lies there.
+            test: of a point.
+            small: rounding error of its values; points with smaller values are skipped, so that
+                their neighbours bracket the zero.
 
         """
         values = [(fraction, test(fraction)) for fraction in self.fractions]
         clear = [(fraction, value) for fraction, value in values if abs(value) > small]
-        for (one, left), (other, right) in pairwise(clear):
+        for (start, left), (end, right) in pairwise(clear):
             if not left * right < 0.0:
                 continue
             try:
-                way = brentq(lambda s, one=one, other=other: test(self.between(one, other, s)),
-                             0.0, 1.0, xtol=BRACKET, rtol=1e-14)
-                zero = self.between(one, other, way)
+                zero = locate(test, partial(self.between, start, end), 0.0, 1.0, BRACKET)
             except (ArithmeticError, ValueError, CpgError):
                 continue
             if abs(test(zero)) < VANISHED * min(abs(left), abs(right)):
@@ -475,17 +462,17 @@ def with_degeneracies(job: tuple[ParameterPlane, Boundary]) -> Boundary:
 def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[CodimensionTwo, ...]:
     """Find the codimension-two points on a curve of Hopf points, in the order of the curve.
 
-    Two zeros of one test function between neighbouring points of the curve are not seen. A
-    first Lyapunov coefficient that is 0 all along, as where the rates are linear about the
-    equilibrium, has none. What happens where the frequency of a class that turns (walk, jump)
-    passes through 0 is not looked at.
+    Two zeros of a test function between neighbouring points of the curve are not found, nor are
+    any of a first Lyapunov coefficient that is 0 along the curve, as where the rates are linear
+    about the equilibrium. Zeros of the frequency of a travelling wave (walk, jump) are not
+    searched.
 
     Args:
         chart: the plane.
         curve: of Hopf points, as ``hopf_curves`` returns it.
 
     """
-    fractions = np.column_stack([curve.fractions(chart), curve.points[:, 2]])
+    fractions = np.column_stack([chart.fractions_of(curve.points), curve.points[:, 2]])
     points: list[CodimensionTwo] = []
     for k, gait in enumerate(curve.gaits):
         condition = condition_of(chart, gait, fractions[len(fractions) // 2])
@@ -495,24 +482,20 @@ def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[Codimensi
             # The classes of a curve have the same roots.
             points += _other_roots(whole, gait)
             points += curve_ends(chart, gait, condition.mode, fractions)
-    return tuple(sorted(points, key=lambda point: _along(chart, fractions, point.values)))
-
-
-def _along(chart: ParameterPlane, fractions: np.ndarray, values: tuple[float, float]) -> int:
-    fraction = (np.array(values) - chart.low) / chart.size
-    return int(np.abs(fractions[:, :2] - fraction).max(axis=1).argmin())
+    return tuple(sorted(points, key=lambda point: np.abs(
+        fractions[:, :2] - chart.fractions_of(point.values)).max(axis=1).argmin()))
 
 
 def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
     @cache
-    def known(key: bytes) -> float:
+    def coefficient(key: bytes) -> float:
         try:
             return curve.at(np.frombuffer(key))[0].lyapunov
         except (np.linalg.LinAlgError, CpgError):
-            return math.nan  # At a pole; it is passed over.
+            return math.nan  # At a pole, which is skipped.
 
     def test(fraction: np.ndarray) -> float:
-        return known(fraction.tobytes())
+        return coefficient(fraction.tobytes())
 
     small = ROUNDING * float(np.nanmax([0.0,
                                         *(abs(test(fraction)) for fraction in curve.fractions)]))
@@ -539,7 +522,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
 
             for zero in curve.zeros(test, small):
                 block, root = curve.at(zero)[1][which], complex(others(zero)[rank])
-                # Of a pair in two conjugate classes, only the root with Im > 0 counts.
+                # Of a pair in two conjugate classes, the root with positive imaginary part.
                 if root.imag > -REAL * zero[2] or block.real:
                     _enter(crossings, _crossing(curve, gait, zero, block, root), curve.chart)
     return crossings
@@ -555,7 +538,7 @@ def _crossing(curve: _Curve, gait: str, zero: np.ndarray, block: Block, root: co
 
 
 def _enter(points: list[CodimensionTwo], new: CodimensionTwo, chart: ParameterPlane) -> None:
-    """Enter a point, unless it is known: then only what it adds to that one's classes."""
+    """Enter a point, or add its classes to an equal point."""
     for k, point in enumerate(points):
         gap = np.abs(np.subtract(point.values, new.values) / chart.size).max()
         if (point.kind == new.kind and gap < SAME_POINT

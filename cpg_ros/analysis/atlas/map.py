@@ -16,11 +16,12 @@
 
 import base64
 from collections.abc import Iterator
+from dataclasses import asdict
 import hashlib
-import io
 from itertools import chain
 import json
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, LABELS, ParameterPlane
@@ -30,7 +31,7 @@ from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
 from cpg_ros.analysis.atlas.row_job import AtlasRow
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import replacing, stored_json, write_atomically
-from cpg_ros.common.report_page import STYLE
+from cpg_ros.common.report_page import rendered, STYLE
 from cpg_ros.fitting.inversion.results import library
 from cpg_ros.networks.registry import find_network
 import numpy as np
@@ -123,9 +124,7 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
         *(Line2D([], [], ls='', marker='o', ms=4.5, mfc='#ffffff', mec='#1a202c',
                  label=f'{LABELS[kind]} {kind}') for kind in special)],
         loc='outside lower center', ncols=min(4 + len(kinds), 3 * wide), frameon=False, fontsize=9)
-    out = io.BytesIO()
-    figure.savefig(out, format='png', dpi=110)
-    write_atomically(path, out.getvalue())
+    write_atomically(path, rendered(figure))
 
 
 # An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json.
@@ -180,7 +179,8 @@ class AtlasFolder:
             return None  # Those of an earlier version are followed anew.
         return [Boundary(curve['kind'], tuple(curve['gaits']), np.array(curve['points']),
                          tuple(map(CodimensionTwo.of, curve['codimension_two'])),
-                         tuple(map(LossOnCurve.of, curve['losses'])))
+                         tuple(LossOnCurve(tuple(loss['values']), loss['soft'], loss['why'])
+                               for loss in curve['losses']))
                 for curve in stored]
 
     def put_curves(self, curves: list[Boundary]) -> None:
@@ -188,7 +188,7 @@ class AtlasFolder:
         write_atomically(self.folder / 'boundaries.json', json.dumps([
             {'kind': curve.kind, 'gaits': curve.gaits, 'points': curve.points.tolist(),
              'codimension_two': [point.as_dict() for point in curve.codimension_two],
-             'losses': [loss.as_dict() for loss in curve.losses]}
+             'losses': [asdict(loss) for loss in curve.losses]}
             for curve in curves]))
 
     def write(self, sheets: dict[str, GaitMap]) -> Path:
@@ -284,20 +284,9 @@ def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
                       for point in curve.codimension_two if point.gait in sheets}.values())
     special = (f'<h2>Points of codimension two</h2><table>{listed}</table>' if listed else '')
     title = f'Gaits of the {kind.name} network over {axes[0].line} and {axes[1].line}'
-    style, script = (Path(__file__).with_name(name).read_text('utf-8')
-                     for name in ('map.css', 'map.js'))
-    write_atomically(path, f"""<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{title}</title>
-<style>{STYLE}
-{style}</style></head><body><h1>{title}</h1>
-<p>Gait <select id="gait" aria-label="gait"></select>. Click the map to see what the network
-does there: the waveform of each leg's first cell over two cycles, with bars where it is below its
-mean, and the parameters.</p><p class="key">{key}</p>
-<main><canvas id="map" width="760" height="600"></canvas>
-<aside><table id="values"></table><canvas id="waves" width="480" height="280"></canvas>
-<p><button id="copy">Copy the preset</button></p><pre id="preset"></pre></aside></main>
-{special}
-<script type="application/json" id="atlas">{data}</script><script>
-{script}</script></body></html>
-""")
+    template, style, script = (Path(__file__).with_suffix(suffix).read_text('utf-8')
+                               for suffix in ('.html', '.css', '.js'))
+    write_atomically(path, Template(template).substitute(
+        title=title, style=f'{STYLE}\n{style}', key=key, special=special, data=data,
+        script=script))
     return path

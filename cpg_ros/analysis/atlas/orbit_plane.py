@@ -16,26 +16,23 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from cpg_ros.analysis.atlas.chart import ParameterPlane
-from cpg_ros.analysis.atlas.row_job import subspace_multipliers
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.fourier.floquet import Accuracy
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form
 from cpg_ros.dynamics.solve_orbit import solve_beside
 import numpy as np
 
-# A gait's orbits over the plane of an atlas, and their multipliers by subspace.
-
-#: ARNOLDI: relative tolerance of multipliers; TRIVIAL: largest error of the trivial multiplier;
-#: HALVINGS: most halvings of the elements.
-ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
+#: Accuracy of multipliers on curves.
+ACCURACY = Accuracy(4, 1e-12, 1e-8, 5)
 
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
     """Multipliers of each subspace, largest first; that of the class first, without 1."""
-    return subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)
+    return multipliers(orbit, accuracy=ACCURACY).subspaces
 
 
 class OrbitPlane:
@@ -60,8 +57,8 @@ class OrbitPlane:
         return solved
 
 
-#: PLACES: number of places on a curve at which the normal form is computed.
-PLACES = 5
+#: Points on a curve at which the normal form is computed.
+POINTS = 5
 
 
 @dataclass(frozen=True)
@@ -70,8 +67,8 @@ class LossOnCurve:
 
     Attributes:
         values: on both axes.
-        soft: whether what leaves the gait attracts; None if the normal form cannot tell.
-        why: it cannot.
+        soft: whether the motion that branches off attracts; None if the form does not decide.
+        why: reason why it does not decide, or ''.
 
     """
 
@@ -79,32 +76,22 @@ class LossOnCurve:
     soft: bool | None
     why: str = ''
 
-    @staticmethod
-    def of(stored: dict[str, Any]) -> 'LossOnCurve':
-        """Return it from what as_dict has made."""
-        first, second = stored['values']
-        return LossOnCurve((first, second), stored['soft'], stored['why'])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as plain types."""
-        return {'values': list(self.values), 'soft': self.soft, 'why': self.why}
-
 
 def stability_losses(plane: OrbitPlane, part: int, rank: int,
                      curve: Sequence[tuple[np.ndarray, Orbit]]) -> Iterator[LossOnCurve]:
-    """Yield the verdicts at places spread evenly over the points of a curve.
+    """Yield the normal forms at evenly spaced points of a curve.
 
-    Places where other multipliers are outside the unit circle are left out: there the gait is not
-    stable on either side.
+    Points at which other multipliers are outside the unit circle are left out: there the gait is
+    unstable on both sides.
 
     Args:
         plane: of the curve.
-        part: number of the subspace in which a multiplier crosses the unit circle.
-        rank: how many larger ones that has.
+        part: index of the subspace in which a multiplier crosses the unit circle.
+        rank: of the multiplier in it, by size.
         curve: its points in fractions of the ranges, and orbits beside them.
 
     """
-    indices = np.unique(((np.arange(PLACES) + 0.5) / PLACES * len(curve)).astype(int))
+    indices = np.unique(((np.arange(POINTS) + 0.5) / POINTS * len(curve)).astype(int))
     for fraction, beside in (curve[k] for k in indices):
         plane.last = beside
         try:

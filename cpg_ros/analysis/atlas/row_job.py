@@ -25,10 +25,9 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import ATTRACTS, by_size, multipliers, sufficient_gain
+from cpg_ros.dynamics.floquet import multipliers, sufficient_gain
 from cpg_ros.dynamics.fourier import orbit as collocation
-from cpg_ros.dynamics.fourier.floquet import leading as fourier_leading
-from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.fourier.floquet import Accuracy
 from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
 from cpg_ros.dynamics.solve_orbit import solve_beside, solve_from_path, solve_orbit
@@ -37,18 +36,17 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 
-#: Labels of a gait at a point. NONE: no orbit; UNSTABLE: an orbit that does not attract in its
-#: class;
-#: LOCKED: one that attracts with a symmetry lock; STABLE: one that attracts by itself.
+#: Labels of a gait at a point: no orbit, one that is unstable in its class, one that attracts with
+#: a symmetry lock, one that attracts by itself.
 NONE, UNSTABLE, LOCKED, STABLE = range(4)
 #: KEPT: number of points of a waveform that are kept.
 KEPT = 65
-#: LEADING: number of multipliers of a subspace that Arnoldi's method computes.
-LEADING = 4
-#: STARTS: number of random states from which the basin of an orbit is estimated.
+#: Accuracy of multipliers for a map.
+ACCURACY = Accuracy(4, 1e-6, 1e-4, 4)
+#: Random states from which the basin of an orbit is estimated.
 STARTS = 8
-#: MOST: most points of a branch from a Hopf point; TRIED: most known orbits that are continued to
-#: a point; STEPS: numbers of steps in which this is tried.
+#: Points of a branch from a Hopf point at most; orbits close by that are continued to a point, and
+#: numbers of steps.
 MOST, TRIED, STEPS = 60, 3, (1, 4)
 
 
@@ -59,11 +57,11 @@ class AtlasRow:
     Attributes:
         chart: the plane.
         gait: of the network.
-        row: which, on the first axis.
-        columns: which points on the second, rising.
-        near: row, column, waveforms (nodes, components) and period of orbits known close by.
-        basin: whether runs from random starts are made.
-        again: whether all else has been tried: orbits are only continued from those close by.
+        row: index on the first axis.
+        columns: indices on the second axis, rising.
+        near: row, column, waveforms (nodes, components) and period of orbits close by.
+        basin: whether to run from random starts.
+        again: whether orbits are only continued from those close by.
 
     """
 
@@ -88,13 +86,13 @@ def assess_row(row: AtlasRow) -> list[dict[str, Any]]:
 class _Finder:
     def __init__(self, row: AtlasRow) -> None:
         self.row = row
-        self.one = float(row.chart.first.values[row.row])
+        self.first = float(row.chart.first.values[row.row])
         self.last: Orbit | None = None
         self._branches: list[Any] | None = None
 
     def point(self, column: int) -> dict[str, Any]:
         value = float(self.row.chart.second.values[column])
-        network = self.row.chart.at(self.one, value)
+        network = self.row.chart.at(self.first, value)
         best: tuple[Orbit, dict[str, Any]] | None = None
         periods: list[float] = []
         for orbit in self._orbits(network, column, value):
@@ -123,25 +121,25 @@ class _Finder:
         if self.last is not None:
             with suppress(NoOrbit):
                 yield from _proper(solve_beside(network, self.last))
-        for near in sorted(self.row.near, key=lambda one: (
-                abs(one[0] - self.row.row) + abs(one[1] - column), one[:2]))[:TRIED]:
+        for near in sorted(self.row.near, key=lambda point: (
+                abs(point[0] - self.row.row) + abs(point[1] - column), point[:2]))[:TRIED]:
             try:
-                yield from _proper(self._led(near, value))
+                yield from _proper(self._continued(near, value))
             except NoOrbit:
                 continue
         if self.row.again:
             return
         with suppress(NoOrbit, NoEquilibrium):
             yield from _proper(solve_orbit(network, gait))
-        # Between points that are known no branch of its own is looked for.
+        # Branches are searched on the coarse grid only.
         for branch in self._from_rest(network) if self.row.basin else ():
             try:
                 yield from branch.at(value)[::-1]
             except CpgError:
                 continue
 
-    def _led(self, near: tuple[int, int, list[list[float]], float], value: float) -> Orbit:
-        """Continue an orbit close by straight to here, in one step or several.
+    def _continued(self, near: tuple[int, int, list[list[float]], float], value: float) -> Orbit:
+        """Continue an orbit close by in a straight line to a value, in one step or several.
 
         Raises:
             NoOrbit: it ends on the way.
@@ -149,7 +147,7 @@ class _Finder:
         """
         chart, (row, column, wave, period) = self.row.chart, near
         begin = np.array([chart.first.values[row], chart.second.values[column]])
-        end = np.array([self.one, value])
+        end = np.array([self.first, value])
         orbit = solve_from_wave(chart.at(*map(float, begin)), self.row.gait, wave, period)
         for steps in STEPS:
             ahead = orbit
@@ -181,9 +179,7 @@ class _Finder:
                 low, high = ((0.9 * point.value, axis.high) if point.normal_form.side >= 0
                              else (axis.low, 1.1 * point.value))
                 try:
-                    self._branches.append(continue_from_hopf(
-                        point.network, point.block.symmetry, point.omega, line, low, high,
-                        rest=point.state, vector=point.eigenvector, most=MOST))
+                    self._branches.append(continue_from_hopf(point, line, low, high, most=MOST))
                 except CpgError:
                     continue
         return self._branches
@@ -191,16 +187,19 @@ class _Finder:
 
 def _assess(orbit: Orbit) -> dict[str, Any]:
     """Return the stability of an orbit, and its numbers."""
-    within, leading, unstable = leading_multipliers(orbit)
-    attracts = leading < ATTRACTS
-    return {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
+    spectrum = multipliers(orbit, accuracy=ACCURACY)
+    if None in (spectrum.attracts, spectrum.attracts_within):
+        spectrum = multipliers(orbit)
+    return {'label': (STABLE if spectrum.attracts else
+                      LOCKED if spectrum.attracts_within else UNSTABLE),
             'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
-            'leading': leading, 'leading_within': within, 'unstable': unstable,
-            'lock': 0.0 if attracts else sufficient_gain(orbit, RATE)}
+            'leading': spectrum.leading, 'leading_within': spectrum.leading_within,
+            'unstable': spectrum.unstable,
+            'lock': 0.0 if spectrum.attracts else sufficient_gain(orbit, RATE)}
 
 
 def _proper(orbit: Orbit) -> Iterator[Orbit]:
-    """Yield the orbit, unless it is another gait's or has almost no amplitude."""
+    """Yield the orbit, unless it has more symmetry or almost no amplitude."""
     if orbit.levels[0, 0, 1] > 1e-3 and not extra_symmetry(orbit):
         yield orbit
 
@@ -226,28 +225,3 @@ def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period
     return orbit
 
 
-def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
-    """Return the largest multiplier in the class, the largest of all, and how many lie outside.
-
-    Moduli, without the trivial one, as exact as a map needs them.
-    """
-    parts = subspace_multipliers(orbit)
-    sizes = np.abs(np.concatenate(parts))
-    return (float(np.abs(parts[0]).max(initial=0.0)), float(sizes.max(initial=0.0)),
-            int((sizes >= ATTRACTS).sum()))
-
-
-def subspace_multipliers(orbit: Orbit, exact: float = 1e-6, trivial: float = 1e-4,
-                         halvings: int = 4) -> list[np.ndarray]:
-    """Return multipliers by subspace, largest first; the class's without the trivial one first.
-
-    Args:
-        orbit: with a delay, the largest ones of each subspace are computed by Arnoldi's method.
-        exact: tolerance of Arnoldi's method.
-        trivial: error of the trivial multiplier above which the elements are halved.
-        halvings: of the elements, at most.
-
-    """
-    if not isinstance(orbit, FourierOrbit):
-        return multipliers(orbit).subspaces
-    return [by_size(part) for part in fourier_leading(orbit, LEADING, exact, trivial, halvings)]

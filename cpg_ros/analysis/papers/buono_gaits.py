@@ -30,6 +30,7 @@ from cpg_ros.analysis.papers.row import (
     disturbed_start,
     Picture,
     primary_gaits,
+    printed_values,
     ReproducedRow,
     Rhythm,
     rhythm,
@@ -43,55 +44,38 @@ from cpg_ros.networks.symmetry import admissible_pairs, GAITS, label, Permutatio
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
-#: SETTLING: gait -> periods in which it settles after a disturbance; USUALLY: the same for others.
+PRINTED = printed_values('buono_golubitsky')
+#: Periods in which a disturbed gait settles: for some gaits, and for the others.
 SETTLING = {'jump': 150.0}
 USUALLY = 60.0
-#: REVERSAL: periods in which a wave reverses its direction.
+#: Periods in which a wave reverses.
 REVERSAL = 150.0
 
-#: Table 13: alpha, beta, gamma, delta.
-TABLE_13 = {'pronk': ('0.2', '0.2', '0.2', '0.2'), 'pace': ('0.2', '0.2', '-0.2', '-0.2'),
-            'bound': ('-0.2', '-0.2', '0.2', '0.2'), 'trot': ('-0.6', '-0.6', '-0.6', '-0.6'),
-            'jump': ('0.01', '-0.01', '0.2', '0.2'), 'walk': ('0.01', '-0.01', '-1.2', '-1.2')}
-#: Table 1: t + ... of u_1 in cells 1 to 4.
-TABLE_1 = {'walk': '0 1/2 1/4 3/4', 'trot': '0 1/2 1/2 0', 'pace': '0 1/2 0 1/2',
-           'jump': '1/4 1/4 0 0', 'bound': '0 0 1/2 1/2', 'pronk': '0 0 0 0'}
 LEGS = ('LH', 'RH', 'LF', 'RF')
-#: Table 2: shifts of omega and kappa.
-TABLE_2 = {'pronk': ('0', '0'), 'pace': ('0', '1/2'), 'bound': ('1/2', '0'),
-           'trot': ('1/2', '1/2'), 'jump': ('1/4', '0'), 'walk': ('1/4', '1/2')}
-#: Section 7: phase between the two cells of a leg. 'Reversed' in the criss-cross network.
-SECTION_7 = {'zig-zag': {'walk': '1/2', 'jump': '1/2', 'pronk': '0', 'pace': '0', 'bound': '0',
-                         'trot': '0'},
-             'criss-cross': {'walk': '0', 'jump': '0', 'pronk': '1/2', 'pace': '1/2',
-                             'bound': '1/2', 'trot': '1/2'}}
 #: Cells (from 1) that share the left hind leg in Table 4.
 LEFT_HIND = {'zig-zag': (1, 5), 'criss-cross': (1, 6)}
 #: Erratum 9: gait -> phase in the criss-cross network, where that section is wrong.
 NOT_REVERSED = {'pronk': '0', 'bound': '0', 'jump': '1/2'}
-#: Constants of section 6 without the current, which is only visible in its sum with gL vL.
-SECTION_6 = {'phi': '0.2', 'v1': '0.2', 'v2': '0.4', 'v3': '0.3', 'v4': '0.2', 'gCa': '3',
-             'gL': '0.6', 'gK': '1.8', 'vL': '-1.8', 'vK': '-0.8'}
 CURRENT = '1'
 
 
 @dataclass(frozen=True)
 class SolvedGait:
-    """A gait of Table 13 in the network: as it was found by simulation."""
+    """A gait of Table 13 as simulated."""
 
     name: str
     network: Quadruped
-    seen: Rhythm
+    rhythm: Rhythm
 
     @property
     def phases(self) -> np.ndarray:
         """Phases of the eight cells relative to cell 1, cycles."""
-        return self.seen.found.phases
+        return self.rhythm.end.phases
 
 
 def settled(name: str) -> SolvedGait:
     """Simulate a gait of Table 13 from near its orbit, with every cell disturbed."""
-    network = Quadruped(*(float(value) for value in TABLE_13[name]))
+    network = Quadruped(*(float(value) for value in PRINTED['table_13'][name]))
     preset = Quadruped.presets()[name]
     span = SETTLING.get(name, USUALLY) * preset.period
     return SolvedGait(name, network, rhythm(network, disturbed_start(preset), span, Z4_Z2,
@@ -100,15 +84,16 @@ def settled(name: str) -> SolvedGait:
 
 def _table_13(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 13'), gait.name
-    yield at.word('gait that is found with the couplings ' + ', '.join(TABLE_13[name]), name,
-                  gait.seen.kind, note=f'period {gait.seen.found.period:.4f}; phases measured')
+    couplings = ', '.join(PRINTED['table_13'][name])
+    yield at.word(f'gait that is found with the couplings {couplings}', name, gait.rhythm.kind,
+                  note=f'period {gait.rhythm.end.period:.4f}; phases measured')
     yield at.stable(f'the {name} that is found',
                     multipliers(solve_orbit(gait.network, name)).leading)
 
 
 def _table_1(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 1'), gait.name
-    printed = [Fraction(part) for part in TABLE_1[name].split()]
+    printed = [Fraction(part) for part in PRINTED['table_1'][name].split()]
     for cell in range(1, 4):
         wrong = name == 'walk' and cell >= 2
         yield at.phases(f'{name}: phase of u_{cell + 1} ({LEGS[cell]}) against u_1 (LH)',
@@ -117,20 +102,21 @@ def _table_1(gait: SolvedGait) -> Iterator[ReproducedRow]:
 
 
 def _reversed(gait: SolvedGait) -> ReproducedRow:
-    """Compute the gait that develops from Table 1's walk, run the other way."""
+    """Start the walk as in Table 1, with the opposite wave, and measure its final phases."""
     preset = Quadruped.presets()[gait.name]
     start = np.array(preset.start).reshape(2, -1)[:, [0, 1, 6, 7, 4, 5, 2, 3]]
-    seen = rhythm(gait.network, start.ravel(), REVERSAL * preset.period, Z4_Z2,
-                  primary_gaits(variables=2))
+    final = rhythm(gait.network, start.ravel(), REVERSAL * preset.period, Z4_Z2,
+                   primary_gaits(variables=2))
     return Citation(AUTHORS, 'Table 1').phases(
         'walk started with u_3(t) = u_1(t + 1/4): phase of u_3 (LF) in the end', '1/4',
-        [seen.found.phases[2]], erratum=(10, '3/4'))
+        [final.end.phases[2]], erratum=(10, '3/4'))
 
 
 def _table_2(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 2'), gait.name
     how = 'with gamma U(t) = U(t - theta) as in eqs. 2.1 and 3.1'
-    for symbol, cell, printed in zip(('omega', 'kappa'), (2, 1), TABLE_2[name], strict=True):
+    shifts = PRINTED['table_2'][name]
+    for symbol, cell, printed in zip(('omega', 'kappa'), (2, 1), shifts, strict=True):
         yield at.phases(f'{name}: phase shift of {symbol}', printed, [-gait.phases[cell] % 1.0],
                         note=f'u_{cell + 1}(t) = u_1(t - theta), {how}')
 
@@ -140,7 +126,7 @@ def _section_7(gait: SolvedGait) -> Iterator[ReproducedRow]:
     for assignment, (first, second) in LEFT_HIND.items():
         wrong = assignment == 'criss-cross' and name in NOT_REVERSED
         yield at.phases(f'{name}: phase between the two cells of a leg, {assignment} network',
-                        SECTION_7[assignment][name],
+                        PRINTED['section_7'][assignment][name],
                         [gait.phases[second - 1] - gait.phases[first - 1]],
                         erratum=(9, NOT_REVERSED[name]) if wrong else None,
                         note=f'cells {first} and {second}')
@@ -153,7 +139,7 @@ def _figure_2(gait: SolvedGait) -> Iterator[ReproducedRow | Picture]:
     if gait.name == 'walk':
         yield Citation(AUTHORS, 'Figure 2').word('order in which the cells peak in the walk',
                                                  'u_1 u_3 u_2 u_4', order)
-    run, period = gait.seen.run, gait.seen.found.period
+    run, period = gait.rhythm.run, gait.rhythm.end.period
     drawn = run.t >= run.t[-1] - 4.0 * period
     cells = gait.network.cells
     yield Picture(AUTHORS, f'Figure 2, {where}', f'The {gait.name} of Table 13, four periods.',
@@ -166,15 +152,15 @@ def _figure_2(gait: SolvedGait) -> Iterator[ReproducedRow | Picture]:
 def _gaits(*names: str) -> Iterator[ReproducedRow | Picture]:
     for name in names:
         gait = settled(name)
-        for part in (_table_1, _table_2, _table_13, _section_7):
-            yield from part(gait)
+        for rows in (_table_1, _table_2, _table_13, _section_7):
+            yield from rows(gait)
         if name == 'walk':
             yield _reversed(gait)
         if name in ('walk', 'trot'):
             yield from _figure_2(gait)
         if name == 'trot':
             at = Citation(AUTHORS, 'section 2.1')
-            h, k = gait.seen.found.h, gait.seen.found.k
+            h, k = gait.rhythm.end.h, gait.rhythm.end.k
             yield at.number('order of H of the trot, Z4 x Z2', '8', len(h))
             yield at.word('K of the trot is generated by', '<omega kappa>', label(Z4_Z2, k))
             yield at.number('order of K of the trot, Z2(omega kappa)', '2', len(k),
@@ -195,7 +181,7 @@ def constants() -> Iterator[ReproducedRow | Picture]:
     """Yield the cell of section 6, read off the compiled rates."""
     at = Citation(AUTHORS, 'section 6')
     values = cell_constants(Quadruped(0.0, 0.0, 0.0, 0.0), float(CURRENT))
-    for name, printed in SECTION_6.items():
+    for name, printed in PRINTED['section_6'].items():
         yield at.number(name, printed, values[name], within=1e-8,
                         note=f'read off the compiled rates, with i = {CURRENT}')
     yield at.formula('tau ten widths v4 from v3, over its least', 'cosh(5)', np.cosh(5.0),
@@ -264,8 +250,6 @@ ONE = tuple(range(8))
 NAMES = {'D4': D4, 'D2s': generated(KAPPA, HALF), 'D2p': generated(after(KAPPA, OMEGA), HALF),
          'Z4': generated(OMEGA), '1': generated(ONE), 'Z2s': generated(KAPPA),
          'Z2p': generated(after(KAPPA, OMEGA)), 'Z2': generated(HALF)}
-TYPES = ('Z4 in D4', 'D2p in D4', 'D2s in D4', 'Z2 in Z4', 'Z2 in D2p', 'Z2p in D2p',
-         'Z2 in D2s', 'Z2s in D2s', '1 in Z4', '1 in Z2', '1 in Z2p', '1 in Z2s')
 
 
 def _name(subgroup: Subgroup) -> str:
@@ -284,15 +268,14 @@ def dihedral() -> Iterator[ReproducedRow | Picture]:
     at = Citation(AUTHORS, 'section 2.3')
     classes = {frozenset(conjugate(g, subgroup) for g in D4) for subgroup in all_subgroups(D4)}
     yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))
-    types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4)
-             for k, h in solutions()}
+    types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4) for k, h in solutions()}
     yield at.number('types of periodic solutions with H larger than K', '12', len(types))
     pairs = {f'{_name(k)} in {_name(h)}' for k, h in solutions()}
-    yield at.word('those types', ', '.join(TYPES), ', '.join(
-        [name for name in TYPES if name in pairs] + sorted(pairs - set(TYPES))))
+    printed = PRINTED['types']
+    yield at.word('those types', ', '.join(printed), ', '.join(
+        [name for name in printed if name in pairs] + sorted(pairs - set(printed))))
     quarter = {f'{_name(k)} in {_name(h)}' for k, h in solutions() if len(h) == 4 * len(k)}
-    yield at.word('those with a quarter-period phase shift', '1 in Z4',
-                  ', '.join(sorted(quarter)))
+    yield at.word('those with a quarter-period phase shift', '1 in Z4', ', '.join(sorted(quarter)))
     at = Citation(AUTHORS, 'Theorem 3.2')
     yield at.holds('kappa omega = omega^3 kappa',
                    after(KAPPA, OMEGA) == after(after(HALF, OMEGA), KAPPA))
@@ -309,19 +292,14 @@ def dihedral() -> Iterator[ReproducedRow | Picture]:
                         note='H/K is Z2: what is in H but not in K shifts by half a period')
 
 
-#: Figure 4: the largest subgroups of each, up to conjugation.
-FIGURE_4 = {'D4': 'D2s, D2p, Z4', 'D2s': 'Z2s, Z2', 'D2p': 'Z2p, Z2', 'Z4': 'Z2', 'Z2s': '1',
-            'Z2p': '1', 'Z2': '1'}
-
-
 def lattice() -> Iterator[ReproducedRow | Picture]:
     """Figure 4: the subgroups of D4, and which contain which."""
-    for name, printed in FIGURE_4.items():
-        below = [one for one in all_subgroups(D4) if one < NAMES[name]]
-        largest = {_name(one) for one in below if not any(one < other for other in below)}
+    for name, printed in PRINTED['figure_4'].items():
+        below = [group for group in all_subgroups(D4) if group < NAMES[name]]
+        largest = {_name(group) for group in below if not any(group < other for other in below)}
         yield Citation(AUTHORS, 'Figure 4').word(
             f'largest subgroups of {name}, up to conjugation', printed,
-            ', '.join([one for one in printed.split(', ') if one in largest]
+            ', '.join([group for group in printed.split(', ') if group in largest]
                       + sorted(largest - set(printed.split(', ')))))
 
 
@@ -336,7 +314,7 @@ def four_cells() -> Iterator[ReproducedRow | Picture]:
 
 
 def _written(element: Permutation) -> str:
-    """Return a permutation in cycles from 1, without the cells it leaves in place."""
+    """Return a permutation in cycles from 1, without fixed cells."""
     left, text = [i for i in range(len(element)) if element[i] != i], ''
     while left:
         cycle = [left[0]]
@@ -358,10 +336,10 @@ def assignments() -> tuple[tuple[str, ...], ...]:
     for partition in _pairings(tuple(range(8))):
         pairs = {frozenset(pair) for pair in partition}
         if all(frozenset(g[i] for i in pair) in pairs for g in symmetries for pair in pairs):
-            own = next(pair for pair in partition if 0 in pair)
-            others = [pair for pair in partition if pair != own]
+            first = next(pair for pair in partition if 0 in pair)
+            others = [pair for pair in partition if pair != first]
             for legs in permutations(LEGS[1:]):
-                leg = {i: name for pair, name in zip((own, *others), (LEGS[0], *legs),
+                leg = {i: name for pair, name in zip((first, *others), (LEGS[0], *legs),
                                                      strict=True) for i in pair}
                 accepted.append(tuple(leg[i] for i in range(8)))
     return tuple(accepted)
@@ -377,12 +355,6 @@ def _pairings(cells: tuple[int, ...]) -> Iterator[list[tuple[int, int]]]:
             yield [(first, other), *more]
 
 
-#: Table 4: legs of cells 1 to 8.
-TABLE_4 = {'zig-zag': 'LH RH LF RF LH RH LF RF', 'criss-cross': 'LH RH LF RF RH LH RF LF'}
-#: Table 3.
-TABLE_3 = 'LH RH LF RF LF RF LH RH'
-
-
 def legs() -> Iterator[ReproducedRow | Picture]:
     """Theorem 3.3, Tables 3 and 4."""
     at = Citation(AUTHORS, 'Theorem 3.3')
@@ -393,10 +365,11 @@ def legs() -> Iterator[ReproducedRow | Picture]:
     yield at.number('assignments if also F(2) = RH, F(3) = LF, F(4) = RF, as in the proof', '2',
                     len(proven))
     at = Citation(AUTHORS, 'Table 4')
-    names = dict(zip(TABLE_4, sorted(proven, key=lambda F: F.split()[4] != 'LH'), strict=True))
-    for name, printed in TABLE_4.items():
+    proven.sort(key=lambda F: F.split()[4] != 'LH')
+    names = dict(zip(PRINTED['table_4'], proven, strict=True))
+    for name, printed in PRINTED['table_4'].items():
         yield at.word(f'legs of cells 1 to 8, {name} network', printed, names[name])
-    shared = TABLE_3.split()
+    shared = PRINTED['table_3'].split()
     pairs = {frozenset(i for i in range(8) if shared[i] == leg) for leg in LEGS}
     kept = all(frozenset(g[i] for i in pair) in pairs
                for g in Z4_Z2.elements.values() for pair in pairs)
@@ -458,10 +431,10 @@ class Action:
         if not normals:
             return True
         signs = np.sign(np.array(normals) @ points)
-        same = np.ones(points.shape[1], dtype=bool)
+        kept = np.ones(points.shape[1], dtype=bool)
         for g in h:
-            same &= (np.sign(np.array(normals) @ (self.matrix(g) @ points)) == signs).all(axis=0)
-        return bool(same.any())
+            kept &= (np.sign(np.array(normals) @ (self.matrix(g) @ points)) == signs).all(axis=0)
+        return bool(kept.any())
 
 
 def of_cells(group: Subgroup, variables: int) -> Action:
@@ -485,23 +458,23 @@ def conditions() -> Iterator[ReproducedRow | Picture]:
     pairs = _quadruped_pairs()
     every = frozenset(Z4_Z2.elements.values())
     dihedral = [(k, h) for k in all_subgroups(D4) for h in all_subgroups(D4) if cyclic(h, k)]
-    for name, group, some in (('Z4 x Z2', every, pairs), ('D4', D4, dihedral)):
+    for name, group, listed in (('Z4 x Z2', every, pairs), ('D4', D4, dihedral)):
         action = of_cells(group, 2)
-        failing = [set(action.failing(k, h)) for k, h in some]
+        failing = [set(action.failing(k, h)) for k, h in listed]
         for condition in CONDITIONS:
             yield at.holds(f'{name}, eight cells with two variables: all pairs with cyclic H/K '
                            f'meet ({condition})',
                            not any(condition in failed for failed in failing),
-                           note=f'{len(some)} pairs')
+                           note=f'{len(listed)} pairs')
         gaps = [action.fixed(k).shape[1] - action.fixed(generated(g, *k)).shape[1]
-                for k, _ in some for g in group - k]
+                for k, _ in listed for g in group - k]
         yield Citation(AUTHORS, 'eq. A.7').holds(
             f'{name}: a further symmetry takes at least two dimensions from Fix(K)',
             min(gaps) >= 2, note=f'at least {min(gaps)}')
-        full = [action.fixed(k).shape[1] == 2 for k, _ in some]
+        full = [action.fixed(k).shape[1] == 2 for k, _ in listed]
         yield Citation(AUTHORS, 'appendix A').holds(
             f'{name}: dim Fix(K) = 2 only where K is the whole group',
-            all(len(k) == len(group) for (k, _), two in zip(some, full, strict=True) if two))
+            all(len(k) == len(group) for (k, _), two in zip(listed, full, strict=True) if two))
     turn = (1, 2, 3, 0)
     z4 = generated(turn)
 

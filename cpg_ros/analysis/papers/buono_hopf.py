@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
-from cpg_ros.analysis.papers.buono_gaits import AUTHORS
+from cpg_ros.analysis.papers.buono_gaits import AUTHORS, PRINTED
 from cpg_ros.analysis.papers.buono_linear import Sample, UNCOUPLED
 from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow
 from cpg_ros.dynamics.equilibrium import equilibrium
@@ -32,24 +32,12 @@ from scipy.optimize import brentq
 
 #: Section 6. STAND: v_0 and w_0 at the stand; NU_0: trace of a cell there.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'
-#: Table 12: alpha = beta, gamma = delta, xi = eta.
-TABLE_12 = {'pace': ('0.3', '-0.32', '0'), 'bound': ('-0.32', '0.3', '0'),
-            'trot': ('0.15', '-0.16', '-0.31')}
-#: APPROXIMATE: relative tolerance of the paper's 'approximate values'.
+#: 'Approximate values': this much of them.
 APPROXIMATE = 0.1
 #: Erratum 6: alpha, gamma and xi of the trot's Hopf point, with the signs that are right.
 TROT = (-0.15, -0.16, 0.31)
 
-#: Theorem 4.2: clause, gait, alpha, sign of beta, between which values of gamma the point lies,
-#: whether the clause calls it stable.
-THEOREM = (
-    ('a', 'pronk', 0.05, 1.0, (0.05, 0.08), True), ('a', 'pronk', -0.05, 1.0, (0.14, 0.2), False),
-    ('b', 'pace', 0.3, 1.0, (-0.35, -0.2), True), ('b', 'pace', 0.3, 1.0, (0.1, 0.16), False),
-    ('c', 'bound', -0.3, 1.0, (0.25, 0.35), True), ('c', 'bound', 0.05, 1.0, (0.08, 0.1), False),
-    ('d', 'trot', -0.6, 1.0, (-0.6, -0.5), True),
-    ('e', 'jump', 0.05, -1.0, (0.1, 0.2), True), ('f', 'walk', 0.01, -1.0, (-1.2, -1.05), True),
-    ('f', 'walk', 0.05, -1.0, (-1.1, -0.9), True))
-#: Gait and alpha of the case of THEOREM in which the clause does not hold.
+#: Point at which theorem 4.2 does not hold, by its gait and alpha.
 FAILING = ('walk', 0.05)
 
 
@@ -74,13 +62,13 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
     def largest(value: float) -> float:
         return stand_sample(along.at(network, value)).largest(f'L_{j}{k}')
 
-    there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
-    # Of the two senses of a wave, take the one whose critical eigenvalue turns forward.
-    blocks = stand_sample(there).blocks
-    root, mode = min(((root, (way, k)) for way in {j, -j % 4}
-                      for root in blocks[f'L_{way}{k}'].roots(2) if root.imag > 0.0),
-                     key=lambda one: abs(one[0].real))
-    return hopf_at(there, along, mode, root.imag)
+    critical = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
+    # The direction of the wave is that of the eigenvalue with positive imaginary part.
+    blocks = stand_sample(critical).blocks
+    root, mode = min(((root, (sense, k)) for sense in {j, -j % 4}
+                      for root in blocks[f'L_{sense}{k}'].roots(2) if root.imag > 0.0),
+                     key=lambda pair: abs(pair[0].real))
+    return hopf_at(critical, along, mode, root.imag)
 
 
 def the_stand() -> Iterator[ReproducedRow | Picture]:
@@ -137,12 +125,12 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
     for gait, name, line, (alpha, gamma) in (
             ('pace', 'gamma = delta', 'gamma=delta', (0.3, 0.0)),
             ('bound', 'alpha = beta', 'alpha=beta', (0.0, 0.3))):
-        printed = TABLE_12[gait][1 if name.startswith('gamma') else 0]
+        printed = PRINTED['table_12'][gait][1 if name.startswith('gamma') else 0]
         points[gait] = hopf(Quadruped(alpha, alpha, gamma, gamma), line, gait, -0.35, -0.2)
         yield at.number(f'{gait}: {name} at the Hopf point', printed, points[gait].value,
                         within=APPROXIMATE * abs(float(printed)),
                         note='the table says approximate; the other coupling as printed')
-    alpha, gamma, xi = (float(row) for row in TABLE_12['trot'])
+    alpha, gamma, xi = (float(row) for row in PRINTED['table_12']['trot'])
     sample = stand_sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
     leading = max(sample.largest(name) for name in sample.blocks)
     yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
@@ -153,8 +141,9 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
         near = TROT[n]
         point = hopf(Quadruped(alpha, alpha, gamma, gamma, xi, xi), line, 'trot', near - 0.05,
                      near + 0.05)
-        yield at.number(f'trot: {name} at the Hopf point', TABLE_12['trot'][n], point.value,
-                        erratum=(6, f'{near:g}'), note=f'the others at {alpha}, {gamma}, {xi}')
+        yield at.number(f'trot: {name} at the Hopf point', PRINTED['table_12']['trot'][n],
+                        point.value, erratum=(6, f'{near:g}'),
+                        note=f'the others at {alpha}, {gamma}, {xi}')
         points['trot'] = point
     for gait, point in points.items():
         yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
@@ -170,7 +159,7 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
 def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
     """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
     points: dict[str, HopfPoint] = {}
-    for clause, gait, alpha, sign, (low, high), stable in THEOREM:
+    for clause, gait, alpha, sign, (low, high), stable in PRINTED['theorem_4_2']:
         point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
         points.setdefault(gait, point)
         yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
@@ -225,8 +214,8 @@ class TheoremVerdict:
         unmet: hypotheses of the theorem that do not hold, as text.
         condition: on the signs, as text.
         met: whether it holds.
-        overlooked: what the theorem's proof takes for granted though it does not hold, as text:
-            the theorem, as stated, may be wrong there.
+        overlooked: assumptions of the proof that do not hold, as text: the theorem may be wrong
+            there.
 
     """
 
@@ -259,7 +248,7 @@ class TheoremVerdict:
 
 
 def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
-    """Apply the theorem at a Hopf point of the gait; that it is one is taken for granted.
+    """Apply the theorem at a Hopf point of the gait, which is not checked.
 
     For jump and walk the proof holds only for the rightmost pair of the class ("we always refer
     to the real part of the eigenvalue with greatest real part", corollary 5.4) and for alpha so
@@ -336,8 +325,8 @@ def _nu(state: np.ndarray) -> float:
 
 def _on_line(gait: str) -> HopfPoint:
     line, _, _, fraction = PROOFS[gait]
-    there = fraction * stand_sample(UNCOUPLED).trace('L_00').real
-    return hopf(UNCOUPLED, line, gait, there - 0.05, there + 0.05)
+    value = fraction * stand_sample(UNCOUPLED).trace('L_00').real
+    return hopf(UNCOUPLED, line, gait, value - 0.05, value + 0.05)
 
 
 def genericity() -> Iterator[ReproducedRow | Picture]:
@@ -387,8 +376,7 @@ def stable_points() -> Iterator[ReproducedRow | Picture]:
     yield Citation(AUTHORS, 'Lemma 5.8').holds(
         'trot: alpha_0 < 0, gamma_0 < 0 and xi_0 > alpha_0/2 there',
         eighth < 0.0 and trot.value > eighth / 2.0)
-    for gait, point in (('pace', _on_line('pace')), ('bound', _on_line('bound')),
-                        ('trot', trot)):
+    for gait, point in (('pace', _on_line('pace')), ('bound', _on_line('bound')), ('trot', trot)):
         yield at.word(f'{gait}: Hopf bifurcation at the point of the proof', 'stable',
                       'stable' if point.stable else 'unstable',
                       note=f'leading other eigenvalue {point.leading_other:.4f}')
@@ -396,7 +384,7 @@ def stable_points() -> Iterator[ReproducedRow | Picture]:
 
 def near_equal() -> Iterator[ReproducedRow | Picture]:
     """Theorem 4.2 where alpha and beta, gamma and delta differ a little."""
-    for clause, gait, alpha, sign, (low, high), stable in THEOREM:
+    for clause, gait, alpha, sign, (low, high), stable in PRINTED['theorem_4_2']:
         if not stable or (gait, alpha) == FAILING:
             continue
         first = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)

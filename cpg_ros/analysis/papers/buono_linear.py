@@ -14,15 +14,14 @@
 
 """Buono & Golubitsky (2001), section 5.2: Tables 5 to 11, formulas against the linearisation.
 
-The formulas stand in ``papers.buono_tables`` as printed. They are held against the blocks of the
-network's own Jacobian, at one state in which all cells are alike and one set of couplings, both
-drawn at random, so that no formula holds by chance.
+The formulas are compared as printed with the blocks of the network's Jacobian, at a random state
+with equal cells and random couplings, so that no formula holds by chance.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from cpg_ros.analysis.papers.buono_gaits import AUTHORS
+from cpg_ros.analysis.papers.buono_gaits import AUTHORS, PRINTED
 from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow
 from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.isotypic import Block, blocks
@@ -142,21 +141,6 @@ def square_root(phi: float, psi: float) -> complex:
     return complex(np.sqrt((phi + size) / 2.0), np.sqrt((size - phi) / 2.0))
 
 
-#: Table 5: phases of cells 1 to 8, upper and lower signs, by (j, k).
-TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0 1/2 0 1/2'),
-           (1, 0): ('jump+', '0 0 1/4 1/4 1/2 1/2 3/4 3/4'),
-           (3, 0): ('jump-', '0 0 -1/4 -1/4 1/2 1/2 -3/4 -3/4'),
-           (1, 1): ('walk+', '0 1/2 1/4 3/4 1/2 0 3/4 1/4'),
-           (3, 1): ('walk-', '0 1/2 -1/4 -3/4 1/2 0 -3/4 -1/4'),
-           (2, 0): ('bound', '0 0 1/2 1/2 0 0 1/2 1/2'),
-           (2, 1): ('trot', '0 1/2 1/2 0 0 1/2 1/2 0')}
-#: TABLE_6: printed text of the entries; the texts of Tables 7, 8 and 11 follow.
-TABLE_6 = {'L_00': 'A + (B + C + D)', 'L_01': 'A + (B - C + D)', 'L_20': 'A - (B - C - D)',
-           'L_21': 'A - (B + C - D)', 'L_10': 'A - Bi + C - D', 'L_11': 'A - Bi - C - D',
-           'L_30': 'A + Bi + C - D', 'L_31': 'A + Bi - C - D'}
-TABLE_11 = {'L_00': 'nu + 2(alpha + gamma + xi)', 'L_01': 'nu + 2(alpha - gamma + xi)',
-            'L_20': 'nu + 2(-alpha + gamma + xi)', 'L_21': 'nu - 2(alpha + gamma - xi)',
-            'L_10': 'nu + 2 gamma - 2 xi', 'L_11': 'nu - 2 gamma - 2 xi'}
 UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
 #: STAND: v and w at the stand of section 6, approximately.
 STAND = np.array([0.31, 0.52])
@@ -214,8 +198,9 @@ def phases() -> Iterator[ReproducedRow | Picture]:
         gap < 1e-9 and max(np.abs(roots - root).min() for root in values) < 1e-9,
         note=f'largest difference {gap:.1e}')
     at = Citation(AUTHORS, 'Table 5')
-    for (j, k), (gait, printed) in TABLE_5.items():
-        eigenvalue = sample.blocks[f'L_{j}{k}'].roots(2)[0]
+    for name, (gait, printed) in PRINTED['table_5'].items():
+        block = sample.blocks[name]
+        (j, k), eigenvalue = block.mode, block.roots(2)[0]
         vector = vectors[:8, np.abs(values - eigenvalue).argmin()]
         yield at.phases(f'U_{j % 2 or j}{k}: phases of cells 1 to 8, {gait}', printed,
                         np.angle(vector / vector[0]) / (2.0 * np.pi),
@@ -232,7 +217,7 @@ def tables() -> Iterator[ReproducedRow | Picture]:
     """Tables 6 to 10, and the eigenvalues that the paper derives from them."""
     sample = drawn()
     printed, parts = sample.tables, sample.blocks
-    for name, text in TABLE_6.items():
+    for name, text in PRINTED['table_6'].items():
         yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
                                                    parts[name].now)
     for (j, k), signs in TABLE_7.items():
@@ -286,7 +271,7 @@ def equal_couplings() -> Iterator[ReproducedRow | Picture]:
     sample = drawn(equal=True)
     printed, parts = sample.tables, sample.blocks
     at = Citation(AUTHORS, 'Table 11')
-    for name, text in TABLE_11.items():
+    for name, text in PRINTED['table_11'].items():
         value = printed.sigma(*parts[name].mode)
         yield at.formula(f'real part of the eigenvalues of {name}', text, value,
                          sample.largest(name), erratum=(13, value / 2.0))
@@ -307,6 +292,6 @@ def equal_couplings() -> Iterator[ReproducedRow | Picture]:
             ('L_11', '2 alpha - 4 xi', 2.0 * n.alpha - 4.0 * n.xi, None),
             ('L_10', '2 alpha + 4 gamma - 4 xi', 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi,
              None)):
-        there = sample.trace(name).real - printed.nu + critical
-        yield at.formula(f'trace of {name} (real part) with that nu', text, value, there,
+        trace = sample.trace(name).real - printed.nu + critical
+        yield at.formula(f'trace of {name} (real part) with that nu', text, value, trace,
                          erratum=wrong)

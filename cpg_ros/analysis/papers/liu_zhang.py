@@ -23,6 +23,7 @@ from cpg_ros.analysis.papers.row import (
     Paper,
     Picture,
     primary_gaits,
+    printed_values,
     ReproducedRow,
     rhythm,
     trajectories,
@@ -100,8 +101,7 @@ def published_normal_form(point: HopfPoint) -> NormalForm:
 
 #: DEVELOPED: model time in which a gait develops; DRAWN: model time that is drawn.
 DEVELOPED, DRAWN = 120.0, 20.0
-#: Start values printed under the figures.
-QUARTERS = (0.1, -0.1, 0.1, -0.1, 0.2, -0.2, 0.2, -0.2)
+#: Start values printed under Figures 3 and 4.
 HALVES = (0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2)
 
 
@@ -110,7 +110,7 @@ class Example:
     """A published gait: its parameters and the printed results.
 
     Attributes:
-        place: in the paper.
+        section: in the paper.
         gait: according to the paper.
         network: the parameters.
         start: values under its figure.
@@ -122,7 +122,7 @@ class Example:
 
     """
 
-    place: str
+    section: str
     gait: str
     network: Delayed
     start: tuple[float, ...]
@@ -133,37 +133,9 @@ class Example:
     wrong_start: tuple[int, str] | None = None
 
 
-EXAMPLES = {
-    'walk': Example(
-        'Example 1', 'walk', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), QUARTERS, 2,
-        {'omega': '7.4772', 'tau': '0.2861', 'k1': '0.4179', 'k2': '-0.2349',
-         'k1 k2': '-0.0982'}, ('omega_2', 'tau_4^0'),
-        {'k1': (1, '1.8135'), 'k2': (1, '-0.9177'), 'k1 k2': (1, '-1.664')}),
-    'trot': Example(
-        'Example 1', 'trot', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), HALVES, 3,
-        {'omega': '6.325', 'tau': '0.2852', 'k1': '0.6486', 'k2': '-0.2544',
-         'k1 k2': '-0.1650'}, ('omega_3', 'tau_6^0'),
-        {'k1': (1, '2.1557'), 'k2': (1, '-0.9610'), 'k1 k2': (1, '-2.072')}),
-    'pace': Example(
-        'Example 2', 'pace', Delayed(-3.0, 0.1, 4.0, 1.0, 0.7), HALVES, 4,
-        {'omega': '3.5119', 'tau': '0.5869', 'k1': '0.5957', 'k2': '-0.5951',
-         'k1 k2': '-0.3545'}, ('omega_1', 'tau_2^0'),
-        {'omega': (2, '3.5199'), 'k1': (1, '0.8319'), 'k2': (1, '-0.9142'),
-         'k1 k2': (1, '-0.7605')}),
-    'goat_trot': Example(
-        'section 4.1', 'trot', Delayed(-2.0, 1.0, 6.43, -2.0, 0.25), QUARTERS, 7,
-        {'tau': '0.2227', 'k1': '1', 'k2': '-0.2227', 'k1 k2': '-0.2227'},
-        ('omega_3', 'tau_6^0'),
-        {'k1': (1, '3.4488'), 'k2': (1, '-0.9010'), 'k1 k2': (1, '-3.107')}, (4, 'walk')),
-    'goat_walk': Example(
-        'section 4.2', 'walk', Delayed(-2.0, 1.0, 6.5, -2.0, 0.245), QUARTERS, 10,
-        {'tau': '0.2048', 'k1': '0.8232', 'k2': '-0.1867', 'k1 k2': '-0.1537'},
-        ('omega_2', 'tau_4^0'),
-        {'k1': (1, '3.4819'), 'k2': (1, '-0.8683'), 'k1 k2': (1, '-3.023')})}
-
-#: TABLE_1: start of c -> printed iterations; then the same of Table 2 for tau, and the results.
-TABLE_1 = {'6.1': '11', '6.3': '9', '6.5': '5', '7.2': '9'}
-TABLE_2 = {'0.25': '5', '0.28': '8', '0.39': '16', '0.4': '13'}
+PRINTED = printed_values('liu_zhang')
+EXAMPLES = {name: Example(network=Delayed(*parameters), **example) for name, (parameters, example)
+            in PRINTED['examples'].items()}
 SOLUTIONS = {'c': '6.4300', 'tau': '0.2450'}
 #: SAMPLES: samples of a cycle; MISFIT: RMS of the noise that makes a recording of the orbit.
 SAMPLES, MISFIT = 20, 0.35
@@ -173,7 +145,7 @@ ONE_MINIMUM = 1e-4
 
 def _coefficients(example: Example, point: HopfPoint) -> Iterator[ReproducedRow]:
     """Yield the normal form: by the formula that is printed, and by the right one."""
-    at = Citation(AUTHORS, example.place)
+    at = Citation(AUTHORS, example.section)
     printed, right = published_normal_form(point), point.in_delays
     for name, wrong_value, value in (
             ('k1', printed.k1.real, right.k1.real), ('k2', printed.k2.real, right.k2.real),
@@ -190,10 +162,10 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[ReproducedRow]
 
 def _example(example: Example) -> Iterator[ReproducedRow | Picture]:
     network, gait = example.network, example.gait
-    at = Citation(AUTHORS, example.place)
+    at = Citation(AUTHORS, example.section)
     point = first_hopf(network, gait)
     if point is None:
-        raise NoOrbit(f'{example.place}: no Hopf point of the {gait}')
+        raise NoOrbit(f'{example.section}: no Hopf point of the {gait}')
     for name, symbol, value in (('omega', example.names[0], point.omega),
                                 ('tau', example.names[1], point.value)):
         if name in example.numbers:
@@ -228,7 +200,7 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
     at = Citation(AUTHORS, figure)
     gaits = primary_gaits(variables=1)
     seen = rhythm(example.network, example.start, DEVELOPED, Z4_Z2, gaits)
-    phases = f'phases of cells 1 to 4: {np.round(seen.found.phases[:4], 4) % 1.0}'
+    phases = f'phases of cells 1 to 4: {np.round(seen.end.phases[:4], 4) % 1.0}'
     yield at.word('gait that the printed start values lead to', gait, seen.kind,
                   erratum=example.wrong_start, note=phases)
     caption = f'From the printed start values: {seen.kind}.'
@@ -328,12 +300,12 @@ def _inversion(figure: str, example: Example, name: str, starts: dict[str, str]
 
 def table_1() -> Iterator[ReproducedRow | Picture]:
     """Table 1: c of the trot."""
-    return _inversion('Table 1', EXAMPLES['goat_trot'], 'c', TABLE_1)
+    return _inversion('Table 1', EXAMPLES['goat_trot'], 'c', PRINTED['table_1'])
 
 
 def table_2() -> Iterator[ReproducedRow | Picture]:
     """Table 2: tau of the walk."""
-    return _inversion('Table 2', EXAMPLES['goat_walk'], 'tau', TABLE_2)
+    return _inversion('Table 2', EXAMPLES['goat_walk'], 'tau', PRINTED['table_2'])
 
 
 PAPER = Paper('liu_zhang', AUTHORS,

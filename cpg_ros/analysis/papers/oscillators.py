@@ -83,14 +83,14 @@ def stance_and_swing() -> Iterator[ReproducedRow]:
             fraction = 0.5 + 0.5 * np.tanh(25.0 * np.sin(angle))
             return float(1.0 / (stance * fraction + swing * (1.0 - fraction)))
 
-        parts = [quad(slowness, begin, begin + np.pi, points=[begin + 0.05, begin + np.pi - 0.05],
+        spans = [quad(slowness, begin, begin + np.pi, points=[begin + 0.05, begin + np.pi - 0.05],
                       epsabs=1e-13)[0] for begin in (0.0, np.pi)]
         yield cite.formula(f'period at duty {duty:g}, b = 50', 'integral of 1/omega over a turn',
-                           sum(parts), orbit.period)
+                           sum(spans), orbit.period)
         yield cite.formula(f'amplitude at duty {duty:g}', 'sqrt(mu)', np.sqrt(network.mu),
                            orbit.peak)
         yield cite.number(f'share of stance for omega_swing / omega_stance = '
-                          f'{duty / (1.0 - duty):.4g}', f'{duty:g}', parts[0] / sum(parts),
+                          f'{duty / (1.0 - duty):.4g}', f'{duty:g}', spans[0] / sum(spans),
                           within=0.01)
 
 
@@ -99,10 +99,10 @@ def neurons() -> Iterator[ReproducedRow]:
     cite = Citation(MATSUOKA, 'two neurons')
     network = _alone(Matsuoka.presets()['trot'].network)
     tau, tau_v, beta = network.tau, network.tau_v, network.beta
-    for a, there in ((1.0 + tau / tau_v - 0.005, False), (1.0 + tau / tau_v + 0.005, True),
+    for a, exists in ((1.0 + tau / tau_v - 0.005, False), (1.0 + tau / tau_v + 0.005, True),
                      (1.0 + beta - 0.005, True), (1.0 + beta + 0.005, False)):
-        yield cite.holds(f'a = {a:g}: they {"oscillate" if there else "do not oscillate"}, as '
-                         '1 + tau/tau_v < a < 1 + beta says', _oscillates(network, a) == there)
+        yield cite.holds(f'a = {a:g}: they {"oscillate" if exists else "do not oscillate"}, as '
+                         '1 + tau/tau_v < a < 1 + beta says', _oscillates(network, a) == exists)
     orbit, double = (solve_orbit(replace(network, c=c), 'trot') for c in (1.0, 2.0))
     yield cite.formula('amplitude with twice the input, over that with it', '2', 2.0,
                        double.peak / orbit.peak)

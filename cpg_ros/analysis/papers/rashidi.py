@@ -24,6 +24,7 @@ from cpg_ros.analysis.papers.row import (
     Paper,
     PHASE,
     Picture,
+    printed_values,
     ReproducedRow,
     Rhythm,
     rhythm,
@@ -41,51 +42,8 @@ from scipy.integrate import solve_ivp
 AUTHORS = 'Rashidi et al. 2016'
 NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
 
-#: Table 1.
-TABLE_1 = {'gCa': '0.9', 'gK': '2.00', 'gL': '0.5', 'vCa': '1.00', 'vK': '-0.7', 'vL': '-0.5',
-           'v1': '0.01', 'v2': '0.15', 'v3': '0.10', 'v4': '0.15'}
-#: Table 2: I, phi; w_a, w_b, w_c.
-TABLE_2 = {'walk': (0.229, 0.254, 0.390, -0.681, 0.489),
-           'run': (0.290, 0.394, -0.936, 1.000, 0.652),
-           'two_legged_jump': (0.279, 0.194, 0.982, -0.013, -0.221),
-           'two_legged_hop': (0.279, 0.294, 0.362, 0.328, -0.016)}
-#: Table 3: initial v, then u, of cells 1 to 4.
-TABLE_3 = {'walk': ((0.280, 0.277, -0.197, 0.159), (-0.197, 0.159, 0.280, 0.277)),
-           'run': ((-0.304, 0.163, -0.304, 0.163), (0.169, 0.229, 0.169, 0.229)),
-           'two_legged_jump': ((-0.046, 0.398, 0.327, 0.253), (-0.046, 0.398, 0.327, 0.253)),
-           'two_legged_hop': ((-0.059, 0.225, -0.059, 0.225), (-0.059, 0.225, -0.059, 0.225))}
-ODD = {'walk': 'printed u is v with its rows exchanged, so negative in cell 1',
-       'two_legged_jump': 'printed u is v', 'two_legged_hop': 'printed u is v'}
-#: Figure 2: phases of right and left flexor, then of the left extensor against its flexor.
-FIGURE_2 = {'walk': ('1/2', '1/2'), 'run': ('1/2', '0'), 'two_legged_jump': ('0', '1/2'),
-            'two_legged_hop': ('0', '0')}
-#: Table 4: signals of the left leg's flexor and extensor, then the right leg's.
-TABLE_4 = {'skip': '(y1, y2), (y1+0.5, y2+0.5)', 'gallop': '(y1, y1+0.5), (y2, y2+0.5)',
-           'hesitation_walk': '(y1, y2+0.5), (y2, y1+0.5)',
-           'asymmetric_hop': '(y1, y2), (y2, y1)', 'one_legged_hop': '(y1, y1), (y2, y2)'}
-#: Table 5: H, K, and the signals of cells 1 to 4.
-TABLE_5 = {'walk': ('D', 'rho-tau', '(y1, y1+0.5, y1+0.5, y1)'),
-           'run': ('D', 'tau', '(y1, y1+0.5, y1, y1+0.5)'),
-           'two_legged_jump': ('D', 'rho', '(y1, y1, y1+0.5, y1+0.5)'),
-           'two_legged_hop': ('D', 'D', '(y1, y1, y1, y1)'),
-           'skip': ('rho', 'I', '(y1, y1+0.5, y2, y2+0.5)'),
-           'gallop': ('tau', 'I', '(y1, y2, y1+0.5, y2+0.5)'),
-           'hesitation_walk': ('rho-tau', 'I', '(y1, y2, y2+0.5, y1+0.5)')}
-#: Equations 6 to 9: phases of cells 2 to 4 against cell 1, in degrees.
-EQUATIONS = {'walk': ('eq. 6', (180.0, 180.0, 0.0)), 'run': ('eq. 7', (0.0, 180.0, 180.0)),
-             'two_legged_jump': ('eq. 8', (180.0, 0.0, 180.0)),
-             'two_legged_hop': ('eq. 9', (180.0, 0.0, 180.0))}
-#: Figures 3 to 6, and 8 to 11: from which primary gait to which secondary one.
-FIGURES = {'walk': 3, 'run': 4, 'two_legged_jump': 5, 'two_legged_hop': 6}
-TRANSITIONS = {8: ('walk', 'skip'), 9: ('walk', 'gallop'), 10: ('run', 'skip'),
-               11: ('two_legged_jump', 'hesitation_walk')}
-#: Section 5: transitions that Pinto & Golubitsky predict, and the paper could not reach.
-PREDICTED = (('two_legged_jump', 'gallop'), ('run', 'hesitation_walk'))
-#: Section 5: gaits that the paper could not reach.
-NOT_REACHED = ('asymmetric_hop', 'one_legged_hop')
-
-#: SETTLING: model time in which a gait settles; CLOSE: largest objective that counts as 0,
-#: degrees.
+PRINTED = printed_values('rashidi')
+#: Model time in which a gait settles; degrees from 0 that an objective may be.
 SETTLING, CLOSE = 1500.0, 1.0
 #: SAME: difference in shape, over the RMS, up to which two waveforms are one.
 SAME = 0.02
@@ -111,7 +69,7 @@ def named(gait: str) -> str:
 
 def printed(gait: str) -> Biped:
     """Return the network with a row of Table 2."""
-    return Biped.symmetric(*TABLE_2[gait])
+    return Biped.symmetric(*PRINTED['table_2'][gait])
 
 
 def settled(gait: str) -> Rhythm:
@@ -126,7 +84,7 @@ def signals(seen: Rhythm) -> list[str]:
 
     Measured on the mean cycle: cells whose waveforms agree after the best shift have one name.
     """
-    run, period = seen.run, seen.found.period
+    run, period = seen.run, seen.end.period
     late = run.t >= run.t[-1] - 10.0 * period
     cycle = mean_cycle(run.t[late], run.x[late, :4], period)(np.arange(POINTS) / POINTS)
     first: list[int] = []
@@ -157,9 +115,8 @@ def cell() -> Iterator[ReproducedRow | Picture]:
     network = printed('walk')
     values = cell_constants(network, network.current)
     at = Citation(AUTHORS, 'Table 1')
-    for name, value in TABLE_1.items():
-        yield at.number(name, value, values[name], within=1e-8,
-                        note='read off the compiled rates')
+    for name, value in PRINTED['table_1'].items():
+        yield at.number(name, value, values[name], within=1e-8, note='read off the compiled rates')
     yield Citation(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
                                              '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
                                              values['tau_far'])
@@ -182,28 +139,29 @@ def _oscillates(sign: float) -> bool:
     far.terminal = True  # type: ignore[attr-defined]
     # A step that ends far out may pass through numbers that are no longer finite.
     with np.errstate(over='ignore', invalid='ignore'):
-        run = solve_ivp(rates, (0.0, 300.0), np.ravel(TABLE_3['walk']), events=far, max_step=0.5)
+        run = solve_ivp(rates, (0.0, 300.0), np.ravel(PRINTED['table_3']['walk']), events=far,
+                        max_step=0.5)
     return bool(run.t[-1] >= 300.0 and np.ptp(run.y[0, run.t > 250.0]) > 0.1)
 
 
 def primary() -> Iterator[ReproducedRow | Picture]:
     """Tables 2, 3 and 5, Figures 2 to 6, equations 6 to 9: the four primary gaits."""
     for gait in PRIMARY:
-        seen = settled(gait)
-        name, phases = named(gait), seen.found.phases
+        seen, figure = settled(gait), PRINTED['figures'][gait]
+        name, phases = named(gait), seen.end.phases
         at = Citation(AUTHORS, 'Table 2')
         yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
-                      note=f'period {seen.found.period:.4f}')
+                      note=f'period {seen.end.period:.4f}')
         yield at.stable(f'the {name} attracts',
                         multipliers(solve_orbit(printed(gait), gait)).leading)
         at = Citation(AUTHORS, 'Figure 2')
         for text, cell_a, cell_b, value in (
-                ('right against left flexor', 1, 0, FIGURE_2[gait][0]),
-                ('right against left extensor', 3, 2, FIGURE_2[gait][0]),
-                ('left extensor against flexor', 2, 0, FIGURE_2[gait][1]),
-                ('right extensor against flexor', 3, 1, FIGURE_2[gait][1])):
+                ('right against left flexor', 1, 0, PRINTED['figure_2'][gait][0]),
+                ('right against left extensor', 3, 2, PRINTED['figure_2'][gait][0]),
+                ('left extensor against flexor', 2, 0, PRINTED['figure_2'][gait][1]),
+                ('right extensor against flexor', 3, 1, PRINTED['figure_2'][gait][1])):
             yield at.phases(f'{name}: {text}', value, [phases[cell_a] - phases[cell_b]])
-        equation, expected = EQUATIONS[gait]
+        equation, expected = PRINTED['equations'][gait]
         for n, (degrees, phase) in enumerate(zip(expected, phases[1:], strict=True), 1):
             off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
             yield Citation(AUTHORS, equation).number(
@@ -211,25 +169,25 @@ def primary() -> Iterator[ReproducedRow | Picture]:
                 within=CLOSE, erratum=(8, '180'),
                 note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
         yield from _table_5(gait, seen)
-        start = simulated(printed(gait), tuple(np.ravel(TABLE_3[gait]).tolist()))
+        start = simulated(printed(gait), tuple(np.ravel(PRINTED['table_3'][gait]).tolist()))
         yield Citation(AUTHORS, 'Table 3').word(
             f'gait from the initial values of the {name}', name, named(start.gait),
-            note=ODD.get(gait, ''))
-        yield _drawn(f'Figure {FIGURES[gait]}', name, start, 'From the initial values of Table 3.')
+            note=PRINTED['odd'].get(gait, ''))
+        yield _drawn(f'Figure {figure}', name, start, 'From the initial values of Table 3.')
 
 
 def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 5'), named(gait)
-    h, k, response = TABLE_5[gait]
-    yield at.word(f'H of the {name}', h, _written(seen.found.h))
-    yield at.word(f'K of the {name}', k, _written(seen.found.k))
+    h, k, response = PRINTED['table_5'][gait]
+    yield at.word(f'H of the {name}', h, _written(seen.end.h))
+    yield at.word(f'K of the {name}', k, _written(seen.end.k))
     yield at.word(f'signals of cells 1 to 4 in the {name}', response,
                   f'({", ".join(signals(seen))})')
 
 
 def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
     run = seen.run
-    late = run.t >= run.t[-1] - 5.0 * seen.found.period
+    late = run.t >= run.t[-1] - 5.0 * seen.end.period
     shapes = [int(signal[1]) - 1 for signal in signals(seen)]
     return Picture(AUTHORS, figure, caption, trajectories(
         f'{AUTHORS}, {figure}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,
@@ -238,22 +196,22 @@ def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
 
 def secondary() -> Iterator[ReproducedRow | Picture]:
     """Tables 4 and 5, Figures 8 to 11: the secondary gaits. Their weights are not printed."""
-    for gait in TABLE_4:
+    for gait in PRINTED['table_4']:
         seen, name = settled(gait), named(gait)
         one, two, three, four = signals(seen)
         yield Citation(AUTHORS, 'Table 4').word(
-            f'signals in the {name}, left and right leg', TABLE_4[gait],
+            f'signals in the {name}, left and right leg', PRINTED['table_4'][gait],
             f'({one}, {three}), ({two}, {four})', note='weights are ours: none are printed')
-        if gait in TABLE_5:
+        if gait in PRINTED['table_5']:
             yield from _table_5(gait, seen)
-        if gait in NOT_REACHED:
+        if gait in PRINTED['not_reached']:
             roots = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
             reached = seen.gait == gait and roots.attracts
             yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {roots.leading:.3g} a cycle')
-    for number, (before, gait) in TRANSITIONS.items():
+    for number, (before, gait) in PRINTED['transitions'].items():
         network = Biped.presets()[gait].network
         assert isinstance(network, Biped)
         seen = simulated(network, disturbed(before))
@@ -267,13 +225,13 @@ def secondary() -> Iterator[ReproducedRow | Picture]:
 def predicted() -> Iterator[ReproducedRow | Picture]:
     """Section 5: which gait a primary one can break into, and the two transitions predicted."""
     at = Citation(AUTHORS, 'section 5')
-    for before, gait in (*TRANSITIONS.values(), *PREDICTED):
+    for before, gait in (*PRINTED['transitions'].values(), *PRINTED['predicted']):
         whole = D2.generated(GAITS[before])
         kept = {name: shift for name, shift in D2.generated(GAITS[gait]).items() if name != '1'}
         yield at.holds(f'the {named(gait)} keeps symmetries of the {named(before)}, and no others',
                        bool(kept) and all(whole[name] == shift for name, shift in kept.items()),
                        note=', '.join(f'{name} by {shift}' for name, shift in kept.items()))
-    for before, gait in PREDICTED:
+    for before, gait in PRINTED['predicted']:
         network = Biped.presets()[gait].network
         assert isinstance(network, Biped)
         seen = simulated(network, disturbed(before))
@@ -294,12 +252,13 @@ def kinds() -> Iterator[ReproducedRow | Picture]:
                                 ('1', 4, 'four waveforms')):
         yield at.number(f'of these with {what}', count, waveforms.count(number))
     gaits = [gait for gait in GAITS if settled(gait).gait == gait]
-    yield Citation(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
-                                              str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
-    in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
+    printed = str(len(PRINTED['table_5']))
+    yield Citation(AUTHORS, 'Table 5').number('gaits of the paper with their H and K', printed,
+                                              len(gaits), erratum=(11, '9'))
+    in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).end.k) > 1]
     yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
                    erratum=11, note='they are in: ' + ', '.join(map(named, in_phase)))
-    walk = settled('walk').found
+    walk = settled('walk').end
     for letter, elements, wrong, right in (('K', walk.k, 'spatio-temporal', 'spatial'),
                                            ('H', walk.h, 'spatial', 'spatio-temporal')):
         # On the elements the walk's best shifts: all of them 0, or not.

@@ -12,10 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``reproduce``: computes every number that the papers print.
-
-``reproduce`` prints a row for each: paper, place, quantity, published, computed, and whether they
-agree or which erratum says why not.
+"""Compute every quantity printed in the papers and compare it with the printed value. A row
+that differs names the erratum that explains it; otherwise it fails.
 """
 
 import argparse
@@ -23,7 +21,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from html import escape
-from io import BytesIO
 import json
 import os
 from pathlib import Path
@@ -37,12 +34,12 @@ from cpg_ros.analysis.papers import (
     oscillators,
     rashidi,
 )
-from cpg_ros.analysis.papers.row import Paper, Picture, ReproducedRow
+from cpg_ros.analysis.papers.row import Paper, ReproducedRow
 from cpg_ros.common import command_line
 from cpg_ros.common.command_line import Parser, progress_bar, run, say
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.common.report_page import html_table, image, page
+from cpg_ros.common.report_page import html_table, image, page, rendered
 from cpg_ros.common.workers import processes
 import yaml
 
@@ -128,7 +125,7 @@ class Reproduction:
 
 
 def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow], list[Drawn]]:
-    """Compute a part of a paper; one that breaks off leaves a row that fails."""
+    """Compute a section of a paper; an error becomes a row that fails."""
     rows: list[ReproducedRow] = []
     figures: list[Drawn] = []
     section = paper.sections[number]
@@ -137,7 +134,8 @@ def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow]
             if isinstance(row, ReproducedRow):
                 rows.append(row)
             elif draw:
-                figures.append(_drawn(row))
+                figures.append(Drawn(row.paper, row.place, row.caption,
+                                     rendered(row.figure, dpi=RESOLUTION)))
     except (CpgError, ArithmeticError) as error:
         rows.append(ReproducedRow(paper.authors, section.__name__.replace('_', ' '),
                                   'what is printed here',
@@ -145,47 +143,41 @@ def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow]
     return rows, figures
 
 
-def _drawn(picture: Picture) -> Drawn:
-    file = BytesIO()
-    picture.figure.savefig(file, format='png', dpi=RESOLUTION)
-    return Drawn(picture.paper, picture.place, picture.caption, file.getvalue())
-
-
 def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
               progress: Callable[[int], None] = lambda done: None) -> Reproduction:
     """Compute all rows of some papers.
 
     Args:
-        names: of the papers, from ``registry.PAPERS``.
-        jobs: processes to share the work; 1 does it in this one.
+        names: of the papers, from ``PAPERS``.
+        jobs: number of processes; 1 for this process.
         draw: whether to draw the figures.
-        progress: takes the number of parts done, out of ``parts(names)``.
+        progress: takes the number of sections done, out of ``sections(names)``.
 
     """
     papers = tuple(PAPERS[name] for name in names)
     tasks = [(paper, number, draw) for paper in papers for number in range(len(paper.sections))]
     done: dict[int, tuple[list[ReproducedRow], list[Drawn]]] = {}
     if jobs == 1:
-        for place, task in enumerate(tasks):
-            done[place] = _section(*task)
+        for index, task in enumerate(tasks):
+            done[index] = _section(*task)
             progress(len(done))
     else:
         pool = processes(min(jobs, len(tasks)))
         try:
-            waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
+            waiting = {pool.submit(_section, *task): index for index, task in enumerate(tasks)}
             for future in as_completed(waiting):
                 done[waiting[future]] = future.result()
                 progress(len(done))
         finally:
-            # After an error or Ctrl-C, jobs that are under way are of no use.
+            # After an error or Ctrl-C, running jobs are ended.
             pool.shutdown(wait=len(done) == len(tasks))
-    parts = [done[place] for place in range(len(tasks))]
+    parts = [done[index] for index in range(len(tasks))]
     return Reproduction(papers, tuple(row for rows, _ in parts for row in rows),
                         tuple(figure for _, figures in parts for figure in figures))
 
 
-def parts(names: Sequence[str]) -> int:
-    """Return the number of parts of the papers."""
+def sections(names: Sequence[str]) -> int:
+    """Return the number of sections of the papers."""
     return sum(len(PAPERS[name].sections) for name in names)
 
 
@@ -259,9 +251,6 @@ def as_html(report: Reproduction) -> str:
     return page('The papers reproduced', [*parts, '</ol>'])
 
 
-DESCRIPTION = """\
-Compute every quantity printed in the papers and compare it with the printed value. A row
-that differs names the erratum that explains it; otherwise it fails."""
 EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 invalid arguments.'
 
 
@@ -272,7 +261,7 @@ def _jobs(text: str) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG)
+    parser = Parser(prog='reproduce', description=__doc__, epilog=EPILOG)
     parser.add_argument('--paper', metavar='NAME', choices=tuple(PAPERS),
                         help=f'one of {", ".join(PAPERS)} (default: all)')
     parser.add_argument('--json', metavar='FILE', help='write the rows as JSON; - writes them to '
@@ -307,7 +296,7 @@ def _reproduce(args: argparse.Namespace) -> int:
     # Now, and not when the work is done.
     for path in files:
         _ready(path)
-    with progress_bar('reproducing', parts(names)) as progress:
+    with progress_bar('reproducing', sections(names)) as progress:
         report = reproduce(names, args.jobs, args.html is not None, progress)
     if json is not None:
         write_atomically(json, as_json(report))

@@ -18,9 +18,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from functools import cache
+from pathlib import Path
+from typing import Any, TYPE_CHECKING
 
-from cpg_ros.dynamics.floquet import ATTRACTS
+from cpg_ros.dynamics.floquet import stable, VERDICTS
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.fitting.gaits.recognition import recognise, Recognition
 from cpg_ros.networks.library.biped import Biped
@@ -28,6 +30,7 @@ from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry, Z4_Z2
 import numpy as np
+import yaml
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,7 +52,7 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
         names: of the cells.
         waves: number of each cell's waveform, from 0, which gives the colour; one each by
             default.
-        variable: what is drawn, for the axis.
+        variable: name of the drawn variable, for the axis.
 
     """
     waves = range(len(names)) if waves is None else waves
@@ -86,15 +89,15 @@ class ReproducedRow:
     Attributes:
         paper: authors and year.
         place: section, table, equation or figure of it.
-        quantity: what it is.
+        quantity: its description.
         published: as the paper prints it.
-        computed: its value, written alike.
-        agrees: whether the two do.
-        compared: how, in words.
-        value: the computed number; None where it is a word or has several numbers.
-        erratum: number of the one that covers this row (see ``errata``), or None.
-        corrected: what is right according to the erratum, or ''.
-        explained: whether the computed one is that.
+        computed: in the same notation.
+        agrees: whether the two agree.
+        compared: description of the comparison.
+        value: the computed number; None for a word or several numbers.
+        erratum: number of the erratum that covers this row, or None.
+        corrected: correct value according to the erratum, or ''.
+        explained: whether the computed value is the correct one.
         note: for the reader, or ''.
 
     """
@@ -127,7 +130,7 @@ class Picture:
     Attributes:
         paper: authors and year.
         place: the figure's number.
-        caption: what is shown, and where it differs from the paper's.
+        caption: description, and differences from the paper's figure.
         figure: its title names paper and figure.
 
     """
@@ -138,6 +141,14 @@ class Picture:
     figure: 'Figure'
 
 
+@cache
+def printed_values(paper: str) -> dict[str, Any]:
+    """Return the tables of a paper as it prints them, from printed.yaml."""
+    papers = yaml.safe_load(Path(__file__).with_name('printed.yaml').read_text('utf-8'))
+    tables: dict[str, Any] = papers[paper]
+    return tables
+
+
 #: Value of a formula.
 Value = float | complex | np.ndarray
 #: A part of a paper: computes some of its rows and pictures.
@@ -146,7 +157,7 @@ Section = Callable[[], Iterable[ReproducedRow | Picture]]
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper: a short name, authors and year, what it is, and its parts."""
+    """A paper: a short name, authors and year, title, and its parts."""
 
     name: str
     authors: str
@@ -158,7 +169,7 @@ class Paper:
 class Citation:
     """A place in a paper, from which rows are quoted.
 
-    An erratum comes with the correct value: a computed value that is neither that nor the
+    An erratum comes with the correct value; a computed value that differs from that and from the
     published one fails.
     """
 
@@ -179,7 +190,7 @@ class Citation:
         """Quote a number with the digits printed.
 
         Args:
-            quantity: what it is.
+            quantity: its description.
             published: as printed; its last digit gives its precision.
             computed: ours.
             within: largest difference; by default half a unit of the last digit printed.
@@ -188,14 +199,13 @@ class Citation:
 
         """
         def same(text: str) -> bool:
-            own = 0.5 * 10.0**_exponent(text)
-            limit = own if within is None or text != published else within
-            # A little more, for the rounding of binary numbers that lie on the limit.
+            half = 0.5 * 10.0**_exponent(text)
+            limit = half if within is None or text != published else within
+            # A little more, for rounding errors at the limit.
             return bool(abs(computed - float(text)) <= limit * (1.0 + 1e-9))
 
         exponent = _exponent(published) if within is None else int(np.floor(np.log10(within)))
         digits = max(0, -exponent) + MORE
-        # A count has no more digits than it has.
         shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
         how = 'to the last digit printed' if within is None else f'within {within:g}'
         return self._row(quantity, published, shown, same, how, float(computed), erratum, note)
@@ -230,7 +240,7 @@ class Citation:
     def stable(self, quantity: str, multiplier: float, *, erratum: int | None = None,
                which: str = 'leading') -> ReproducedRow:
         """Quote that a gait is stable, judged by a Floquet multiplier; an erratum: it is not."""
-        return self.word(quantity, 'stable', 'stable' if multiplier < ATTRACTS else 'unstable',
+        return self.word(quantity, 'stable', VERDICTS[stable(multiplier)],
                          erratum=None if erratum is None else (erratum, 'unstable'),
                          note=f'{which} Floquet multiplier {multiplier:.3g} a cycle')
 
@@ -268,7 +278,7 @@ def _shown(value: Value) -> str:
 
 # Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
 
-#: FAR: potentials at which m is 0 or 1 to rounding; NEAR: potentials at which m and n vary.
+#: Potentials at which m is 0 or 1 to rounding, and at which m and n bend.
 FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
 
 
@@ -284,7 +294,7 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
     """Read the constants off the rates.
 
     Args:
-        network: in which cells that are alike do not feel one another.
+        network: without coupling between equal cells.
         current: into each cell, which cannot be distinguished from gL vL.
 
     Returns:
@@ -306,8 +316,8 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
     v3, v4 = _bend(closed[4:, 1] / speed)
 
     def tau_phi(at: float) -> float:
-        place = np.array([at])
-        return float((_rates(network, place, 0.0) - _rates(network, place, 1.0))[0, 1])
+        v = np.array([at])
+        return float((_rates(network, v, 0.0) - _rates(network, v, 1.0))[0, 1])
 
     return {'gCa': float(g_ca), 'vCa': float(v_ca), 'gK': float(g_k), 'vK': float(v_k),
             'gL': float(g_l), 'vL': float(v_l), 'v1': v1, 'v2': v2, 'v3': v3, 'v4': v4,
@@ -320,9 +330,9 @@ def _bend(fraction: np.ndarray) -> tuple[float, float]:
     return float(-offset / slope), float(1.0 / slope)
 
 
-#: SETTLED: last share of a simulation, on which the rhythm is measured.
+#: Fraction of a simulation, from its end, on which the rhythm is measured.
 SETTLED = 0.15
-#: SAMPLES: number of samples on which the rhythm is measured; more only take time.
+#: Samples from which a rhythm is measured, at most.
 SAMPLES = 4000
 #: DISTURBANCE: standard deviation of a disturbed start, in the units of the cells.
 DISTURBANCE = 0.01
@@ -349,25 +359,25 @@ def disturbed_start(preset: Preset) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """A simulation and the gait recognised at its end.
+    """A simulation and the gait at its end.
 
     Attributes:
         run: from the start on.
-        found: phases, period, symmetries and gait.
+        end: phases, period, symmetries and gait.
 
     """
 
     run: Trajectory
-    found: Recognition
+    end: Recognition
 
     @property
     def gait(self) -> str:
-        """Name of the gait, its sense included; 'none' if no named one is near."""
-        return self.found.name or 'none'
+        """Name of the gait with the direction of its wave; 'none' if none is near."""
+        return self.end.name or 'none'
 
     @property
     def kind(self) -> str:
-        """Name of the gait whichever way its wave runs."""
+        """Name of the gait without the direction of its wave."""
         return self.gait.rstrip('+-')
 
 

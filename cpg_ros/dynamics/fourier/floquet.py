@@ -12,18 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Variational equation of gaits with a delay: adjoint, Floquet multipliers, forced solutions.
+"""Floquet multipliers of the gaits of networks with a delay, by a spectral method.
 
 Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, which
-keep the subspaces apart that symmetry does (dynamics.isotypic). A history is held at
-Chebyshev points of equal elements of [-tau, 0]. Elements of the same length march over a period,
-so that a delayed value always lies at a point; the monodromy matrix takes the values of one
-history to those a period later (Breda, Maset & Vermiglio 2012).
+keep the subspaces of dynamics.isotypic.split apart. A history has its values at Chebyshev points
+of equal elements of [-tau, 0]. Elements of the same length cover a period, so that a delayed value
+always lies at a point; the monodromy matrix takes the values of a history to those a period later
+(Breda, Maset & Vermiglio 2012).
 """
 
 from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
+from typing import NamedTuple
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.fourier import orbit as collocation
@@ -34,9 +35,7 @@ from cpg_ros.networks.equations import Field, States
 import numpy as np
 import scipy
 
-# The adjoint of the variational equation along a gait of a network with a delay, spectrally.
-
-#: RESOLVED: relative size of the last harmonics at which the adjoint is resolved.
+#: Size of the last harmonics at which the adjoint is resolved.
 RESOLVED = 1e-9
 
 
@@ -74,13 +73,9 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     return waveform
 
 
-#: DEGREE: polynomial degree on an element; SPAN: longest element, as a share of the period.
+#: Polynomial degree on an element, and largest length of an element in periods.
 DEGREE, SPAN = 20, 0.4
-#: TRIVIAL: error of the trivial multiplier, which is 1, up to which the elements are halved, at
-#: most HALVINGS times.
-TRIVIAL = 1e-9
-HALVINGS = 4
-#: FEW: size of a matrix up to which computing all eigenvalues takes no longer than the largest.
+#: Size of a matrix up to which all eigenvalues take no longer than the largest.
 FEW = 90
 
 
@@ -100,9 +95,9 @@ def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 POINTS, DERIVATIVE, _WEIGHTS = _differentiation(DEGREE)
 
 
-def _interpolation(places: np.ndarray) -> np.ndarray:
+def _interpolation(points: np.ndarray) -> np.ndarray:
     """Matrix from values at the points to values at places in [0, 1], shape (m, degree + 1)."""
-    gaps = places[:, None] - POINTS
+    gaps = points[:, None] - POINTS
     exact = np.abs(gaps) < 1e-14
     rows = _WEIGHTS / np.where(exact, 1.0, gaps)
     rows /= rows.sum(axis=1, keepdims=True)
@@ -110,7 +105,7 @@ def _interpolation(places: np.ndarray) -> np.ndarray:
 
 
 class Variation:
-    """The variational equation along an orbit, on elements of which n hold a delay."""
+    """The variational equation along an orbit, on elements of the length delay / n."""
 
     def __init__(self, orbit: FourierOrbit, n: int) -> None:
         network = orbit.network
@@ -124,7 +119,7 @@ class Variation:
 
     def march(self, columns: np.ndarray, gain: float
               ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
-        """Return the map that takes histories in a subspace through a period.
+        """Return the map that takes histories in a subspace over a period.
 
         Args:
             columns: orthonormal, shape (components, d).
@@ -172,10 +167,10 @@ class Variation:
             Values at the times, shape (m, d, k).
 
         """
-        places = np.asarray(times) + self.n
-        elements = np.clip(places.astype(int), 0, self.n + self.count - 1)
+        positions = np.asarray(times) + self.n
+        elements = np.clip(positions.astype(int), 0, self.n + self.count - 1)
         nearby = elements[:, None] * DEGREE + np.arange(DEGREE + 1)
-        return np.einsum('mk,mkds->mds', _interpolation(places - elements), values[nearby])
+        return np.einsum('mk,mkds->mds', _interpolation(positions - elements), values[nearby])
 
     def period_map(self, columns: np.ndarray, gain: float
                    ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
@@ -198,27 +193,23 @@ class Variation:
 
         return size, later
 
-    def multipliers(self, columns: np.ndarray, gain: float) -> np.ndarray:
-        """Return the multipliers in a subspace, as period_map has it."""
-        size, later = self.period_map(columns, gain)
-        return np.linalg.eigvals(later(np.eye(size)))
-
-    def leading(self, columns: np.ndarray, gain: float, count: int, exact: float) -> np.ndarray:
-        """Return the largest multipliers in a subspace, by Arnoldi's method where there are many.
+    def multipliers(self, columns: np.ndarray, gain: float, count: int | None, exact: float
+                    ) -> np.ndarray:
+        """Return the multipliers in a subspace, or the largest ones by Arnoldi's method.
 
         Args:
             columns: as of march.
             gain: as of march.
-            count: number of multipliers, at least; all where there are few.
+            count: number of multipliers, at least; None for all.
             exact: relative tolerance of Arnoldi's method.
 
         """
         size, later = self.period_map(columns, gain)
-        if size > FEW:
+        if count is not None and size > FEW:
             arpack = scipy.sparse.linalg
             operator = arpack.LinearOperator((size, size),
                                              matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
-            # The last gain's answer is a good start.
+            # The eigenvectors at the last gain are a good start.
             start = self._vectors.get(id(columns), np.random.default_rng(0).standard_normal(size))
             with suppress(arpack.ArpackError):
                 roots, vectors = arpack.eigs(operator, k=count, ncv=24, tol=exact, v0=start,
@@ -228,69 +219,65 @@ class Variation:
         return np.linalg.eigvals(later(np.eye(size)))
 
 
-def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class, without the trivial one, and that one."""
-    roots = variation(orbit)[1]
-    trivial = int(np.abs(roots - 1.0).argmin())
-    return np.delete(roots, trivial), complex(roots[trivial])
+class Accuracy(NamedTuple):
+    """Accuracy of multipliers with a delay.
 
-
-def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
-    """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
-    equation = variation(orbit)[0]
-    return tuple(equation.multipliers(columns, gain) for columns in equation.outside)
-
-
-def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
-    """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
-    equation = variation(orbit)[0]
-    return max((float(np.abs(equation.leading(part, gain, 2, exact)).max())
-                for part in equation.outside), default=0.0)
-
-
-def leading(orbit: FourierOrbit, count: int, exact: float, trivial: float, halvings: int
-            ) -> list[np.ndarray]:
-    """Return the largest multipliers of each subspace, the class's without the trivial one first.
-
-    Args:
-        orbit: of a network with a delay.
-        count: number of multipliers of each subspace.
+    Attributes:
+        leading: number of largest multipliers of each subspace, by Arnoldi's method; None for all.
         exact: relative tolerance of Arnoldi's method.
         trivial: error of the trivial multiplier above which the elements are halved.
         halvings: of the elements, at most.
 
     """
-    equation, inside = _resolved(orbit, trivial, halvings, lambda equation: equation.leading(
-        equation.inside, 0.0, count, exact))
-    return [np.delete(inside, np.abs(inside - 1.0).argmin()),
-            *(equation.leading(part, 0.0, count, exact) for part in equation.outside)]
+
+    leading: int | None
+    exact: float
+    trivial: float
+    halvings: int
+
+
+EXACT = Accuracy(None, 1e-10, 1e-9, 4)
+
+
+def within(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[np.ndarray, complex]:
+    """Return the multipliers within the gait's class but the trivial one, and that."""
+    roots = variation(orbit, accuracy)[1]
+    trivial = int(np.abs(roots - 1.0).argmin())
+    return np.delete(roots, trivial), complex(roots[trivial])
+
+
+def transverse(orbit: FourierOrbit, gain: float = 0.0, accuracy: Accuracy = EXACT
+               ) -> tuple[np.ndarray, ...]:
+    """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
+    equation = variation(orbit, accuracy)[0]
+    return tuple(equation.multipliers(columns, gain, accuracy.leading, accuracy.exact)
+                 for columns in equation.outside)
+
+
+def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
+    """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
+    equation = variation(orbit)[0]
+    return max((float(np.abs(equation.multipliers(part, gain, 2, exact)).max())
+                for part in equation.outside), default=0.0)
 
 
 @lru_cache(maxsize=4)
-def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
-    """Return a sufficiently fine variational equation and the multipliers within the class."""
-    return _resolved(orbit, TRIVIAL, HALVINGS, lambda equation: equation.multipliers(
-        equation.inside, 0.0))
-
-
-def _resolved(orbit: FourierOrbit, trivial: float, halvings: int,
-              solve: Callable[[Variation], np.ndarray]) -> tuple[Variation, np.ndarray]:
-    """Return the variational equation on elements that resolve the multiplier 1, and solve's."""
+def variation(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[Variation, np.ndarray]:
+    """Return the variational equation, fine enough, and the multipliers within the class."""
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
-    for halving in range(halvings):
+    for halving in range(accuracy.halvings):
         equation = Variation(orbit, n * 2**halving)
-        within = solve(equation)
-        if np.abs(within - 1.0).min() <= trivial:
+        roots = equation.multipliers(equation.inside, 0.0, accuracy.leading, accuracy.exact)
+        if np.abs(roots - 1.0).min() <= accuracy.trivial:
             break
-    return equation, within
+    return equation, roots
 
 
 def mode(orbit: FourierOrbit, part: int, multiplier: complex
          ) -> Callable[[np.ndarray], np.ndarray]:
     """Return the disturbance with a multiplier as a function of time, of size 1 at most.
 
-    The multiplier's eigenvector is a history; the variational equation takes it through a period,
-    after which it is the multiplier times as large.
+    The multiplier's eigenvector is a history, which the variational equation takes over a period.
 
     Args:
         orbit: of a network with a delay.
@@ -315,16 +302,14 @@ def mode(orbit: FourierOrbit, part: int, multiplier: complex
     nu = float(roots[nearest].real)
 
     def path(theta: np.ndarray) -> np.ndarray:
-        turns = np.floor(theta)
-        times = (theta - turns) * orbit.period / equation.length
-        return nu**turns[:, None] * equation.read(values, times)[..., 0] @ columns.T
+        periods = np.floor(theta)
+        times = (theta - periods) * orbit.period / equation.length
+        return nu**periods[:, None] * equation.read(values, times)[..., 0] @ columns.T
 
     return path
 
 
-# The variational equation along a gait of a network with a delay, with sources, as a matrix.
-
-#: MOST: largest number of unknowns, as the matrices are dense.
+#: Unknowns at most: the matrices are dense.
 MOST = 4096
 
 
@@ -335,7 +320,7 @@ class Variational:
         at: states at the nodes now and a delay ago, shape (n, components) each.
         slope: their derivatives by time.
         delay: model time.
-        flaw: why derivatives of the rates do not tell how disturbances interact, or ''.
+        flaw: reason why the derivatives of the rates do not describe disturbances, or ''.
 
     """
 
@@ -365,39 +350,39 @@ class Variational:
         self.flaw = 'the rates have kinks' if network.kinks else ''
 
     def critical(self, part: int, multiplier: complex) -> tuple[complex, np.ndarray]:
-        """Return the factor over a period of the disturbance with a multiplier, and about that.
+        """Return the factor of the disturbance with a multiplier, and a guess at it.
 
         Args:
-            part: number of its subspace, as in floquet.mode.
+            part: number of its subspace, as in mode.
             multiplier: over a period.
 
         Returns:
             The factor, and the disturbance at the unknowns, shape (n components,).
 
         """
-        # For a complex pair, the real part is enough as a guess.
+        # The real part of a pair is enough for a guess.
         values = mode(self._orbit, part, multiplier)(self._times / self._orbit.period)
         return multiplier, (values * self._wave(multiplier, -1.0)).ravel()
 
-    def _sigma(self, turn: complex) -> complex:
-        return complex(np.log(complex(turn))) / self._orbit.period
+    def _sigma(self, factor: complex) -> complex:
+        return complex(np.log(complex(factor))) / self._orbit.period
 
-    def _wave(self, turn: complex, sign: float) -> np.ndarray:
-        return np.exp(sign * self._sigma(turn) * self._times)[:, None]
+    def _wave(self, factor: complex, sign: float) -> np.ndarray:
+        return np.exp(sign * self._sigma(factor) * self._times)[:, None]
 
     def along(self) -> np.ndarray:
         """Return the derivative of the orbit by time at the unknowns, shape (n components,)."""
         return self.slope[0].ravel()
 
-    def matrix(self, turn: complex) -> np.ndarray:
+    def matrix(self, factor: complex) -> np.ndarray:
         """Return the matrix of the unknowns.
 
         Args:
-            turn: factor over a period.
+            factor: over a period.
 
         """
         n, d = self.at[0].shape
-        sigma, nodes = self._sigma(turn), np.arange(n)
+        sigma, nodes = self._sigma(factor), np.arange(n)
         matrix = np.zeros((n, d, n, d), dtype=complex)
         derive = collocation.derivative_matrix(n) / self._orbit.period + sigma * np.eye(n)
         for k in range(d):
@@ -407,34 +392,34 @@ class Variational:
             :, :, None, :]
         return matrix.reshape(n * d, n * d)
 
-    def right(self, rates: np.ndarray, turn: complex) -> np.ndarray:
+    def right(self, rates: np.ndarray, factor: complex) -> np.ndarray:
         """Return the right-hand side for sources at the nodes, shape (n components,)."""
-        return (rates * self._wave(turn, -1.0)).ravel()
+        return (rates * self._wave(factor, -1.0)).ravel()
 
-    def values(self, unknowns: np.ndarray, rates: np.ndarray, turn: complex) -> States:
+    def values(self, unknowns: np.ndarray, rates: np.ndarray, factor: complex) -> States:
         """Return a solution at the nodes, now and a delay ago.
 
         Args:
             unknowns: shape (n components,).
             rates: the sources, which are in the unknowns already.
-            turn: factor over a period.
+            factor: over a period.
 
         """
-        periodic, sigma = unknowns.reshape(self._n, -1), self._sigma(turn)
-        return (periodic * self._wave(turn, 1.0),
+        periodic, sigma = unknowns.reshape(self._n, -1), self._sigma(factor)
+        return (periodic * self._wave(factor, 1.0),
                 self._shift @ periodic * np.exp(sigma * (self._times - self.delay))[:, None])
 
-    def derivative(self, values: States, turn: complex) -> States:
+    def derivative(self, values: States, factor: complex) -> States:
         """Return the derivative by time of a disturbance, now and a delay ago."""
-        sigma = self._sigma(turn)
+        sigma = self._sigma(factor)
         derive = collocation.derivative_matrix(self._n) / self._orbit.period
         waves = np.exp(sigma * self._times)[:, None]
-        now, past = (waves * (derive @ (some / waves)) + sigma * some
-                     for some in values if some is not None)
+        now, past = (waves * (derive @ (state / waves)) + sigma * state
+                     for state in values if state is not None)
         return now, past
 
     def delayed(self, values: States) -> np.ndarray:
-        """Return the contribution of the delayed part of a disturbance to the rates."""
+        """Return the contribution of the state a delay ago to the rates."""
         assert values[1] is not None
         sources: np.ndarray = np.einsum('tij,tj->ti', self._past, values[1])
         return sources

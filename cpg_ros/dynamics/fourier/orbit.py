@@ -14,10 +14,10 @@
 
 """Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
 
-On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
-all cells collapse to a periodic problem for one cell of each: with theta = t / T in cycles,
+On a gait every cell has one of a few waveforms, shifted by a known phase, so the delay equations
+reduce to a periodic problem for one cell of each: with theta = t / T in cycles,
 ``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for the inputs of a cell,
-solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
+solved at even nodes with the period as unknown. Cell 1 peaks at phase zero.
 """
 
 from collections.abc import Sequence
@@ -81,7 +81,7 @@ def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
 
 
 def tail(values: np.ndarray) -> float:
-    """Largest of the last six harmonics over the largest of all: how well it is resolved."""
+    """Largest of the last six harmonics over the largest of all, a measure of the resolution."""
     size = np.abs(np.fft.rfft(values))
     return float(size[-6:].max() / (size.max() or 1.0))
 
@@ -90,8 +90,6 @@ def resample(values: np.ndarray, n: int) -> np.ndarray:
     """Nodal values on n nodes, more than there are, of the same interpolant."""
     return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)
 
-
-# Orbits as trigonometric polynomials: the gaits of networks with a delay.
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FourierOrbit(Orbit):
@@ -158,13 +156,14 @@ class FourierOrbit(Orbit):
 
 NODES = 63
 MOST_NODES = 1023
-#: TOLERANCE: residual at which Newton's method stops; STEPS: most steps of it.
+#: Residual at which Newton's method ends, its steps, and size of the last harmonics at which a
+#: waveform is resolved.
 TOLERANCE, STEPS = 1e-12, 12
 #: RESOLVED: relative size of the last harmonics at which a waveform is resolved.
 RESOLVED = 1e-12
 #: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
 Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
-#: SMALLEST: range of a waveform below which Newton's method has fallen to the rest state.
+#: Range below which Newton's method has reached the equilibrium.
 SMALLEST = 1e-7
 
 
@@ -175,12 +174,12 @@ def _inputs(network: type[Network], symmetry: Symmetry
     inputs = []
     for argument in equations_of(network).arguments:
         source = range(network.cells) if argument.source is None else argument.source
-        places = []
+        sources = []
         for cell in symmetry.first:
             other = source[cell]
-            places.append((int(symmetry.waves[other]) * network.variables + argument.variable,
-                           float(symmetry.phases[other] - symmetry.phases[cell])))
-        inputs.append((argument.delayed, places))
+            sources.append((int(symmetry.waves[other]) * network.variables + argument.variable,
+                            float(symmetry.phases[other] - symmetry.phases[cell])))
+        inputs.append((argument.delayed, sources))
     return inputs
 
 
@@ -210,11 +209,11 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     waves, derive = rows // variables, derivative_matrix(n)
     rise, inputs = u @ derive.T, _inputs(type(network), symmetry)
     states, slopes, matrices = [], [], []
-    for delayed, places in inputs:
+    for delayed, sources in inputs:
         late = tau / period if delayed else 0.0
         matrices.append([None if shift == late == 0.0 else
-                         shift_matrix(n, shift - late) for _, shift in places])
-        moved = list(zip(places, matrices[-1], strict=True))
+                         shift_matrix(n, shift - late) for _, shift in sources])
+        moved = list(zip(sources, matrices[-1], strict=True))
         states.append(np.array([u[row] if matrix is None else matrix @ u[row]
                                 for (row, _), matrix in moved]))
         slopes.append([matrix @ rise[row] if delayed and matrix is not None else None
@@ -238,8 +237,8 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     nodes, flat = np.arange(n), np.zeros((waves, n))
     for (v, k), slope in by_argument.items():
         slope = slope + flat
-        delayed, places = inputs[k]
-        for wave, (source, _) in enumerate(places):
+        delayed, sources = inputs[k]
+        for wave, (source, _) in enumerate(sources):
             row, matrix = wave * variables + v, matrices[k][wave]
             if matrix is None:
                 blocks[row, nodes, source, nodes] -= slope[wave]
@@ -277,7 +276,7 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
     """Complete a solution by its derivatives; the last three are those of the equations."""
     derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
-    # One cell of each wave has seen only those of its family's weights that end on it.
+    # The equations of one cell contain only the weights of its own inputs.
     for family in network.families(symmetry):
         if len(family) > 1:
             members = [names.index(name) for name in family]
@@ -296,7 +295,7 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
         symmetry: of the gait.
         u: guess at the waveforms on the nodes, shape (rows, n).
         period: in model time.
-        periods: periods of orbits to be kept off, model time.
+        periods: of orbits to keep away from, model time.
 
     Raises:
         NoOrbit: they would need more nodes than there may be.
@@ -317,9 +316,8 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             if periods:
                 step = step * deflation_factor(period, -float(step[-1]), periods)
             u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
-            # A period that leaves the range of the delay has run away, and so has a waveform.
-            if not (1e-3 * network.delay < period < 1e3 * network.delay
-                    and np.abs(u).max() < 1e3):
+            # The period or a waveform has diverged.
+            if not (1e-3 * network.delay < period < 1e3 * network.delay and np.abs(u).max() < 1e3):
                 return None
         else:
             return None

@@ -34,17 +34,12 @@ from cpg_ros.dynamics.fourier.orbit import (
     rows_of,
 )
 from cpg_ros.dynamics.hopf import first_hopf
-from cpg_ros.dynamics.orbit import check_values
+from cpg_ros.dynamics.orbit import check_values, Path
 from cpg_ros.dynamics.settling import find_orbit
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-
-# The orbits of a gait along a line of parameters as waveforms, a curve for continuation.
-
-#: States, shape (m, components), as a function of times in cycles, shape (m,).
-States = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,9 +63,9 @@ class FourierCurve(ShortRepr):
         """Return the waveforms, a row for each variable of each wave, shape (rows, n)."""
         return z[:-2].reshape((int(self.symmetry.waves.max()) + 1) * self.network.variables, -1)
 
-    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+    def product(self, first: np.ndarray, second: np.ndarray) -> float:
         """Mean over the cycle and the rows plus period plus value."""
-        return float(self._weights(one.size) * one @ other)
+        return float(self._weights(first.size) * first @ second)
 
     def _weights(self, size: int) -> np.ndarray:
         weights = np.full(size, 1.0 / (size - 2))
@@ -80,8 +75,7 @@ class FourierCurve(ShortRepr):
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newton's increment normal to the border, and the tangent."""
         network = self.along.at(self.network, z[-1])
-        residual, jacobian, point = equations(network, self.symmetry, self._rows(z),
-                                              float(z[-2]))
+        residual, jacobian, point = equations(network, self.symmetry, self._rows(z), float(z[-2]))
         matrix = np.zeros((z.size, z.size))
         matrix[:-1, :-1] = jacobian
         slopes = by_parameter(network, self.symmetry, point)
@@ -112,8 +106,8 @@ class FourierCurve(ShortRepr):
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
         nodes = 2 * n + 1 if more else n
         theta = start + np.arange(nodes) / nodes
-        moved = [np.concatenate([*(collocation.evaluate(row, theta) for row in self._rows(part)),
-                                 part[-2:]]) for part in (z, border)]
+        moved = [np.concatenate([*(collocation.evaluate(row, theta) for row in self._rows(vector)),
+                                 vector[-2:]]) for vector in (z, border)]
         return self, moved[0], moved[1]
 
     def orbit(self, z: np.ndarray) -> FourierOrbit:
@@ -125,24 +119,24 @@ class FourierCurve(ShortRepr):
 
 def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]
             ) -> tuple[FourierCurve, np.ndarray]:
-    """Return the curve of the orbits along a line, and the place of one of them on it."""
+    """Return the curve of the orbits along a line, and the unknowns of one of them."""
     return (FourierCurve(orbit.network, orbit.symmetry, line, scales),
             np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
 
 
 def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
-           scales: tuple[float, float], path: States, disturbance: States, period: float
+           scales: tuple[float, float], path: Path, disturbance: Path, period: float
            ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
-    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
+    """Return the curve of the orbits that branch off, the old solution on it and the tangent.
 
     Args:
-        network: at the place.
-        symmetry: of the orbits.
+        network: at the bifurcation.
+        symmetry: of the new orbits.
         line: of parameters.
         scales: as of the curve.
-        path: states of what they leave, shape (m, components), over times in cycles.
-        disturbance: the direction in which, the same.
-        period: of the orbits, model time.
+        path: the old solution.
+        disturbance: the critical disturbance of it.
+        period: of the new orbits, model time.
 
     """
     theta = np.arange(NODES) / NODES
@@ -151,7 +145,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
             np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))
 
 
-#: POINTS: points of a cycle on which describing functions are computed.
+#: Points of a cycle at which describing functions are computed.
 POINTS = 32
 THETA = np.arange(NODES) / NODES
 
@@ -167,12 +161,12 @@ Describing = Callable[[float], tuple[complex, complex]]
 def _describing(network: Network, symmetry: Symmetry) -> Describing:
     """Return A and B of ``lambda = A + B exp(-lambda tau)`` as functions of an amplitude.
 
-    Each cell's rate by its first harmonic where all cells are amplitude * cos, with their
-    phases: at this amplitude the network is, to first harmonic, a linear one.
+    They are the first harmonic of a cell's rate where all cells are amplitude * cos, with their
+    phases: to first harmonic, the network is linear at this amplitude.
     """
     kind, cosine = equations_of(type(network)), np.cos(np.arange(POINTS) * (2.0 * np.pi / POINTS))
     p = [value[0] if value.ndim else value for value in values_of(network)]
-    # One row for each argument, in which all others are at rest.
+    # One row for each argument, in which all others are 0.
     rows = np.eye(len(kind.arguments))[..., None] * cosine
     first = [0 if argument.source is None else argument.source[0] for argument in kind.arguments]
     turns = np.exp(2j * np.pi * (symmetry.phases[first] - symmetry.phases[0]))
@@ -206,7 +200,7 @@ def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, f
     low = max(low, 1e-6)
     if excess(low) >= 0.0:
         return None
-    # Bisection suffices for a guess, and spares a generator's start the loading of an optimizer.
+    # Bisection suffices for a guess, and the generator need not load scipy's optimizers.
     while high - low > 1e-3 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if excess(middle) < 0.0 else (low, middle)
@@ -261,7 +255,7 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
     """Solve for the orbit next to a known one of the same symmetry, by Newton's method alone.
 
     Raises:
-        NoOrbit: the method leads elsewhere; a shorter way may do.
+        NoOrbit: the method leads elsewhere; a shorter step may succeed.
 
     """
     orbit = _accepted(newton(network, near.symmetry, *predicted(network, near)))
@@ -270,9 +264,9 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
     return orbit
 
 
-def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float, periods: Sequence[float] = ()) -> FourierOrbit | None:
-    """Solve for an orbit from a guess, states over times in cycles; None where none is found."""
+def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
+              periods: Sequence[float] = ()) -> FourierOrbit | None:
+    """Solve for an orbit from a guess, as solve_orbit.solve_from_path."""
     try:
         u = rows_of(network, symmetry, path(THETA))
         return _accepted(newton(network, symmetry, u, period, periods))
@@ -291,7 +285,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
     Args:
         network: parameters.
         gait: one of the network's.
-        near: an orbit of that gait to start from; where it leads nowhere it does not matter.
+        near: an orbit of that gait to start from; if it fails, it is ignored.
 
     Raises:
         InputError: an unknown gait, or parameters that are not finite or a delay not positive.

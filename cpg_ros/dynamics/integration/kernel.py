@@ -80,7 +80,7 @@ class Samples(NamedTuple):
     """Buffers for the recorded steps.
 
     Attributes:
-        every: keep every so many steps only.
+        every: number of steps from one recorded step to the next.
         states: at the steps kept, shape (lanes, rows, components).
         slopes: there, the same shape.
 

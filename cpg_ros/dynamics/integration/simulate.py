@@ -146,7 +146,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
         lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
         noise: standard deviation of white noise per square root of model time.
         seed: seeds the noise of the whole batch.
-        every: keep every so many steps only; t_end is rounded up to such a multiple.
+        every: number of steps from one recorded step to the next; t_end is rounded up to these.
         progress: show a progress bar on work of more than about two seconds.
 
     Raises:

@@ -28,9 +28,7 @@ from cpg_ros.networks import equations as generated
 import numpy as np
 from numpy.polynomial import legendre, polynomial
 
-# Gauss collocation on a mesh: polynomials of degree S on each interval, exact at its S nodes.
-
-#: S: number of nodes of an interval.
+#: Nodes of an interval.
 S = 8
 #: FLOOR: least density of a mesh, over the mean.
 FLOOR = 0.2
@@ -88,8 +86,8 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
         n: intervals of the new mesh.
 
     """
-    # A floor, and neighbours smoothed: no interval may be far longer than the next one. The floor
-    # is a share of the mean, so that a long rest before a short jump takes few of the intervals.
+    # No interval may be far longer than its neighbours. The floor is a fraction of the mean, so
+    # that a long rest before a short jump takes few intervals.
     density = np.maximum(density, FLOOR * (density * np.diff(mesh)).sum())
     for _ in range(2):
         padded = np.concatenate([density[-1:], density, density[:1]])
@@ -100,17 +98,17 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
     return new
 
 
-# Meshes whose ends lie where the rates have a kink, so that collocation keeps its order.
+# Meshes with ends at the kinks of the rates, which keep the order of the collocation.
 
-#: PLACES: places of an interval between which sign changes are searched for.
+#: Positions in an interval between which changes of sign are searched.
 PLACES = np.linspace(0.0, 1.0, 9)
-#: ON: distance of an interval's end from a kink, over the mesh, up to which it lies on the kink.
+#: Distance between a kink and an end on it.
 ON = 1e-13
-#: NEAR: an end is moved to a kink within this share of the shorter interval beside it.
+#: Distance below which an end moves onto a kink, over the shorter interval beside it.
 NEAR = 0.4
 
 
-def places_of(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+def sign_changes(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
     """Return the places, 0 to 1, at which variables change sign, rising.
 
     Args:
@@ -127,9 +125,9 @@ def places_of(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         middle = 0.5 * (low + high)
         above = (polynomial.polyval(middle, terms, tensor=False) > 0.0) == rising
         low, high = np.where(above, low, middle), np.where(above, middle, high)
-    places = np.sort(mesh[interval] + 0.5 * (low + high) * np.diff(mesh)[interval])
+    positions = np.sort(mesh[interval] + 0.5 * (low + high) * np.diff(mesh)[interval])
     # Cells that are in phase, and ends that a kink lies on, are met twice.
-    return places[np.diff(places, prepend=-1.0) > 1e-9]
+    return positions[np.diff(positions, prepend=-1.0) > 1e-9]
 
 
 def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
@@ -145,7 +143,7 @@ def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
         return None
     fixed = [0.0, 1.0, *(kink for kink in kinks if ON < kink < 1.0 - ON)]
     free = [end for k, end in enumerate(mesh[1:-1], 1) if not any(
-        abs(end - place) < NEAR * min(end - mesh[k - 1], mesh[k + 1] - end) for place in fixed)]
+        abs(end - kink) < NEAR * min(end - mesh[k - 1], mesh[k + 1] - end) for kink in fixed)]
     return np.array(sorted({*fixed, *free}))
 
 

@@ -15,16 +15,14 @@
 """Variational equation of gaits without delay: adjoint, Floquet multipliers, forced solutions.
 
 A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow keeps Fix(K) and its
-orthogonal complement apart, so the multipliers split: those within the class, 1 among them, and
-those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement and nothing else:
-it multiplies the transverse multipliers by exp(-g T) exactly.
+orthogonal complement apart, so the multipliers split into those within the class, 1 among them,
+and those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement and nothing
+else: it multiplies the transverse multipliers by exp(-g T) exactly.
 
-The multiplier 1 belongs to the direction of the flow, which is known. The others of the class are
-those of what is left across it, so that none of them is mixed up with it at a fold, where it is
-double.
+The multiplier 1 belongs to the direction of the flow. The others of the class are computed across
+it, so that they stay separate at a fold, where 1 is double.
 """
 
-from collections.abc import Callable
 from functools import lru_cache
 from itertools import pairwise
 
@@ -37,14 +35,11 @@ from cpg_ros.dynamics.mesh.solve import kinks
 from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
 from cpg_ros.networks.equations import Field, States
 import numpy as np
-from numpy.polynomial import polynomial
 import scipy
 
-# The adjoint of the variational equation along a gait of a network without delay.
-
-#: RESOLVED: relative size of the last terms of an interval's polynomials at which it is resolved.
+#: Relative size of the last terms of its polynomials at which an interval is resolved.
 RESOLVED = 1e-9
-#: SINGULAR: singular value below which a disturbance other than along the orbit is neutral, too.
+#: Singular value below which a disturbance other than along the orbit does not decay.
 SINGULAR = 1e-9
 
 
@@ -73,13 +68,13 @@ def adjoint(orbit: MeshOrbit) -> Waveforms:
 
 
 def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the adjoint's polynomials, (S + 1, n, d), and which intervals do not resolve it."""
+    """Return the adjoint's polynomials, (S + 1, n, d), and which intervals are too long."""
     reduced, length = Reduced(orbit.network, orbit.symmetry), orbit.solution.length
     lengths = length * np.diff(mesh)
-    places = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
-    states = path_of(reduced, orbit.solution)(places.ravel()).reshape(*places.shape, -1)
+    positions = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
+    states = path_of(reduced, orbit.solution)(positions.ravel()).reshape(*positions.shape, -1)
     jacobians = reduced.linearised(states)[1]
-    # Backwards: the last interval first, and in each the last node.
+    # Backwards in time.
     back = np.ascontiguousarray(jacobians[::-1, ::-1].swapaxes(2, 3))
     try:
         answers = transfer(back, lengths[::-1], np.zeros((*back.shape[:3], 0)))
@@ -99,18 +94,18 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
     slopes = -np.einsum('nsij,nsjk,nk->nsi', back, answers, points[:-1])[::-1, ::-1]
     coefficients = collocation.power_coefficients(points[::-1][:-1], slopes, lengths)
     ends = collocation.last_share(slopes) * lengths / np.abs(points).max()
-    # One class stands for all of its cells, which share what it does.
+    # The cells of a class share its response.
     alike = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
     return coefficients / alike, ends > RESOLVED
 
 
-# Eigenvalues of a product of many matrices, each to its own size.
+# Eigenvalues of a product of many matrices, each relative to its own size.
 
-#: SAME: difference up to which two subspaces are one.
+#: Distance below which two subspaces are the same.
 SAME = 1e-13
-#: ALIKE: largest ratio of the sizes of a block's eigenvalues, which bounds their rounding errors.
+#: Largest ratio of the sizes of the eigenvalues of a block.
 ALIKE = 1e4
-#: ROUNDS: most iterations of all factors on the columns.
+#: Iterations at most.
 ROUNDS = 40
 
 
@@ -121,11 +116,11 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
         factors: F_1, F_2 ..., shape (n, d, d).
 
     Returns:
-        Complex numbers, shape (d,); not a number where they leave the range of numbers.
+        Complex numbers, shape (d,); nan where they overflow.
 
     """
     factors, d = np.ascontiguousarray(factors), factors.shape[-1]
-    # Random columns lie in no invariant subspace.
+    # Generic columns, which lie in no invariant subspace.
     columns = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0])
     work = np.empty((3, d, d))
     for _ in range(ROUNDS):
@@ -135,59 +130,57 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
         if not np.isfinite(back).all():
             return np.full(d, np.nan, dtype=complex)
         cuts = [0, *(k for k in range(1, d) if np.abs(back[k:, :k]).max() <= SAME), d]
-        parts = [slice(*ends) for ends in pairwise(cuts)]
-        sizes = [np.abs(np.diag(whole)[part]) for part in parts]
+        blocks = [slice(*ends) for ends in pairwise(cuts)]
+        sizes = [np.abs(np.diag(whole)[block]) for block in blocks]
         if all(size.max() <= ALIKE * size.min() for size in sizes):
             break
     return np.concatenate([
-        np.linalg.eigvals(back[part, part] @ whole[part, part]).astype(complex)
-        for part in parts])
+        np.linalg.eigvals(back[block, block] @ whole[block, block]).astype(complex)
+        for block in blocks])
 
 
-def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class, without the trivial one, and that one."""
+def within(orbit: MeshOrbit, accuracy: object = None) -> tuple[np.ndarray, complex]:
+    """Return the multipliers within the gait's class but the trivial one, and that."""
     roots, _, trivial = multipliers(orbit)
     return roots, complex(trivial)
 
 
-def transverse(orbit: MeshOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
+def transverse(orbit: MeshOrbit, gain: float = 0.0, accuracy: object = None
+               ) -> tuple[np.ndarray, ...]:
     """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
     return tuple(part * np.exp(-gain * orbit.period) for part in multipliers(orbit)[1])
 
 
 def largest_transverse(orbit: MeshOrbit, gain: float = 0.0, exact: float = 0.0) -> float:
-    """Return the largest modulus of the transverse multipliers, 0 if there is none."""
+    """Return the modulus of the largest of them, 0 if there is none."""
     return max((float(np.abs(part).max()) for part in transverse(orbit, gain)), default=0.0)
 
 
 @lru_cache(maxsize=4)
 def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], float]:
-    """Return the multipliers within the class, transverse to it, and the trivial one, no lock.
-
-    They come from the variational equation, by the orbit's own collocation.
-    """
+    """Return the multipliers within the class, transverse to it, and the trivial one, no lock."""
     m, (inside, outside) = orbit.symmetry.order, split(orbit.symmetry)
     linear = Flow(orbit)
     steps, change = linear.on(inside)
     network = Reduced(orbit.network, orbit.symmetry)
     points = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
-    rates = network.rates(points)[:, network.place] @ inside
+    rates = network.rates(points)[:, network.columns] @ inside
     sizes = np.linalg.norm(rates, axis=1)
     along = rates / sizes[:, None]
-    # The factors along the flow: their product is 1 but for errors of collocation.
+    # Growth along the flow: 1 up to the error of the collocation.
     kept = np.einsum('ni,nij,nj->n', along[1:], steps, along[:-1]) * sizes[:-1] / sizes[1:]
     across = _across(along)
     inner = across[1:].transpose(0, 2, 1) @ steps @ across[:-1]
     back = across[0].T @ change.T @ across[-1]
     # After T/m the cells have changed places; m of these make a period.
     roots = eigenvalues(np.concatenate([inner, back[None]] * m))
-    others = []
+    transverse = []
     for columns in outside:
         steps, change = linear.on(columns)
         # After m changes a cell is another one of its class.
         again = np.linalg.matrix_power(change, m)
-        others.append(eigenvalues(np.concatenate([*[steps, change.T[None]] * m, again[None]])))
-    return roots, tuple(others), float(np.prod(kept)**m)
+        transverse.append(eigenvalues(np.concatenate([*[steps, change.T[None]] * m, again[None]])))
+    return roots, tuple(transverse), float(np.prod(kept)**m)
 
 
 class Flow:
@@ -196,7 +189,7 @@ class Flow:
     def __init__(self, orbit: MeshOrbit) -> None:
         """Linearise about an orbit."""
         symmetry, network = orbit.symmetry, orbit.network
-        index = Reduced(network, symmetry).place
+        index = Reduced(network, symmetry).columns
         self._jacobians = network.jacobian(orbit.stages[..., index])
         #: Lengths of the intervals, model time.
         self.lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
@@ -204,7 +197,7 @@ class Flow:
                       + np.arange(network.variables)[:, None] * network.cells).ravel()
 
     def on(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the flow over each interval, and how cells change places after T/m.
+        """Return the flow over each interval, and the permutation of cells after T/m.
 
         Args:
             columns: orthonormal, of a subspace that the flow keeps, shape (components, d).
@@ -231,13 +224,13 @@ def _across(along: np.ndarray) -> np.ndarray:
     return (np.eye(along.shape[1]) - 2.0 * mirror[:, :, None] * mirror[:, None, :])[:, :, 1:]
 
 
-def mode(orbit: MeshOrbit, part: int, multiplier: complex
-         ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the disturbance with a multiplier as a function of time, of size 1 at most.
+def returning(orbit: MeshOrbit, part: int, multiplier: complex
+              ) -> tuple[np.ndarray, complex, np.ndarray]:
+    """Return the disturbance with a multiplier, and its factor over T/m.
 
-    On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells after T/m. So the
-    disturbances w that return as a multiple nu of themselves are those of the map over T/m in the
-    frame that changes places with the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
+    On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells. So disturbances w that
+    grow by a factor nu are eigenvectors of the map over T/m in the frame that changes places with
+    the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
 
     Args:
         orbit: of a network without delay.
@@ -245,47 +238,8 @@ def mode(orbit: MeshOrbit, part: int, multiplier: complex
         multiplier: about that of the disturbance over a period, not the trivial one.
 
     Returns:
-        States, shape (points, components), as a function of times in cycles, shape (points,).
-
-    """
-    columns, nu, left = returning(orbit, part, multiplier)
-    flow, m = Flow(orbit), orbit.symmetry.order
-    jacobians, answers = flow.solved(columns)
-    change = flow.on(columns)[1]
-    inner = np.einsum('nsij,nj->nsi', answers, left[:-1])
-    slopes = np.einsum('nsij,nsj->nsi', jacobians, inner)
-    coefficients = collocation.power_coefficients(left[:-1], slopes, flow.lengths)
-    size = float(np.abs(left).max())
-
-    def path(theta: np.ndarray) -> np.ndarray:
-        places = np.asarray(theta, dtype=float) * m
-        turns = np.floor(places).astype(int)
-        places = places - turns
-        k = np.clip(np.searchsorted(orbit.mesh, places, side='right') - 1, 0,
-                    orbit.mesh.size - 2)
-        xi = (places - orbit.mesh[k]) / np.diff(orbit.mesh)[k]
-        values = polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
-        out = (nu**turns[:, None] * values).real
-        for turn in np.unique(turns):
-            there = turns == turn
-            out[there] = out[there] @ np.linalg.matrix_power(change, int(turn)).T
-        return out @ columns.T / size
-
-    return path
-
-
-def returning(orbit: MeshOrbit, part: int, multiplier: complex
-              ) -> tuple[np.ndarray, complex, np.ndarray]:
-    """Return the disturbance with a multiplier, and what it is multiplied by over T/m.
-
-    Args:
-        orbit: as of mode.
-        part: as of mode.
-        multiplier: as of mode.
-
-    Returns:
-        Orthonormal columns of the subspace, shape (components, d); nu; and w of mode at the
-        mesh points in these columns, shape (n + 1, d).
+        Orthonormal columns of the subspace, shape (components, d); nu; and w at the mesh points in
+        these columns, shape (n + 1, d).
 
     """
     inside, outside = split(orbit.symmetry)
@@ -306,8 +260,6 @@ def returning(orbit: MeshOrbit, part: int, multiplier: complex
         w.append(step @ w[-1])
     return columns, complex(nu), np.array(w)
 
-
-# The variational equation along a gait of a network without delay, with sources, as a matrix.
 
 class Variational:
     """The variational equation of an orbit in all components, on its mesh or a finer one.
@@ -334,9 +286,9 @@ class Variational:
             mesh = np.sort(np.concatenate([mesh, 0.5 * (mesh[:-1] + mesh[1:])]))
         self._orbit, self._mesh, self._reduced = orbit, mesh, reduced
         self._lengths = np.diff(mesh) * orbit.solution.length
-        places = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
-        states = path_of(reduced, orbit.solution)(places.ravel()).reshape(*places.shape, -1)
-        self.at: States = states[..., reduced.place], None
+        positions = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
+        states = path_of(reduced, orbit.solution)(positions.ravel()).reshape(*positions.shape, -1)
+        self.at: States = states[..., reduced.columns], None
         field: Field = Field(orbit.network)
         rates, self._jacobians, _ = field.linearised(self.at[0])
         self.slope: States = rates, None
@@ -361,10 +313,10 @@ class Variational:
         return 'the rates have kinks' if met else ''
 
     def critical(self, part: int, multiplier: complex) -> tuple[complex, np.ndarray]:
-        """Return the factor over T/m of the disturbance with a multiplier, and about that.
+        """Return the factor over T/m of the disturbance with a multiplier, and a guess at it.
 
         Args:
-            part: number of its subspace, as in floquet.mode.
+            part: number of its subspace, as in returning.
             multiplier: about that over a period.
 
         Returns:
@@ -380,13 +332,13 @@ class Variational:
     def along(self) -> np.ndarray:
         """Return the derivative of the orbit by time at the unknowns, shape (n components,)."""
         points = path_of(self._reduced, self._orbit.solution)(self._mesh[:-1])
-        return self._reduced.rates(points)[:, self._reduced.place].ravel()
+        return self._reduced.rates(points)[:, self._reduced.columns].ravel()
 
-    def matrix(self, turn: complex) -> 'scipy.sparse.csc_array':
+    def matrix(self, factor: complex) -> 'scipy.sparse.csc_array':
         """Return the matrix of the unknowns.
 
         Args:
-            turn: factor over T/m.
+            factor: over T/m.
 
         """
         n, _, d = self._shape
@@ -394,13 +346,13 @@ class Variational:
         rows: list[list] = [[None] * n for _ in range(n)]
         for k in range(n):
             rows[k][k] = scipy.sparse.csr_array(-self._steps[k])
-            # With a single interval both fall together.
-            ahead = ones if k < n - 1 else turn * ones[self._turn]
+            # With a single interval both are the same block.
+            ahead = ones if k < n - 1 else factor * ones[self._turn]
             before = rows[k][(k + 1) % n]
             rows[k][(k + 1) % n] = ahead if before is None else before + ahead
         return scipy.sparse.block_array(rows, format='csc', dtype=complex)
 
-    def right(self, rates: np.ndarray, turn: complex) -> np.ndarray:
+    def right(self, rates: np.ndarray, factor: complex) -> np.ndarray:
         """Return the right-hand side for sources at the nodes, shape (n components,)."""
         inner = self._inner(rates)
         summed = np.einsum('isjk,isk->isj', self._jacobians, inner) + rates
@@ -411,22 +363,22 @@ class Variational:
         given = self._lengths[:, None, None] * np.einsum('pq,iqd->ipd', collocation.A, rates)
         return (self._inverse @ given.reshape(n, s * d, 1)).reshape(n, s, d)
 
-    def values(self, unknowns: np.ndarray, rates: np.ndarray, turn: complex) -> States:
+    def values(self, unknowns: np.ndarray, rates: np.ndarray, factor: complex) -> States:
         """Return a solution at the nodes, now and a delay ago.
 
         Args:
             unknowns: shape (n components,).
             rates: the sources.
-            turn: factor over T/m.
+            factor: over T/m.
 
         """
         left = unknowns.reshape(self._shape[0], -1)
         return np.einsum('isjk,ik->isj', self._answers, left) + self._inner(rates), None
 
-    def derivative(self, values: States, turn: complex) -> States:
+    def derivative(self, values: States, factor: complex) -> States:
         """Return the derivative by time of a disturbance, by the variational equation."""
         return np.einsum('isjk,isk->isj', self._jacobians, values[0]), None
 
     def delayed(self, values: States) -> np.ndarray:
-        """Return the contribution of the delayed part to the rates: nothing."""
+        """Return the contribution of the state a delay ago to the rates: 0."""
         return np.zeros_like(values[0])

@@ -90,8 +90,7 @@ def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
     rise = h[:, None] * (collocation.WEIGHTS @ slopes)
     sources = [by_length[..., None],
                (now.points[:-1, None] + now.length * by_length - now.stages)[..., None]]
-    ends = [rise[..., None],
-            (now.points[:-1] + now.length * rise - now.points[1:])[..., None]]
+    ends = [rise[..., None], (now.points[:-1] + now.length * rise - now.points[1:])[..., None]]
     if extra is not None:
         n, s = extra.shape[:2]
         flat = extra.reshape(n, s, -1)
@@ -157,9 +156,8 @@ def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bo
     return False
 
 
-def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
-            ) -> Solution:
-    """Return a guess at the points of a mesh from a path over the places 0 to 1."""
+def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float) -> Solution:
+    """Take a guess at the points of a mesh from a path over the places 0 to 1."""
     inner = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
     return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 
@@ -174,9 +172,9 @@ def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarra
     """Return the solution as a function of places from 0 to 1."""
     coefficients = coefficients_of(reduced, now)
 
-    def path(places: np.ndarray) -> np.ndarray:
-        k = np.clip(np.searchsorted(now.mesh, places, side='right') - 1, 0, now.mesh.size - 2)
-        xi = (places - now.mesh[k]) / np.diff(now.mesh)[k]
+    def path(positions: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(now.mesh, positions, side='right') - 1, 0, now.mesh.size - 2)
+        xi = (positions - now.mesh[k]) / np.diff(now.mesh)[k]
         return polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
     return path
 
@@ -208,9 +206,9 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
 def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
                intervals: int = FEW) -> np.ndarray:
     """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
-    places = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
-    bend = np.abs(np.diff(reduced.rates(path(places)), axis=0)).max(axis=1)
-    return collocation.spread(places, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), intervals)
+    positions = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
+    bend = np.abs(np.diff(reduced.rates(path(positions)), axis=0)).max(axis=1)
+    return collocation.spread(positions, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), intervals)
 
 
 def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray]:
@@ -342,12 +340,12 @@ def evaluate(symmetry: Symmetry, mesh: np.ndarray, coefficients: np.ndarray, the
 
     """
     theta = np.asarray(theta, dtype=float) - symmetry.phases[symmetry.first[wave]]
-    places = (theta - np.floor(theta)) * symmetry.order
-    part = np.minimum(places.astype(int), symmetry.order - 1)
-    places = places - part
-    interval = np.clip(np.searchsorted(mesh, places, side='right') - 1, 0, mesh.size - 2)
+    positions = (theta - np.floor(theta)) * symmetry.order
+    part = np.minimum(positions.astype(int), symmetry.order - 1)
+    positions = positions - part
+    interval = np.clip(np.searchsorted(mesh, positions, side='right') - 1, 0, mesh.size - 2)
     length = np.diff(mesh)[interval]
-    xi = (places - mesh[interval]) / length
+    xi = (positions - mesh[interval]) / length
     column = np.array(_columns(symmetry, wave, variable))[part]
     terms = coefficients
     for _ in range(order):

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Finding the orbit of a gait of a network without delay, and curves of such orbits.
+"""Solving for the orbit of a gait of a network without delay, from the nearest known orbit.
 
-From the given start Newton's method is tried at once; failing that, the network is left to find
-its gait by itself, held in its symmetry, from there and from many other states; failing that, the
-orbit is followed from the known parameters to the wanted ones, which also tells how far it exists.
-Where no orbit is known, those that are unstable within their class are followed from Hopf points.
+Newton's method starts at the given orbit. If it fails, simulations locked to the gait's symmetry
+start there and at many other states. If they fail, the orbit is continued from the known
+parameters to the given ones, which also shows how far it exists. Without a known orbit, those that
+are unstable within their class are continued from Hopf points.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,7 +29,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.collocation import aligned, places_of
+from cpg_ros.dynamics.mesh.collocation import aligned, sign_changes
 from cpg_ros.dynamics.mesh.orbit import (
     bordered,
     coefficients_of,
@@ -46,42 +46,30 @@ from cpg_ros.dynamics.mesh.orbit import (
     sampled,
     Solution,
 )
-from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit
+from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit, Path
 from cpg_ros.dynamics.settling import find_orbit, settle
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import polynomial
 
-# Solving for orbits on meshes that are made finer until they resolve them.
-
-#: MORE: factor of the intervals of a first mesh if Newton's method fails with fewer, as for
-#: waveforms of several spikes.
+#: Factor of the number of intervals of a second first mesh, for waveforms with several spikes.
 MORE = 4
-#: ALIGNED: most iterations that put ends of intervals on kinks.
+#: Iterations in which ends of intervals move onto kinks.
 ALIGNED = 8
-#: SMALLEST: range below which the orbit has fallen to an equilibrium.
+#: Range below which the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
-#: BETWEEN: places of an interval, 0 to 1, at which the residual of the equations is evaluated.
+#: Positions in an interval, 0 to 1, at which the residual is computed.
 BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
-def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float, periods: Sequence[float] = ()) -> MeshOrbit | None:
-    """Solve for an orbit from a guess; None where Newton's method leads to none.
-
-    Args:
-        network: parameters.
-        symmetry: of the gait.
-        path: states, shape (m, components), as a function of times in cycles, shape (m,).
-        period: in model time.
-        periods: periods of orbits that Newton's method is to be kept off, model time.
-
-    """
+def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
+              periods: Sequence[float] = ()) -> MeshOrbit | None:
+    """Solve for an orbit from a guess, as solve_orbit.solve_from_path."""
     reduced = Reduced(network, symmetry)
 
-    def guess(places: np.ndarray) -> np.ndarray:
-        return path(places / symmetry.order)[:, reduced.kept]
+    def guess(positions: np.ndarray) -> np.ndarray:
+        return path(positions / symmetry.order)[:, reduced.kept]
 
     for intervals in (FEW,) if periods else (FEW, MORE * FEW):
         start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
@@ -92,9 +80,7 @@ def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
 
 
 def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
-    """Solve for an orbit from what the derivatives of a known one predict; None as in from_path.
-
-    The mesh of the known one is taken over, so that little is left to do.
+    """Solve for an orbit from the prediction of a known one, on its mesh; None as in from_path.
 
     Args:
         network: parameters.
@@ -114,8 +100,7 @@ def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
     return _refined(Reduced(network, near.symmetry), Solution(near.mesh, points, stages, length))
 
 
-def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()
-             ) -> MeshOrbit | None:
+def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> MeshOrbit | None:
     """Solve, remesh and solve again until the mesh is fine enough; None as in from_path."""
     fewest = FEWEST
     while True:
@@ -132,20 +117,20 @@ def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()
         except NoOrbit:
             return None
         now, periods = sampled(path_of(reduced, now), mesh, now.length), ()
-        # Finer every time: equal shares of the error alone may stay short of the goal for ever.
+        # Finer every time: distributing the error evenly need not suffice.
         fewest = finer(mesh)
 
 
 def kinks(reduced: Reduced, now: Solution) -> np.ndarray:
-    """Places, 0 to 1, at which the rates of a solution have a kink."""
+    """Positions, 0 to 1, at which the rates of a solution have a kink."""
     network = reduced.network
     columns = [variable * reduced.size + k for variable, name in enumerate(network.states)
                if name in network.kinks for k in range(reduced.size)]
-    return places_of(now.mesh, coefficients_of(reduced, now)[..., columns])
+    return sign_changes(now.mesh, coefficients_of(reduced, now)[..., columns])
 
 
 def _on_kinks(reduced: Reduced, now: Solution) -> bool:
-    """Put ends of intervals on all kinks, in place; tell whether Newton's method converged."""
+    """Move ends of intervals onto all kinks, in place; return whether Newton converged."""
     if not reduced.network.kinks:
         return True
     for _ in range(ALIGNED):
@@ -169,11 +154,6 @@ def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
     return MeshOrbit(reduced.network, reduced.symmetry, reduced.symmetry.order * now.length,
                      float(residual.max()), now.mesh, now.stages, coefficients)
 
-
-# The orbits of a gait along a line of parameters on a mesh, as a curve for continuation.
-
-#: States, shape (m, components), as a function of times in cycles, shape (m,).
-States = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -214,21 +194,21 @@ class MeshCurve(ShortRepr):
         weights[-1] = self.scales[1]**-2.0
         return weights
 
-    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+    def product(self, first: np.ndarray, second: np.ndarray) -> float:
         """Mean over the cycle and the components plus period plus value."""
-        return float(self._weights(one.size) * one @ other)
+        return float(self._weights(first.size) * first @ second)
 
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newton's increment normal to the border, and the tangent."""
         reduced, now = self._solution(z)
-        way = self.along.direction(self.network)
-        extra = reduced.by_parameter(now.stages) @ way
+        direction = self.along.direction(self.network)
+        extra = reduced.by_parameter(now.stages) @ direction
         p, r, by_start, by_source = linearised(reduced, now, extra[..., None])
         d = p.shape[-1]
         matrix, right = np.zeros((d + 2, d + 2)), np.zeros((d + 2, 2))
         matrix[:d + 1, :d + 1] = bordered(reduced, now, p, r)
         matrix[:d, d + 1] = r[-1, :, 2]
-        matrix[d, d + 1] = reduced.by_parameter(now.points[0])[0] @ way
+        matrix[d, d + 1] = reduced.by_parameter(now.points[0])[0] @ direction
         weighted = self._weights(z.size) * border
         row = weighted[:now.points.size].reshape(now.points.shape)
         matrix[d + 1, :d] = np.einsum('ki,kij->j', row, p)
@@ -258,7 +238,7 @@ class MeshCurve(ShortRepr):
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['MeshCurve', np.ndarray, np.ndarray] | None:
-        """Another mesh where the solution asks for it, from the highest peak of cell 1."""
+        """A finer mesh if the solution needs it, from the highest peak of cell 1."""
         reduced, now = self._solution(z)
         mesh = remeshed(reduced, now, finer(now.mesh) if again else FEWEST)
         path = path_of(reduced, now)
@@ -268,8 +248,8 @@ class MeshCurve(ShortRepr):
         mesh = now.mesh if mesh is None else mesh
         points = border[:now.points.size].reshape(now.points.shape)
 
-        def slanted(places: np.ndarray) -> np.ndarray:
-            return np.stack([np.interp(places, now.mesh, column) for column in points.T], -1)
+        def slanted(positions: np.ndarray) -> np.ndarray:
+            return np.stack([np.interp(positions, now.mesh, column) for column in points.T], -1)
 
         curve = replace(self, mesh=mesh)
         moved = [curve.pack(sampled(self._turned(reduced, states, start), mesh, 1.0), *ends)
@@ -277,24 +257,24 @@ class MeshCurve(ShortRepr):
         return curve, moved[0], moved[1]
 
     def _highest(self, reduced: Reduced, now: Solution, path: Callable) -> float:
-        """Return when cell 1 is higher than at the start, in m-ths of the cycle, or 0."""
+        """Return the time of cell 1's peak, in m-ths of the cycle, or 0 if it is at the start."""
         columns = self._columns(reduced)
         peaks = now.points[:, columns]
-        node, part = divmod(int(peaks.argmax()), len(columns))
+        node, index = divmod(int(peaks.argmax()), len(columns))
         if peaks.max() <= now.points[0, 0] + 1e-9 * np.ptp(peaks):
             return 0.0
         near = np.linspace(now.mesh[max(node - 1, 0)], now.mesh[min(node + 1, now.mesh.size - 1)],
                            201)
-        return float(part + near[path(near)[:, columns[part]].argmax()])
+        return float(index + near[path(near)[:, columns[index]].argmax()])
 
     def _turned(self, reduced: Reduced, path: Callable, start: float) -> Callable:
-        """Return the path from another start on: y(s + 1) = y(s)[turn]."""
-        def later(places: np.ndarray) -> np.ndarray:
-            places = places + start
-            parts = np.floor(places).astype(int)
-            out = path(places - parts)
-            for k in range(1, parts.max(initial=0) + 1):
-                out[parts >= k] = out[parts >= k][:, reduced.turn]
+        """Return the path from another start, where y(s + 1) = y(s)[turn]."""
+        def later(positions: np.ndarray) -> np.ndarray:
+            positions = positions + start
+            periods = np.floor(positions).astype(int)
+            out = path(positions - periods)
+            for k in range(1, periods.max(initial=0) + 1):
+                out[periods >= k] = out[periods >= k][:, reduced.turn]
             return out
         return later
 
@@ -309,31 +289,23 @@ class MeshCurve(ShortRepr):
 
 def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
             ) -> tuple[MeshCurve, np.ndarray]:
-    """Return the curve of the orbits along a line, and the place of one of them on it."""
+    """Return the curve of the orbits along a line, and the unknowns of one of them."""
     curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
     now = orbit.solution
     return curve, curve.pack(now, now.length, line.value(orbit.network))
 
 
 def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
-           scales: tuple[float, float], path: States, disturbance: States, period: float
+           scales: tuple[float, float], path: Path, disturbance: Path, period: float
            ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
-    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
+    """Return the curve of the orbits that branch off, the old solution on it and the tangent.
 
-    Args:
-        network: at the place.
-        symmetry: of the orbits.
-        line: of parameters.
-        scales: as of the curve.
-        path: states of what they leave, shape (m, components), over times in cycles.
-        disturbance: the direction in which, the same.
-        period: of the orbits, model time.
-
+    The arguments are those of the Fourier method's function.
     """
     reduced = Reduced(network, symmetry)
 
-    def on_quotient(states: States) -> States:
-        return lambda places: states(places / symmetry.order)[:, reduced.kept]
+    def on_quotient(states: Path) -> Path:
+        return lambda positions: states(positions / symmetry.order)[:, reduced.kept]
 
     mesh = first_mesh(reduced, on_quotient(path))
     curve = MeshCurve(network, symmetry, line, scales, mesh)
@@ -342,7 +314,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
             curve.pack(sampled(on_quotient(disturbance), mesh, 1.0), 0.0, 0.0))
 
 
-#: SAME: relative difference from the highest peak above which a peak is another one.
+#: Relative difference above which a peak is not the highest.
 SAME = 1e-6
 
 
@@ -374,19 +346,19 @@ def from_preset(preset: Preset) -> MeshOrbit:
 
 def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                 ) -> MeshOrbit | None:
-    """Collocate from a simulation over one period from a state near the orbit."""
+    """Collocate from a simulation over a period from a state near the orbit."""
     run = simulate(network, start, 1.05 * period, network.step, progress=False)
     return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
 
 
 def _stated(network: Network, gait: str) -> MeshOrbit | None:
-    """The orbit near which the network knows a state; None where it knows none."""
+    """Solve from the state that the network states near the orbit; None if it states none."""
     state = network.on_orbit(gait)
     if state is None:
         return None
     symmetry = network.symmetry(gait)
     orbit = _from_state(network, symmetry, *state)
-    # Phase 0 is the highest peak, to which a state that is only near need not lead.
+    # Phase 0 is the highest peak, which a state near the orbit may miss.
     if orbit is None or orbit.peak - orbit.waveform(np.zeros(1))[0] > SAME * orbit.peak:
         return _by_itself(network, symmetry, *state)
     return orbit
@@ -395,14 +367,14 @@ def _stated(network: Network, gait: str) -> MeshOrbit | None:
 def _sought(network: Network, gait: str) -> MeshOrbit:
     orbit = _settled(network, gait)
     if orbit is None:
-        # Hopf points are looked at, too, before anybody reads this: see orbit.solve_orbit.
+        # solve_orbit.solve_orbit searches from Hopf points before it raises this.
         raise NoOrbit(f'no {gait} was found at these parameters, neither by simulations from '
                       f'states about the equilibrium nor from a Hopf point along {network.line}')
     return orbit
 
 
 def _settled(network: Network, gait: str) -> MeshOrbit | None:
-    """Return the orbit on which the network settles from many states of the gait's class."""
+    """Return the orbit that simulations from states of the gait's class settle on, or None."""
     symmetry = network.symmetry(gait)
     try:
         orbits = (_accepted(from_path(network, symmetry, *guess)) for guess in find_orbit(network,
@@ -418,20 +390,20 @@ def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: 
     return None if cycle is None else _accepted(from_path(network, symmetry, cycle, cycle.period))
 
 
-def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:
+def _on_cycles(orbit: Orbit) -> Path:
     return lambda theta: orbit(theta * orbit.period)
 
 
 def _continue_orbit(near: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
-    """Follow an orbit along the line to other parameters; also return the share reached."""
+    """Continue an orbit to other parameters; also return the fraction of the way reached."""
     start, end = near.network.as_dict(), network.as_dict()
     orbit, reached, step = near, 0.0, 0.25
     # A failure costs more than a success, so steps shrink fast.
     while reached < 1.0 and step > 0.003:
         fraction = min(1.0, reached + step)
-        here = replace(network, **{key: start[key] + fraction * (end[key] - start[key])
+        between = replace(network, **{key: start[key] + fraction * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
-        ahead = _accepted(from_path(here, near.symmetry, _on_cycles(orbit), orbit.period))
+        ahead = _accepted(from_path(between, near.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
         if ahead is None or not 0.5 < ahead.period / orbit.period < 2.0:
             step *= 0.25
@@ -444,7 +416,7 @@ def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
     """Solve for the orbit next to a known one of the same symmetry, by Newton's method alone.
 
     Raises:
-        NoOrbit: the method leads elsewhere; a shorter way may do.
+        NoOrbit: the method leads elsewhere; a shorter step may succeed.
 
     """
     orbit = _accepted(predicted(network, near))
@@ -465,7 +437,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
 
     Raises:
         ValueError: an unknown gait, or parameters that are not finite.
-        NoOrbit: none was found; the message says how far from the known one it exists.
+        NoOrbit: there is none; the message says how far from the known one it exists.
 
     """
     symmetry = network.symmetry(gait)
@@ -485,7 +457,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             pass
     start = near(np.array(0.0))
     if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
-        # A wave that runs the other way: the same signals with other phases.
+        # The opposite wave has the same signals with other phases.
         start = _states(near, symmetry)
     orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)
     if orbit is not None:
@@ -506,7 +478,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
 def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
     """Return the orbit of the gait's preset, if it has one."""
     preset = network.presets().get(gait)
-    # One without a start is sought, as the gait of the network itself is.
+    # A preset without a start is solved like the gait of the network itself.
     if preset is None or (preset.start is None and preset.network == network):
         return None
     try:

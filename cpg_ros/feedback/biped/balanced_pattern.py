@@ -77,7 +77,7 @@ class BalancedPattern(Pattern):
 
     Attributes:
         balance: the feedback, None for the open-loop pattern.
-        sensors: what is measured now, joints in the feedback's order; None if that is not known.
+        sensors: present measurements, joints in the feedback's order; None if they are unknown.
         wish: speeds forward and to the left, m/s, and rate of turning, rad/s.
         balancing: whether the feedback bears the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
@@ -114,7 +114,7 @@ class BalancedPattern(Pattern):
         self._places = self.robot.places
         self._rest = np.array(list(self.robot.held.values()))
         self._arms: Arms | None = None
-        #: Of other threads: a gait to follow, and whether doubts are to be forgotten.
+        #: Requests of other threads: a gait to follow, and whether doubts are to be forgotten.
         self._follow: deque[GaitRunner] = deque(maxlen=1)
         self._anew = False
 
@@ -134,7 +134,7 @@ class BalancedPattern(Pattern):
         super().enable(enabled, ramp)
 
     def attach(self, drive: StrideCommand) -> None:
-        """Do nothing, likewise."""
+        """Do nothing: feet are placed for the wished speed."""
 
     @property
     def level(self) -> float:

@@ -119,7 +119,7 @@ class BipedFeedback:
         else:
             self._set_frequency(plan)
         self.gains = self._gains[plan.gait]
-        #: What is wanted, what is in force, and a walk to stop with.
+        #: The wanted gait, the gait in force, and a walk with which to stop.
         self._goal = self.track = GaitRunner(plan, 0.0)
         self._walk, self.faults = GaitRunner(walk, 0.0), 0
         self.arms = Arms(robot)

@@ -124,7 +124,7 @@ OF_GAIT: Mapping[str, Mapping[str, float]] = {
         'sole_kd': 0.33, 'stance_damping': 0.3, 'speed_integral': 0.793, 'place_offset': 0.0082,
         'reaction': 0.0689, 'reaction_yaw': 0.639},
     'two_legged_hop': _HOP, 'two_legged_jump': _HOP}
-#: Least gains of a gait that leaves the ground, where they are not those of a walk.
+#: SHORTEST: limits of gains in gaits with flight that are lower than in a walk.
 SHORTEST: Mapping[str, float] = {'duty': 0.2}
 _Fields: Any = named_tuple('BipedGains', GAINS, (gain.default for gain in GAINS.values()))
 

@@ -117,7 +117,7 @@ def blank_pose(links: Links) -> Pose:
                 np.zeros(count), np.zeros((count, 3)), np.zeros(links.soles.shape))
 
 
-#: From the base's axes to the world's.
+#: Rotation from the base's axes to the world's.
 rotation = jit(fill_rotation)
 
 

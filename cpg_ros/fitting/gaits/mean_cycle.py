@@ -48,7 +48,7 @@ class HarmonicCycle(ShortRepr):
         coefficients: c_n of ``x(t) = Re(c_0 + 2 sum_n c_n exp(2 pi i n (t - start) / period))``,
             complex, shape (harmonics + 1, channels).
         start: where the cycle begins.
-        residual: RMS of what the cycle leaves, over that of the signals about their means.
+        residual: RMS of the residual, over the RMS of the signals about their means.
 
     """
 

@@ -164,7 +164,7 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     """
     slope, level = (np.polyfit(rough.times - rough.begin, rough.phases, 1)
                     if rough.times.size > 1 else (1.0, 0.0))
-    # Plain numbers: what is fitted is written to files that know no others.
+    # Convert to plain numbers, as results are written to files that accept no others.
     span = float(rough.end - rough.begin)
     within = index_range(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
     grid, y = resample_evenly(times[within], positions[within], BLOCKS * POINTS * slope)

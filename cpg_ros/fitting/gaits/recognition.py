@@ -16,7 +16,7 @@
 
 A symmetry g with shift theta means ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono &
 Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
-mean cycle; H and K are what is violated by less than the tolerance and forms a homomorphism.
+mean cycle; H and K are the symmetries whose violation is below the tolerance, as a homomorphism.
 """
 
 from collections.abc import Mapping, Sequence

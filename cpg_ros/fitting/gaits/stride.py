@@ -138,7 +138,7 @@ def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarra
         legs: leg -> its joints.
         x: angles, rad, nan where missing, shape (n, joints).
         source: of the recording, for messages.
-        notes: what is left out is added to.
+        notes: a line for each kind of data that is left out is added.
 
     Raises:
         NoSteadyGait: a leg has no joint left.
@@ -272,7 +272,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
             of touchdown, and they tell walk from run where legs move alike in both.
         body: where the body was, m, the last axis upward, shape (n, 3); how it falls tells walk
             from run, too.
-        known: the gait, where that is no question: confidence is then that of the frequency.
+        known: the gait, if it is given: the confidence is then that of the frequency alone.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.

@@ -86,7 +86,7 @@ class CycleProblem:
     The gait's duty, if it is free, is the last of the free numbers.
 
     Attributes:
-        joints, network, gait, free, order, readout: what is fitted to what.
+        joints, network, gait, free, order, readout: data and unknowns of the fit.
         coordinates: in which a trust region moves.
         sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
 
@@ -104,7 +104,7 @@ class CycleProblem:
         self._members = np.array([[float(name in one.members) for one in free]
                                   for name in names])
         self._of_duty = np.array([float(one.name == GAIT_DUTY) for one in free])
-        #: How many of the values are the network's.
+        #: Number of values that belong to the network.
         self._own = len(free) - int(self._of_duty.sum())
         leading = np.array([readout.leading.get(int(cell) + 1, int(cell) + 1) - 1
                             for cell in joints.cells])

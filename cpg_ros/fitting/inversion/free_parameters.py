@@ -212,7 +212,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
         try:
             return evaluate(values)[0]
         except NoOrbit:
-            # The method answers what is not finite with a shorter step.
+            # The method responds to values that are not finite by a shorter step.
             return np.full(size, np.nan)
 
     def jacobian(values: np.ndarray) -> np.ndarray:

@@ -119,7 +119,7 @@ class StretchFit(ShortRepr):
 
     Attributes:
         begin, end: s from the recording's start.
-        stride: what was found there, on a clock of its own.
+        stride: of the stretch, on a clock of its own.
         fit: the network's gait fitted to it; None if that failed.
         why: why there is no fit.
 
@@ -137,7 +137,7 @@ class StretchFit(ShortRepr):
 
     @property
     def gait(self) -> str | None:
-        """Name of the gait, None if it is none or cannot be told."""
+        """Name of the gait, None if it is not a gait of the network or cannot be told."""
         return None if len(self.stride.alike) > 1 else self.stride.gait
 
 

@@ -62,7 +62,7 @@ class GaitReadout:
     @classmethod
     def of(cls, network: type[Network], gait: str, preset: str = '', robot: Robot | None = None
            ) -> 'GaitReadout':
-        """Return that of a robot file's gait or preset, or of a robot without a file."""
+        """Return the readout of a robot file's gait or preset, or of a robot without a file."""
         assignment = next(iter(network.legs)) if robot is None else robot.assignment
         leading = {cell: cells[0] for cells in network.legs[assignment].values()
                    for cell in cells}

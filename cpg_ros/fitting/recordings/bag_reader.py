@@ -149,7 +149,7 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
     Args:
         path: the bag's folder, or one of its storage files (.mcap, .db3, or packed: .mcap.zstd).
         topics: which to read, by their names or namespaces; if empty, all topics of type
-            sensor_msgs/msg/JointState, or else the fastest of type unitree_go/msg/LowState.
+            sensor_msgs/msg/JointState, or else the fastest of Unitree's LowState.
         joints: which joints to take, in this order; all of them, if empty.
         progress: show a progress bar.
         some: joints that are not there are passed over, unless none is.

@@ -30,7 +30,7 @@ from typing import Any, IO
 from cpg_ros.common import files as regular_file
 from cpg_ros.fitting.recordings.bag_library import Reader, ReaderError, unpack_file
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
-from cpg_ros.fitting.recordings.low_state import LOW_STATE
+from cpg_ros.fitting.recordings.low_state import MOTORS
 from cpg_ros.fitting.recordings.recording import abbreviate, RecordingError, refuse_stand_in
 from cpg_ros.fitting.recordings.tables import UnpackedSize
 
@@ -142,7 +142,7 @@ class Bag:
         if not types:
             raise RecordingError(f'{self.path}: an empty bag, without topics')
         fitting = [topic for topic in types if types[topic] == {JOINT_STATE}]
-        motors = [topic for topic in types if types[topic] == {LOW_STATE}]
+        motors = [topic for topic in types if types[topic] <= set(MOTORS)]
         if not topics and not fitting and motors:
             # Robots publish their state twice, at the full rate and slower.
             counts = self.expected()

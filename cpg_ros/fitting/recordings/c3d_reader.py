@@ -131,7 +131,7 @@ def c3d_markers(path: str | Path) -> Markers:
 
 
 def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
-    """Return points, names of those that are angles, the unit of these, '' if none, and events."""
+    """Return points, names of angles, the angles' unit, '' if none, and events."""
     stated = _stated(path)
     needed('ezc3d')
     try:

@@ -56,7 +56,7 @@ class SerializedBlock(ShortRepr):
         stamps: of the headers, ns, shape (n,), int64.
         names: of the joints, as in the messages.
         positions: shape (n, positions); a message may have more or fewer than names.
-        velocities, efforts: likewise, rad/s and N m; of width 0 where they were not requested.
+        velocities, efforts: same shape, rad/s and N m; of width 0 where they were not requested.
 
     """
 
@@ -110,7 +110,7 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
 def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
     """Join blocks of equal names and widths, their messages in the order of the batch again.
 
-    They can differ in what is no number: byte order, or the frame's name.
+    They can differ in byte order, or in the frame's name.
     """
     alike: dict[tuple, list[SerializedBlock]] = {}
     for block in blocks:

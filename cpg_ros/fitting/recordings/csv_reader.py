@@ -307,7 +307,7 @@ class _Table:
         return cells_of(line, self.delimiter, f'{self.path}, line {number}')
 
     def _time(self, headers: list[str], option: str | None) -> Column:
-        """Find the time column, or that of the seconds beside one of nanoseconds."""
+        """Find the time column, or the column of seconds beside one of nanoseconds."""
         self.rest, self.shares = -1, False
         names, units = zip(*map(split, headers), strict=True)
 
@@ -421,7 +421,7 @@ class _Table:
         return FootLoads(tuple(column.joint for column in self.loads), rows[:, 0], rows[:, 1:])
 
     def _check(self, seconds: np.ndarray, lines: list[str]) -> None:
-        """Refuse times that are none, or go back."""
+        """Raise RecordingError for times that are not numbers, or that go back."""
         before = np.append(self.last, seconds[:-1])[:len(seconds)]
         wrong = ~(np.abs(seconds) < LATEST) | (seconds < before)
         # A single stamp far ahead of the next one is the one that is wrong: merged leaves it out.

@@ -28,7 +28,7 @@ from cpg_ros.fitting.recordings.cdr import (
     SerializedBlock,
     UndecodableError,
 )
-from cpg_ros.fitting.recordings.low_state import decode_low_states, LOW_STATE
+from cpg_ros.fitting.recordings.low_state import decode_low_states, MOTORS
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     Chunk,
@@ -110,22 +110,22 @@ class Stream:
     def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None,
                  source: str = '', kind: str = JOINT_STATE) -> None:
         self.topic, self.servo, self.source, self.kind = topic, servo, source, kind
-        #: The joints that are asked for, in the order of positions that have no names.
+        #: The requested joints, in the order of positions without names.
         self.order = tuple(joints)
-        #: What stands before the names that are asked for; where the names are missing; the
-        #: first message that has not a position for each name.
+        #: Prefix of the requested names; text on messages without names; text on the first message
+        #: without a position for each name.
         self.prefix, self.unnamed, self.first_odd = '', False, ''
         self.wanted = set(joints)
         self.taken: set[str] = set()
-        #: What is not decoded yet, and the times of receipt in ns.
+        #: Messages that are not decoded yet, and their times of receipt, ns.
         self.messages: list[bytes] = []
         self.received: list[int] = []
         self._bytes = 0
         #: Header stamps and receive times in ns, names, positions.
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
         self._size = 0
-        #: Of a long topic: joints -> samples on a grid, and by how many seconds the other clock is
-        #: ahead more than it was at first.
+        #: For a long topic: joints -> samples on a grid; then the seconds by which the other clock
+        #: has gained since the first message.
         self._thinned: dict[tuple[str, ...], Thinned] = {}
         self._by_headers, self._ahead = True, 0
         self.joints: dict[str, None] = {}
@@ -165,8 +165,8 @@ class Stream:
         received = np.array(self.received, np.int64)
         try:
             efforts = self.servo is not None
-            blocks = (decode_low_states(self.messages, self.order, efforts)
-                      if self.kind == LOW_STATE else in_order(decode(self.messages, efforts)))
+            blocks = (decode_low_states(self.messages, self.order, efforts, self.kind)
+                      if self.kind in MOTORS else in_order(decode(self.messages, efforts)))
             for block in blocks:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
@@ -216,7 +216,7 @@ class Stream:
         found = Counter(name[:-len(one)] for name in names for one in self.wanted
                         if name.endswith(one))
         (prefix, most), *others = [*found.most_common(2), ('', 0)]
-        # As many under another prefix are those of another robot.
+        # Equally many joints under another prefix belong to another robot.
         if most < 2 or others[0][1] == most:
             return names
         self.prefix = prefix

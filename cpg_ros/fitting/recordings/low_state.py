@@ -12,34 +12,52 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message ``unitree_go/msg/LowState`` of Unitree's four-legged robots, many at a time.
+"""Unitree's ``LowState``, many messages at once: of dogs (unitree_go), humanoids (unitree_hg).
 
-It has no stamp and no names: motors are FR, FL, RR, RL with hip, thigh and calf each, and so are
-feet.
+They have no stamps and no names. A dog's motors are FR, FL, RR, RL with hip, thigh and calf each,
+and so are its feet; a humanoid's are by default those of a G1.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 
 from cpg_ros.fitting.recordings.cdr import SerializedBlock, UndecodableError
 import numpy as np
 
-LOW_STATE = 'unitree_go/msg/LowState'
-#: MOTORS: default names of the motors, those of Unitree's URDF.
-MOTORS = tuple(f'{leg}_{part}_joint' for leg in ('FR', 'FL', 'RR', 'RL')
-               for part in ('hip', 'thigh', 'calf'))
-#: SIZE: bytes of a message, including the header of CDR, _HEADER bytes.
-SIZE, _HEADER, _LITTLE_ENDIAN = 1180, 4, 1
-_MOTOR = np.dtype({'names': ['q', 'dq', 'torque'], 'formats': ['<f4'] * 3, 'offsets': [0, 4, 12],
-                   'itemsize': 48})
-#: Offsets as in the bridge, which drives the robot by them.
-_FIELDS = np.dtype({
-    'names': ['quaternion', 'gyroscope', 'accelerometer', 'motors', 'feet'],
-    'formats': ['4<f4', '3<f4', '3<f4', (_MOTOR, len(MOTORS)), '4<i2'],
-    'offsets': [_HEADER + offset for offset in (24, 40, 52, 80, 1080)], 'itemsize': SIZE})
+LOW_STATE, HUMANOID_STATE = 'unitree_go/msg/LowState', 'unitree_hg/msg/LowState'
+_ARM = ('shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_roll', 'wrist_pitch',
+        'wrist_yaw')
+_LEG = ('hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')
+#: MOTORS: kind of message -> default names of its motors, those of Unitree's URDF.
+MOTORS = {
+    LOW_STATE: tuple(f'{leg}_{part}_joint' for leg in ('FR', 'FL', 'RR', 'RL')
+                     for part in ('hip', 'thigh', 'calf')),
+    HUMANOID_STATE: tuple(f'{part}_joint' for part in chain(
+        (f'{side}_{part}' for side in ('left', 'right') for part in _LEG),
+        (f'waist_{axis}' for axis in ('yaw', 'roll', 'pitch')),
+        (f'{side}_{part}' for side in ('left', 'right') for part in _ARM)))}
+_HEADER, _LITTLE_ENDIAN = 4, 1
 
 
-def low_states(messages: Sequence[bytes]) -> np.ndarray:
-    """Return the fields of messages: a structured array, shape (n,).
+def _fields(size: int, motor: int, motors: int, offsets: Sequence[int]) -> np.dtype:
+    """Return the fields of a message of a size, of whose motors each takes ``motor`` bytes."""
+    one = np.dtype({'names': ['q', 'dq', 'torque'], 'formats': ['<f4'] * 3,
+                    'offsets': [0, 4, 12], 'itemsize': motor})
+    # Of the last motor only these numbers: what follows it ends the message.
+    return np.dtype({'names': ['quaternion', 'gyroscope', 'accelerometer', 'motors', 'feet'],
+                     'formats': ['4<f4', '3<f4', '3<f4', (one, motors), '4<i2'],
+                     'offsets': [_HEADER + offset for offset in offsets],
+                     'itemsize': _HEADER + size})
+
+
+#: FIELDS: kind of message -> what is read of it; of dogs the offsets are as in the bridge, which
+#: drives the robot by them. Humanoids have no foot sensors: what stands there is not used.
+FIELDS = {LOW_STATE: _fields(1176, 48, 12, (24, 40, 52, 80, 1080)),
+          HUMANOID_STATE: _fields(2088, 56, 35, (16, 32, 44, 72, 2068))}
+
+
+def low_states(messages: Sequence[bytes], kind: str = LOW_STATE) -> np.ndarray:
+    """Return the fields of messages of a kind: a structured array, shape (n,).
 
     ``quaternion`` (w x y z), ``gyroscope`` (rad/s), ``accelerometer`` (m/s^2), ``motors`` with
     ``q`` (rad), ``dq`` (rad/s) and ``torque`` (N m), ``feet`` (the robot's units).
@@ -48,29 +66,32 @@ def low_states(messages: Sequence[bytes]) -> np.ndarray:
         UndecodableError: a message has another length or byte order.
 
     """
+    size = FIELDS[kind].itemsize
     for index, message in enumerate(messages):
-        if len(message) < SIZE or message[1] != _LITTLE_ENDIAN:
-            raise UndecodableError(index, f'{len(message)} bytes, where {SIZE} are needed')
-    return np.frombuffer(b''.join(message[:SIZE] for message in messages), _FIELDS)
+        if len(message) < size or message[1] != _LITTLE_ENDIAN:
+            raise UndecodableError(index, f'{len(message)} bytes, where {size} are needed')
+    return np.frombuffer(b''.join(message[:size] for message in messages), FIELDS[kind])
 
 
-def decode_low_states(messages: Sequence[bytes], joints: Sequence[str], efforts: bool
-                      ) -> Iterator[SerializedBlock]:
+def decode_low_states(messages: Sequence[bytes], joints: Sequence[str], efforts: bool,
+                      kind: str = LOW_STATE) -> Iterator[SerializedBlock]:
     """Yield messages as joint states without stamps.
 
     Args:
         messages: as they were received.
         joints: of a robot in the order of its motors, which names them; Unitree's names if it
-            has these, or another number of joints.
+            has any of these, or has more joints than there are motors, or of a dog fewer.
         efforts: whether to return velocities and efforts, too.
+        kind: type of the messages.
 
     """
     if not messages:
         return
-    motors = low_states(messages)['motors']
-    own = len(joints) == len(MOTORS) and not set(joints) & set(MOTORS)
-    count, none = len(messages), np.empty((len(messages), 0))
+    motors, names = low_states(messages, kind)['motors'], MOTORS[kind]
+    fits = len(joints) == 12 if kind == LOW_STATE else 0 < len(joints) <= motors.shape[1]
+    names = tuple(joints) if fits and not set(joints) & set(names) else names
+    motors, count, none = motors[:, :len(names)], len(messages), np.empty((len(messages), 0))
     yield SerializedBlock(
-        np.arange(count), np.zeros(count, np.int64), tuple(joints) if own else MOTORS,
+        np.arange(count), np.zeros(count, np.int64), names,
         motors['q'].astype(float), *((motors[name].astype(float) if efforts else none)
                                      for name in ('dq', 'torque')))

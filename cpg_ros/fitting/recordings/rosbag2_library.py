@@ -56,7 +56,7 @@ def deserialize(message: bytes) -> Any:
     """Return a JointState out of its bytes.
 
     Raises:
-        SerdeError: they are none.
+        SerdeError: the bytes are not such a message.
 
     """
     try:

@@ -78,7 +78,7 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
         fixed: column -> text that it has in every line.
 
     Returns:
-        Numbers, shape (rows, columns), and what was left out, one line each.
+        Numbers, shape (rows, columns), and a line for each kind of row that was left out.
 
     Raises:
         RecordingError: a cell that is no number, or a line of another width.

@@ -83,8 +83,8 @@ class FixedData(GaitData):
             raise InputError(f'positions up to {reach:.3g} rad: whole numbers go to 4 rad')
         #: Bits that angles have beyond those of positions; and of slopes after the point.
         self.fine = max(0, -_halvings(largest * 2**POSITION, ANGLE_BITS))
-        #: Of a frequency's 32 bits those that are left out for 16; of rates the bits after the
-        #: point, with a slope times a frequency of 16 bits.
+        #: Bits by which a frequency of 32 bits is shortened to 16; then the bits of rates after
+        #: the point, for a slope times a frequency of 16 bits.
         self.coarser = _halvings(fastest / rate * 2.0**32, 16)
         bound = max(float(bound.max()) for bound in self._bounds)
         steepest = max(float(np.abs(one.rises).max()) for one in readouts)

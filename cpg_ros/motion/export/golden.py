@@ -44,7 +44,7 @@ class Golden(ShortRepr):
         strides: each event's strides of the legs, then the pace, shape (events, legs + 1); None
             without steering.
         every: ticks from one sample to the next.
-        positions: of the joints after each so many ticks, rad, shape (n, joints).
+        positions: of the joints at regular ticks, rad, shape (n, joints).
         network_tolerance: of the states.
         tolerance: of the positions, rad.
 

@@ -26,7 +26,7 @@ import math
 from typing import Any, ClassVar
 
 from cpg_ros.networks.definition import Cell, leg_count, Number, Range, tanh
-from cpg_ros.networks.leg_numbers import places
+from cpg_ros.networks.leg_numbers import leg_positions
 from cpg_ros.networks.library.families import (
     across,
     behind,
@@ -72,8 +72,8 @@ class Delayed(Network):
     couplings: ClassVar[tuple[str, ...]] = ('c', 'd')
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}}
-    sides: ClassVar[dict[str, str]] = places(4)['sides']
-    girdles: ClassVar[dict[str, str]] = places(4)['girdles']
+    sides: ClassVar[dict[str, str]] = leg_positions(4)['sides']
+    girdles: ClassVar[dict[str, str]] = leg_positions(4)['girdles']
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
     free: ClassVar[tuple[str, ...]] = ('c', 'tau')

@@ -30,7 +30,7 @@ from typing import Any, ClassVar
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.networks.definition import leg_count, Range
-from cpg_ros.networks.leg_numbers import leg_names, places
+from cpg_ros.networks.leg_numbers import leg_names, leg_positions
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.symmetry import GAITS, Group, Permutation, Symmetry, Z4_Z2
 
@@ -79,8 +79,7 @@ def ring_gaits(legs: int) -> dict[str, tuple[int, int]]:
 
 
 @cache
-def ring_symmetry(legs: int, mode: tuple[int, int], variables: int, odd: bool = False
-                  ) -> Symmetry:
+def ring_symmetry(legs: int, mode: tuple[int, int], variables: int, odd: bool = False) -> Symmetry:
     """Return the symmetry of the mode (j, k) in the rings of 2n legs."""
     j, k = mode
     return Symmetry.of(ring_group(legs), {'omega': Fraction(j, legs), 'kappa': Fraction(k, 2)},
@@ -105,7 +104,7 @@ def ring_legs(legs: int) -> dict[str, dict[str, tuple[int, int]]]:
 
 def ring_places(legs: int) -> dict[str, Any]:
     """Return the attributes of a network of such rings for a number of legs."""
-    return {'cells': 2 * legs, 'legs': ring_legs(legs), **places(legs)}
+    return {'cells': 2 * legs, 'legs': ring_legs(legs), **leg_positions(legs)}
 
 
 #: Phases of LH RH LF RF, in quarters of a cycle.
@@ -176,7 +175,7 @@ class LegPairs(Network):
     #: Ranges of the parameters other than the weights, and the largest weight.
     own_ranges: ClassVar[dict[str, Range]]
     most: ClassVar[float] = 20.0
-    #: The parameters but the weights of all presets, and how large weights are usually looked for.
+    #: Parameters of all presets other than the weights, and the largest weight that is usual.
     usual: ClassVar[dict[str, float]]
     looked_for: ClassVar[float] = 2.0
 
@@ -188,7 +187,8 @@ class LegPairs(Network):
                   for kind, sources in inputs.items()}
         weights = tuple(name for members in groups.values() for name in members)
         return {
-            'cells': cls.each * legs, **places(legs), 'groups': groups, 'couplings': weights,
+            **leg_positions(legs), 'cells': cls.each * legs, 'groups': groups,
+            'couplings': weights,
             'own_of_cells': {kind: cls.each * members for kind, members in groups.items()},
             'legs': {'implicit': {leg: tuple(1 + n + m * legs for m in range(cls.each))
                                   for n, leg in enumerate(names)}},

@@ -99,8 +99,7 @@ class HopfOscillators(LegPairs):
     @cache
     def presets(cls) -> dict[str, Preset]:
         """Return one for each gait: alpha, beta and mu of the paper, duty 0.6."""
-        return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait)))
-                for gait in cls.gaits()}
+        return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait))) for gait in cls.gaits()}
 
 
 @for_legs(4)

@@ -35,7 +35,7 @@ import math
 from typing import Any, ClassVar
 
 from cpg_ros.networks.definition import Cell, cos, Number, Range, sin, sqrt
-from cpg_ros.networks.leg_numbers import for_legs, leg_names, places
+from cpg_ros.networks.leg_numbers import for_legs, leg_names, leg_positions
 from cpg_ros.networks.library.families import ring_gaits
 from cpg_ros.networks.network import known, Network, Preset
 from cpg_ros.networks.stated_gait import stated_gait
@@ -95,9 +95,10 @@ class PhaseOscillators(Network):
         between = (0.0, 0.25) if legs == 2 else tuple(
             (0.5 * (i % 2) + 1.5 * (i // 2) / legs) % 1.0 for i in range(legs))
         return {
-            'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
+            **leg_positions(legs), 'cells': legs,
+            'offsets': dict(zip(names, offsets, strict=True)),
             'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
-            # Offset of the cell n places further: offset_j with j = i + n.
+            # Offsets of the cell n further round.
             'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
             'ranges': {**cls.own_ranges, **{
                 f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which the leg {leg} is ahead')
@@ -117,8 +118,7 @@ class PhaseOscillators(Network):
             # r_j sin(theta_j - phi) and r_j cos(theta_j - phi).
             rise, lead = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
             speed = speed + p.w * (rise * x - lead * y) / r
-        return (s * x / r - speed * y, s * y / r + speed * x,
-                p.a * (p.a / 4.0 * (p.r - r) - s))
+        return (s * x / r - speed * y, s * y / r + speed * x, p.a * (p.a / 4.0 * (p.r - r) - s))
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
@@ -133,8 +133,8 @@ class PhaseOscillators(Network):
 
         """
         known(gait, self.gaits())
-        own = self if stated_gait(self) == gait else self.presets()[gait].network
-        return _alone(self.cells).led(own.leads)
+        stating = self if stated_gait(self) == gait else self.presets()[gait].network
+        return _alone(self.cells).led(stating.leads)
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float]:
         """Return the gait's state where the first leg's oscillator peaks, and the period."""

@@ -24,7 +24,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from cpg_ros.networks.definition import Cell, Number, Range
-from cpg_ros.networks.leg_numbers import places
+from cpg_ros.networks.leg_numbers import leg_positions
 from cpg_ros.networks.library.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
@@ -70,8 +70,8 @@ class Quadruped(Network):
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)},
         'zigzag': {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)},
         'crisscross': {'lh': (1, 6), 'rh': (2, 5), 'lf': (3, 8), 'rf': (4, 7)}}
-    sides: ClassVar[dict[str, str]] = places(4)['sides']
-    girdles: ClassVar[dict[str, str]] = places(4)['girdles']
+    sides: ClassVar[dict[str, str]] = leg_positions(4)['sides']
+    girdles: ClassVar[dict[str, str]] = leg_positions(4)['girdles']
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
     free: ClassVar[tuple[str, ...]] = ('alpha', 'beta')

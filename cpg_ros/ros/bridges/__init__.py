@@ -12,6 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Nodes that drive real robots by what a generator publishes, and their watchdog."""
+"""Nodes that drive real robots from a generator's output, and their watchdog."""
 
 __all__ = ['bridge', 'robot_state', 'servos', 'supervisor', 'unitree', 'watchdog', 'watchdog_link']

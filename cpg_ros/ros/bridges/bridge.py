@@ -111,7 +111,7 @@ class StartSequence(threading.Thread):
 
 #: REST: time in damping, s, after which the robot is at rest and the bridge may end.
 REST = 1.0
-#: How often the network is checked for others who command the robot, s.
+#: CHECK: period in which the graph is checked for others who command the robot, s.
 CHECK = 0.1
 #: STATE: longest time that a start waits for the first robot state, s.
 STATE = 10.0

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Settings of a bridge: the robot's joints, gains, poses, limits and times."""
+"""Parameters and settings of a bridge; the state that it reads and the command that it sends."""
 
 from dataclasses import dataclass
 import math

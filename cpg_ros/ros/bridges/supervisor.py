@@ -204,7 +204,7 @@ class Supervisor:
     All methods must be called from one thread.
 
     Attributes:
-        robot: the measured state; whoever reads a new one then calls ``state_received``.
+        robot: the measured state; readers of a new one then call ``state_received``.
         command: to be sent after ``step``.
         targets: of a generator.
         state: of the bridge.

@@ -240,7 +240,7 @@ def rate(text: str) -> float:
     """Read a positive number.
 
     Raises:
-        argparse.ArgumentTypeError: it is none.
+        argparse.ArgumentTypeError: the text is not a positive number.
 
     """
     if not 0.0 < number(text) < float('inf'):

@@ -28,7 +28,7 @@ from cpg_ros.common.errors import MissingLibraryError, needed
 
 #: The signals by which users, terminals and launch files end a process.
 ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
-#: Where an installation of ROS lists its packages.
+#: INDEX: folder in which an installation of ROS lists its packages.
 INDEX = 'share/ament_index/resource_index/packages'
 #: Executable -> module whose ``main`` it runs.
 EXECUTABLES = {'generator': 'ros.generator', 'robot_sim': 'ros.robot_sim',

@@ -240,7 +240,7 @@ class FeedbackLoop(SensorLoop):
         self._instant.wish[:] = self._motion()
 
     def _correct(self, angles: np.ndarray) -> np.ndarray:
-        """Return corrected angles, rad, (joints,), of those that are planned."""
+        """Return the corrected angles, rad, shape (joints,), of planned ones."""
         if self._bound is not self.feedback.gains:
             self.bind()
         self._pattern.report(self._instant.numbers[2:], self._instant.gaits)

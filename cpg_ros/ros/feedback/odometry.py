@@ -77,7 +77,7 @@ class OdometryPublisher:
 
         Args:
             node: that publishes.
-            source: of what is published.
+            source: of the published odometry.
             topic: of the nav_msgs/Odometry.
             frames: the one in which the robot moves, and that of its base.
             transforms: whether to publish the transform between them, too.

@@ -273,7 +273,7 @@ class SensorInput:
 
         Args:
             now: s.
-            judge: whether to judge them now; else what was found last is told.
+            judge: whether to judge them now; else the last result is returned.
 
         """
         found, waiting = [], False

@@ -126,7 +126,7 @@ def specs(robot: Robot) -> dict[str, Spec]:
 
 
 def gains(value: Callable[[str], Any]) -> Gains:
-    """Return the gains; ``value`` returns that of a parameter, by its name behind PREFIX."""
+    """Return the gains; ``value`` returns a parameter's value by its name behind PREFIX."""
     return Gains(*map(value, Gains._fields))
 
 
@@ -207,7 +207,7 @@ class FeedbackSwitch:
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
         self._hindrance = ''
-        #: Whether the robot may move meanwhile.
+        #: Whether the robot may already move.
         self._started = False
         self.apply()
         self._started = True
@@ -300,7 +300,7 @@ class FeedbackSwitch:
             self.loop.sense(dt, 1e-9 * stamp)
 
     def renew(self) -> None:
-        """Tell ticks outside the interpreter what is wanted; log the delays once they matter."""
+        """Pass requests on to ticks outside the interpreter; log the delays once they matter."""
         if self.loop is None:
             return
         self.loop.renew()
@@ -337,7 +337,7 @@ class FeedbackSwitch:
         return position if self.loop is None else self.loop.targets(position)
 
     def publish(self, dt: float, stamp: int) -> None:
-        """Publish what is due; dt since the last call, s, and stamp, ns."""
+        """Publish the messages that are due; dt since the last call, s, and stamp, ns."""
         if self.loop is not None:
             self._kp_scale.publish(dt, self.loop.kp_scale)
             if self._odometry is not None and self.loop.fraction > 0.0:

@@ -40,7 +40,7 @@ OUT, ERROR = STREAMS = 1, 2
 #: WORDS: words of 8 bytes for each stream in shared memory: whether output is being relayed, and
 #: the number of lost lines.
 WORDS = 2
-#: The signals that end nodes; the relay ends when all who could write have ended.
+#: SIGNALS: signals that end nodes, which the relay ignores: it ends after all writers.
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 
 

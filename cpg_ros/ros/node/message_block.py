@@ -167,7 +167,7 @@ class MessageBlock:
 
         Args:
             node: that publishes.
-            sizes: how many numbers each part has of those that the messages are filled from.
+            sizes: sizes of the parts of the array from which the messages are filled.
             templates: topic and message, in the order of publishing.
 
         """
@@ -247,7 +247,7 @@ class MessageBlock:
 
         Args:
             places: addresses of pointers to the numbers of each part.
-            every: so many ticks.
+            every: number of ticks between two publications.
             quiet: publish as the first number changes, and else only while it is not 1.
 
         """

@@ -288,7 +288,7 @@ class StartedNode(Node):
         """Start the thread."""
 
     def look(self) -> None:
-        """Do what is to be done 50 times a second, in the main thread."""
+        """Do periodic work, 50 times a second, in the main thread."""
 
     def finish(self) -> None:
         """End the thread."""

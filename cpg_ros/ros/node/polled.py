@@ -28,7 +28,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 # Qualities of service that more than one node uses.
 
-#: For topics whose QoS can be overridden by parameters of the node.
+#: OVERRIDABLE: option of topics whose QoS can be overridden by parameters of the node.
 OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
 

@@ -1,4 +1,4 @@
-/* What a thread that ticks does at each tick, outside the interpreter: it waits for the deadline,
+/* The work of a ticking thread at each tick, outside the interpreter: it waits for the deadline,
  * writes numbers into serialised messages and hands these to the middleware. Nothing here
  * allocates memory, and no lock is held but those of the middleware. See native.py. */
 #define _POSIX_C_SOURCE 200809L
@@ -10,11 +10,11 @@
 #include <time.h>
 
 #define SECOND 1000000000
-/* What rcl returns where no message waits. */
+/* Return code of rcl if no message waits. */
 #define NOTHING_TAKEN 401
 #define OUTPUTS 3
 
-/* As rcutils_uint8_array_t. */
+/* Same layout as rcutils_uint8_array_t. */
 typedef struct {
     uint8_t *buffer;
     size_t length, capacity;
@@ -28,7 +28,7 @@ typedef struct {
     const void *const *publisher;
     const serialized *message;
     uint32_t *memory;       /* of all messages, words */
-    uint32_t *words;        /* stamp, duration, and the numbers: what changes */
+    uint32_t *words;        /* changing words: stamp, duration, and the numbers */
     const int64_t *place;   /* in the memory, of each word that changes, */
     const int64_t *source;  /* and where it comes from */
     int64_t messages, changes;
@@ -111,23 +111,23 @@ typedef struct {
     int64_t size;
 } copy;
 
-/* What corrects the angles between two functions of the pattern. */
+/* The correction of the angles between plan and follow of the pattern. */
 typedef struct {
     int64_t (*close)(const void *arguments);
-    const void *arguments;     /* replaced as gains are */
+    const void *arguments;     /* replaced when gains change */
     void (*report)(const void *what, double *numbers, int64_t *gaits);
     void (*plan)(void *what, double dt);
     void (*follow)(void *what, double dt, int corrected);
     int (*take)(const void *subscription, void *message, void *info, void *allocation);
     void (*forget)(void);
-    double *numbers;           /* length of the tick and time, s, and what report fills */
+    double *numbers;           /* length of the tick and time, s, then those of report */
     int64_t *gaits;
     input *inputs;
     const copy *resets;
     int64_t count, parts;
 } correction;
 
-/* Numbers in a message, whose byte order is its own. */
+/* Copy a number out of a message with its own byte order. */
 static void number(const uint8_t *from, int swapped, void *to, int size)
 {
     for (int k = 0; k < size; k++) {
@@ -207,7 +207,7 @@ static void correct(correction *c, void *what, double dt, int64_t stamp)
 
 typedef struct {
     counters *count;
-    const int32_t *asked;              /* by what advances, for a tick of Python's */
+    const int32_t *asked;              /* set by the pattern if the next tick needs Python */
     void (*advance)(void *what, double dt);
     void (*resume)(void *what, double stall);  /* s */
     void *what;

@@ -184,7 +184,7 @@ class TickThread(threading.Thread):
     def __init__(self, name: str, rate: float, failed: Callable[[BaseException], None]) -> None:
         super().__init__(name=name, daemon=True)
         self.rate = rate
-        #: Shared with what ticks outside the interpreter.
+        #: Counters that are shared with ticks outside the interpreter.
         self.count = native.Counters()
         self._failed = failed
         self._ending = threading.Event()

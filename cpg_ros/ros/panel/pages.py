@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The open pages: the robot that each shows, its limits, and what it is sent."""
+"""The open pages: the robot that each shows, checks of its requests, and messages to it."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping

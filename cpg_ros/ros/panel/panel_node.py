@@ -466,7 +466,7 @@ class Panel(StartedNode):
             self._views[name].ready()
             self._views[name].teleop.update()
         for page in self._pages.everyone:
-            # A page never turns to another robot by itself, whoever steers that.
+            # A page never changes to another robot by itself.
             if not page.node and (first := self._first()):
                 self._choose(page, first)
 

@@ -176,7 +176,7 @@ async def robot_info(watch: Node, services: ServiceClients, graph: Graph, genera
     Args:
         watch: a node that is not spun.
         services: clients of other nodes.
-        graph: what is on it.
+        graph: nodes and topics.
         generator: full name of the node that moves the robot.
         robot: its robot file.
         urdf: file that the user names, '' for none.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The page's files and its socket, on one port."""
+"""The panel's web server: access control, the page's files, recordings and the socket."""
 
 import asyncio
 from collections.abc import Awaitable, Callable

@@ -208,7 +208,7 @@ class _StandingLeg:
         return np.clip(np.round(best, 3), self.low, self.high) + 0.0
 
     def _way(self, angles: np.ndarray) -> float:
-        """Return what it costs to have the knee on this side: behind, on two legs before."""
+        """Return the cost of a knee on this side: less behind, or on two legs in front."""
         if self.aside is not None:
             return 0.0
         points = self.chain.posed(angles)[1]

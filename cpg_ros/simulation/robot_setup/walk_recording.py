@@ -19,9 +19,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.common.errors import ShortRepr
+from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
 from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.fitting.gaits.leg_names import CODES
 from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
@@ -132,6 +133,8 @@ class WalkRecording(ShortRepr):
 def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> WalkRecording:
     """Read the sensor data that feedback takes from a bag.
 
+    Unitree's LowState has all of them but the phase; it is read where the bag has no joint states.
+
     Args:
         path: the bag.
         robot: whose joints and legs are read.
@@ -144,12 +147,19 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     """
     # Loaded here: what tunes gaits needs no bags.
     from cpg_ros.fitting.recordings.bag_storage import opened
+    from cpg_ros.fitting.recordings.low_state import LOW_STATE
     from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
 
     path = Path(path)
     names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
     with opened(path) as bag:
         kinds = {one.topic: one.msgtype for one in bag.connections}
+        dogs = [topic for topic, kind in kinds.items() if kind == LOW_STATE]
+        if dogs and kinds.get(names['joint_states']) != TYPES['joint_states']:
+            given, counts = names['joint_states'], bag.expected()
+            return _of_low_states(path, robot, [
+                (received, data) for _, received, data in bag.messages(
+                    [given if given in dogs else max(dogs, key=counts.__getitem__)])])
         for key, topic in list(names.items()):
             if key in OPTIONAL and topic not in kinds:
                 del names[key]
@@ -223,6 +233,34 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
                     to_imu('foot_contacts', loads, at), rpy_of(turned),
                     vectors('angular_velocity'), vectors('linear_acceleration'))
     return WalkRecording(str(path), joints, times, senses, phase)
+
+
+def _of_low_states(path: Path, robot: Robot, states: Sequence[tuple[int, bytes]]
+                   ) -> WalkRecording:
+    from cpg_ros.fitting.recordings.low_state import decode_low_states, low_states
+    received = np.array([at for at, _ in states], dtype=np.int64)
+    stamps, keep = np.unique(received, return_index=True)
+    if len(keep) < 2:
+        raise RecordingError(f'{path}: {len(keep)} messages of LowState')
+    times, messages = 1e-9 * (stamps - stamps[0]), [states[k][1] for k in keep]
+    feet = [CODES[code] for code in ('fr', 'fl', 'rr', 'rl')]
+    if set(robot.legs) != set(feet):
+        raise RecordingError(f'{path}: LowState is of the legs {", ".join(feet)}, where the robot '
+                             f'has {", ".join(robot.legs)}')
+    try:
+        own = low_states(messages)
+        (block,) = decode_low_states(messages, robot.order, True)
+    except CpgError as error:
+        raise RecordingError(f'{path}, LowState: {error}') from error
+    joints = tuple(joint.name for joint in robot.joints)
+    if lacking := [name for name in joints if name not in block.names]:
+        raise RecordingError(f"{path}: LowState has no joint '{lacking[0]}'")
+    places = [block.names.index(name) for name in joints]
+    return WalkRecording(str(path), joints, times, SensorData(
+        block.positions[:, places], block.velocities[:, places],
+        own['feet'][:, [feet.index(leg) for leg in robot.legs]].astype(float),
+        rpy_of(own['quaternion'].astype(float)), own['gyroscope'].astype(float),
+        own['accelerometer'].astype(float)))
 
 
 def _stamp(message: Any) -> float:

@@ -305,7 +305,7 @@ class TunedFeedback:
         without: survivors without feedback.
         before: with the gains that the search began with.
         after: with those that it found.
-        lost: those of before that are none of after.
+        lost: survivors before that are not survivors after.
         fell: undisturbed runs that fell with these.
 
     """

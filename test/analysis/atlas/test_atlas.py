@@ -20,9 +20,9 @@ import json
 from cpg_ros.analysis.atlas import atlas, fold_curves
 from cpg_ros.analysis.atlas import orbit_curves as curves
 from cpg_ros.analysis.atlas.chart import chart_of
-from cpg_ros.analysis.atlas.grid import GaitMap, grid_indices, refine, uncrossed_edges
+from cpg_ros.analysis.atlas.grid import GaitMap, refine, uncrossed_edges
 from cpg_ros.analysis.atlas.hopf_curves import curves_from, hopf_curves, hopf_starts
-from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow, leading_multipliers, LOCKED, NONE
+from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow, LOCKED, NONE
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
@@ -113,7 +113,7 @@ def test_a_row_is_where_the_formula_says_and_as_orbits_alone_are():
     assert one['label'] == LOCKED
     assert one['period'] == pytest.approx(orbit.period, rel=1e-9)
     assert one['leading'] == pytest.approx(judged.leading, rel=1e-4)
-    assert leading_multipliers(orbit)[2] == (np.abs(judged.transverse) >= 1.0).sum()
+    assert one['unstable'] == judged.unstable == (np.abs(judged.transverse) >= 1.0).sum()
 
 
 def test_a_torus_curve_has_a_pair_on_the_unit_circle(monkeypatch):
@@ -143,7 +143,7 @@ def test_a_curve_of_folds_is_where_branches_turn(monkeypatch):
     chart = chart_of('quadruped', preset.network, [('xi', (-0.05, 0.05)),
                                                    ('alpha=beta', (0.1, 0.2))], (9, 9))
     monkeypatch.setattr(fold_curves, 'SHORTEST', 0.02)
-    found = fold_curves.continue_fold(chart, first.place, 0.0, 1.0)
+    found = fold_curves.continue_fold(chart, first.curve_point, 0.0, 1.0)
     assert len(found) >= 10
     xi, fold = found[3]
     network = replace(preset.network, xi=xi)
@@ -215,8 +215,8 @@ def test_points_of_codimension_two_are_listed_and_marked(drawn):
 
 @pytest.mark.parametrize('count', [2, 3, 9, 12, 20, 200])
 def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
-    assert grid_indices(count, 1) == list(range(count))
     chart = chart_of('delayed', TROT, OVER, (count, 9))
+    assert chart.first.indices(1) == list(range(count))
 
     def run(jobs, number):
         for row in jobs:

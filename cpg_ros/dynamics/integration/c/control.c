@@ -1,6 +1,6 @@
 
 #define SHORTEST R(0.05)
-/* Longest ramp or fade, and longest tick, s. */
+/* LONGEST: longest ramp or fade, s; LONGEST_TICK: longest tick, s. */
 #define LONGEST R(3600.0)
 #define LONGEST_TICK R(1.0)
 
@@ -46,7 +46,7 @@ void cpg_switch(cpg *c, uint8_t gait, cpg_real transition)
 }
 
 #ifdef CPG_STEERING
-/* A comparison that NaN fails keeps the target. */
+/* NaN fails this comparison, so that it keeps the target. */
 static void aim(cpg_real *target, cpg_real value, cpg_real low, cpg_real high)
 {
     if (value >= low || value < low) {
@@ -90,7 +90,7 @@ void cpg_advance(cpg *c, cpg_real dt)
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS];
     dt = time_within(dt, R(0.0), LONGEST_TICK);
 #ifdef CPG_STEERING
-    /* Of this struct, also where it has been copied. */
+    /* Point to the strides of this struct, which may have been copied. */
     for (int16_t n = 0; n < c->tracks; n++) {
         c->track[n].stride = c->drive.now;
     }

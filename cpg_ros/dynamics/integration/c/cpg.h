@@ -18,7 +18,7 @@ typedef @REAL@ cpg_real;
 
 @DEFINES@
 
-/* Gaits that may fade into one another at a time; each takes the memory of a cpg_track. */
+/* Most gaits that fade into one another at a time; each takes the memory of a cpg_track. */
 #ifndef CPG_TRACKS
 #define CPG_TRACKS @TRACKS@
 #endif
@@ -29,7 +29,7 @@ typedef @REAL@ cpg_real;
 
 typedef struct {
     uint8_t gait;
-    cpg_real transition, progress;  /* s, and how much of it is over */
+    cpg_real transition, progress;  /* s, and the share of it that is over */
     cpg_real phase, phase_carry;    /* of the first leg, cycles */
     cpg_real angle[CPG_JOINTS];     /* from the stand, rad */
     cpg_real rise[CPG_JOINTS];      /* its derivative by phase, rad per cycle */
@@ -80,7 +80,7 @@ typedef struct cpg {
     cpg_real velocity[CPG_JOINTS];  /* rad/s */
     cpg_real level;                 /* 0 at the stand, 1 in the full gait */
     uint8_t held;                   /* joints that a limit held back in this tick */
-    /* What follows is its own. */
+    /* Private: the fields below are for the functions alone. */
     uint8_t tracks, waiting, followed;
     uint8_t behind[CPG_JOINTS];
     cpg_track track[CPG_TRACKS];
@@ -95,28 +95,28 @@ typedef struct cpg {
 /* Stand, every joint at its offset, then go into a gait within ramp s. */
 void cpg_start(cpg *c, uint8_t gait, cpg_real ramp);
 
-/* Advance by dt s and fill position and velocity: by nothing if dt is negative or no number, and by
- * 1 s at most. */
+/* Advance by dt s and fill position and velocity. A negative dt and NaN count as 0, and more than
+ * 1 s as 1 s. */
 void cpg_advance(cpg *c, cpg_real dt);
 
-/* Change to a gait by a cross-fade in s. If all tracks are taken it waits; of those that wait only
- * the last one matters. A gait that there is not changes nothing. */
+/* Change to a gait by a cross-fade of transition s. If all tracks are taken, the gait waits and
+ * replaces one that already waits. An unknown gait changes nothing. */
 void cpg_switch(cpg *c, uint8_t gait, cpg_real transition);
 
 /* Ramp into the gait (1), or down to the stand (0), within a time in s. */
 void cpg_enable(cpg *c, uint8_t enabled, cpg_real ramp);
 
 #ifdef CPG_STEERING
-/* Change the strides of the legs, -1 to 1, CPG_LEGS of them, and the pace, 0 to 2: factors of those
- * that the gait has. What is no number changes nothing. */
+/* Change the strides of the legs, -1 to 1, an array of CPG_LEGS, and the pace, 0 to 2: factors of
+ * the gait's own. NaN changes nothing. */
 void cpg_steer(cpg *c, const cpg_real *stride, cpg_real pace);
 #endif
 
-/* Return the phases of the legs in cycles, 0 where the leg's cell peaks, CPG_LEGS of them. */
+/* Return the phases of the legs, CPG_LEGS of them, in cycles; 0 is where the leg's cell peaks. */
 const cpg_real *cpg_leg_phases(const cpg *c);
 
 #ifndef CPG_TABLE
-/* Change the newest gait's delay, model time, from now on: one step to CPG_MAX_DELAY of them. */
+/* Change the newest gait's delay, model time, from now on: from 1 to CPG_MAX_DELAY steps. */
 void cpg_set_delay(cpg *c, cpg_real delay);
 
 /* Start a network from a constant past, and take one step of it: for tests. */
@@ -157,7 +157,7 @@ typedef struct {
     cpg_real in_place[CPG_JOINTS][CPG_WEIGHTS];  /* for strides of length 0 */
 #endif
 #ifdef CPG_RETIMED
-    cpg_real maps[CPG_MAPS][3];   /* k, centre and own: what the duty factor makes of a phase */
+    cpg_real maps[CPG_MAPS][3];   /* k, centre and own: the duty factor's map of a phase */
 #endif
 #ifdef CPG_PHASE_READOUT
     CPG_ROM cpg_real *shapes;     /* [wave]: mean and half range of both variables */

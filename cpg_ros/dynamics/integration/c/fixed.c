@@ -1,11 +1,12 @@
 #define CPG_INTERNAL
 #include "cpg.h"
 
-/* Shares, levels and clocks have 14 bits after the point, what adds up over ticks 30. */
+/* Shares, levels and clocks have 14 bits after the point, sums over ticks 30. */
 #define ONE 16384
 #define WHOLE 1073741824
 
-/* a >> bits, at most 16 of them, without a loop over bits on processors that have no such shift. */
+/* a >> bits, at most 16 of them, without a loop over bits on processors that have no such shift.
+ * */
 static int16_t down(int32_t a, uint8_t bits)
 {
     return (int16_t)((int16_t)(a >> 16) * (int16_t)(1 << (16 - bits)) + ((uint16_t)a >> bits));
@@ -17,7 +18,7 @@ static int16_t part(int16_t a, int16_t q)
     return down((int32_t)a * q + ONE / 2, 14);
 }
 
-/* Of a share of 14 bits the one of 16, but for the last of them. */
+/* Return a share of 14 bits as one of 16 bits, in which 1 becomes the largest number. */
 static uint16_t finer(int16_t share)
 {
     return share < ONE ? (uint16_t)((uint16_t)share * 4U) : UINT16_MAX;
@@ -34,13 +35,13 @@ static int32_t scaled(int32_t a, int16_t q)
     return (int32_t)(int16_t)(a >> 16) * q * 4 + (((int32_t)(uint16_t)a * q) >> 14);
 }
 
-/* A share that becomes 1 in so many ticks. */
+/* Return the share per tick that adds up to 1 in a number of ticks. */
 static int32_t step_of(uint16_t ticks)
 {
     return WHOLE / (ticks > CPG_SHORTEST ? ticks : CPG_SHORTEST);
 }
 
-/* The step at which a level covers a way, 2^-14, at a rate. */
+/* Return the share per tick with which a level covers a distance, 2^-14, at a rate. */
 static int32_t step_over(int32_t rate, int32_t way)
 {
     const int32_t quotient = rate / way, most = step_of(0) / ONE;
@@ -63,7 +64,7 @@ static int16_t smoothstep(int16_t s, int16_t *rate)
     return (int16_t)(square + 2 * part(square, left));
 }
 
-/* Plan the level's way to its end from its present value and rate, without overshoot. */
+/* Plan the path of the level from its present value and rate to its end, without overshoot. */
 static void ramp_to(cpg *c, int16_t end, uint16_t ticks)
 {
     int16_t level = c->level;
@@ -71,7 +72,7 @@ static void ramp_to(cpg *c, int16_t end, uint16_t ticks)
     c->ramp_parts = 0;
     c->ramp_past = 0;
     if ((rate > 0 && end < level) || (rate < 0 && end > level)) {
-        /* Turned round half way: brake first, within half of the room that is left. */
+        /* The level moves away from its end: brake first, within half of the room that is left. */
         const int16_t room = (int16_t)(((rate > 0 ? ONE : 0) - level) / 2);
         if (room != 0) {
             const cpg_ramp_part first = {level, (int16_t)(level + room),
@@ -194,7 +195,7 @@ static int16_t read_joint(CPG_ROM cpg_gait_joint *of, uint16_t phase, uint16_t f
     return (int16_t)(of->shift + lookup(table, phase));
 }
 
-/* One gait, at the stand or in full swing: nothing to mix. */
+/* Compute a tick of one gait, at the stand or in full swing. */
 static void cruise(cpg *c)
 {
     cpg_track *t = &c->track[0];
@@ -210,14 +211,14 @@ static void cruise(cpg *c)
     }
 }
 
-/* A product as a rate; what is beyond these limits is slowed just as much. */
+/* A product as a rate; rates beyond these limits are slowed as much as rates at them. */
 static int16_t rate_of(int32_t product)
 {
     const int16_t most = 1 << (CPG_TERM_BITS - 3), high = (int16_t)(product >> 16);
     return high >= most ? 8191 : high < -most ? -8192 : down(product, CPG_TERM_BITS);
 }
 
-/* A tick in which gaits fade or the ramp moves. */
+/* Compute a tick in which gaits fade or the ramp moves. */
 static void blend(cpg *c)
 {
     const int16_t clock = (int16_t)((uint16_t)(c->slowing + (uint16_t)c->slower) / 2);
@@ -269,7 +270,7 @@ static void blend(cpg *c)
             angle = share_of(angle, level);
         }
         move(c, joint, angle);
-        /* The pattern slows where it would outrun the gaits in the next tick. */
+        /* Slow the clock if a joint would exceed its speed bound in the next tick. */
         const int16_t last = c->followed ? c->last_rate[joint] : speed;
         const int16_t half = (int16_t)(speed - (last >> 1));
         const uint16_t size = (uint16_t)((uint16_t)(half < 0 ? -half : half) * 2U);

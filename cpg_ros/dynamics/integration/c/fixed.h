@@ -1,8 +1,8 @@
 /* @TITLE@
  *
- * In whole numbers. cpg_start once, then cpg_advance CPG_RATE times a second: the position of every
- * joint. Between ticks cpg_switch changes the gait and cpg_enable ramps to the stand and back.
- * Nothing here allocates memory, calls itself or waits; a struct cpg holds all that changes.
+ * In whole numbers. cpg_start once, then cpg_advance CPG_RATE times a second: the position of
+ * every joint. Between ticks cpg_switch changes the gait and cpg_enable ramps to the stand and
+ * back. Nothing here allocates memory, calls itself or waits; a struct cpg holds all that changes.
  */
 #ifndef CPG_H
 #define CPG_H
@@ -26,7 +26,7 @@ extern "C" {
 typedef struct {
     uint8_t gait;
     uint32_t phase;                /* of the orbit, 2^-32 cycles */
-    int32_t progress, step;        /* of a fade, and how much of it a tick is: 2^-30 */
+    int32_t progress, step;        /* share of a fade that is over, and that of a tick, 2^-30 */
 } cpg_track;
 
 typedef struct {
@@ -38,7 +38,7 @@ typedef struct cpg {
     int16_t position[CPG_JOINTS];  /* 2^-13 rad, leg by leg */
     int16_t level;                 /* 0 at the stand, 2^14 in the full gait */
     uint8_t held;                  /* joints that a limit held back in this tick */
-    /* What follows is its own. */
+    /* Private: the fields below are for the functions alone. */
     uint8_t tracks, ramp_parts, waiting, followed;
     cpg_track track[2];
     cpg_ramp_part ramp[2];
@@ -47,21 +47,21 @@ typedef struct cpg {
     int16_t last_rate[CPG_JOINTS];
 } cpg;
 
-/* Stand, every joint at its offset, then go into a gait within so many ticks. */
+/* Stand, every joint at its offset, then go into a gait within ramp ticks. */
 void cpg_start(cpg *c, uint8_t gait, uint16_t ramp);
 
 /* Advance by a tick and fill position. */
 void cpg_advance(cpg *c);
 
-/* Change to a gait by a cross-fade in ticks. While gaits fade it waits; of those that wait only the
- * last one matters. A gait that there is not changes nothing. */
+/* Change to a gait by a cross-fade of transition ticks. While gaits fade, the gait waits and
+ * replaces one that already waits. An unknown gait changes nothing. */
 void cpg_switch(cpg *c, uint8_t gait, uint16_t transition);
 
-/* Ramp into the gait (1), or down to the stand (0), within so many ticks. */
+/* Ramp into the gait (1), or down to the stand (0), within ramp ticks. */
 void cpg_enable(cpg *c, uint8_t enabled, uint16_t ramp);
 
-/* Return the phase of a leg, 2^-16 cycles, 0 where the leg's cell peaks; of one that there is not,
- * that of the first. */
+/* Return the phase of a leg, 2^-16 cycles, 0 where the leg's cell peaks; the first leg's for an
+ * unknown leg. */
 uint16_t cpg_leg_phase(const cpg *c, uint8_t leg);
 
 #ifdef CPG_INTERNAL
@@ -74,7 +74,7 @@ uint16_t cpg_leg_phase(const cpg *c, uint8_t leg);
 
 typedef struct {
     int16_t shift;           /* from the stand to where the gait swings about */
-    uint16_t bound;          /* fastest that a fade may be, in units of rates */
+    uint16_t bound;          /* largest rate in a fade, in units of rates */
     uint16_t phase;          /* 2^-16 cycles */
     CPG_ROM int16_t *table;  /* 256 angles over a cycle, 256 slopes */
 } cpg_gait_joint;
@@ -88,7 +88,7 @@ typedef struct {
 
 typedef struct {
     int16_t offset, low, high;
-    uint16_t reach;          /* farthest in a tick */
+    uint16_t reach;          /* largest change in a tick */
 } cpg_joint;
 
 extern CPG_ROM cpg_gait cpg_gaits[CPG_GAITS];

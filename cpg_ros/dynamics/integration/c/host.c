@@ -1,11 +1,12 @@
 
-/* Jumps are absorbed over this time, s. */
+/* ABSORB: time over which jumps are absorbed, s. */
 #define ABSORB 0.3
-/* The clock is slowed in for as long as a stall was, but no longer than this, s. */
+/* LONGEST: longest time for which the clock runs slow after a stall, s; otherwise as long as the
+ * stall. */
 #define LONGEST 0.5
 
-/* No ramp or fade is shorter, s: the clock is slowed from substep to substep, and a joint that has
- * to get up to speed within one would outrun its limit before that. */
+/* SHORTEST: least duration of a ramp or fade, s. The clock adapts from substep to substep: a joint
+ * that accelerated within a single one would exceed its speed limit before the clock slows. */
 #define SHORTEST 0.05
 
 void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
@@ -13,7 +14,7 @@ void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
     ramp_to(ramp, end, most(time, SHORTEST));
 }
 
-/* Lead the joints from where they were found to the stand, none faster than half of its limit. */
+/* Lead the joints from their first angles to the stand, none faster than half of its limit. */
 void cpg_lead_in(cpg *c, cpg_real time)
 {
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
@@ -23,7 +24,7 @@ void cpg_lead_in(cpg *c, cpg_real time)
     cpg_ramp_to(&c->lead, 0.0, time);
 }
 
-/* Take what other threads ask for. */
+/* Take the requests of other threads. */
 void cpg_take(cpg *c)
 {
     cpg_real go = 0.0;
@@ -41,13 +42,13 @@ void cpg_take(cpg *c)
             cpg_track_reseed(t, c->track[c->tracks - 1]->phase);
             c->track[c->tracks] = t;
             __atomic_store_n(&c->tracks, c->tracks + 1, __ATOMIC_RELEASE);
-            /* Unless another one waits by now. */
+            /* Keep a request that has come meanwhile. */
             __atomic_compare_exchange_n(&c->waiting, &t, 0, 0, __ATOMIC_ACQ_REL, __ATOMIC_RELAXED);
         }
     }
 }
 
-/* Take over what is wanted; the difference after a jump decays smoothly. */
+/* Take over the wanted angles; the difference after a jump decays smoothly. */
 static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *rate)
 {
     const uint8_t absorbing = c->absorbed < ABSORB;
@@ -78,7 +79,7 @@ static cpg_real pace_at(const cpg *c, cpg_real s)
     return c->stall_low + (1.0 - c->stall_low) * smoothstep(s, &rate);
 }
 
-/* Slow the clock in after a stall in s: the longer, the more the joints have stopped. */
+/* Slow the clock after a stall in s: the longer the stall, the more the joints have stopped. */
 void cpg_resume(cpg *c, cpg_real stall)
 {
     const cpg_real pace = c->stall > 0.0 ? pace_at(c, c->stall_past / c->stall) : 1.0;
@@ -87,7 +88,7 @@ void cpg_resume(cpg *c, cpg_real stall)
     c->stall_past = 0.0;
 }
 
-/* Return how far a slowed clock goes in dt, s; pace is that at the end of it. */
+/* Return the time by which a slowed clock advances in dt, s; pace is its rate at the end. */
 static cpg_real slowed_in(cpg *c, cpg_real dt, cpg_real *pace)
 {
     const cpg_real time = c->stall, low = c->stall_low, before = c->stall_past / time;
@@ -105,7 +106,7 @@ static cpg_real slowed_in(cpg *c, cpg_real dt, cpg_real *pace)
     return way;
 }
 
-/* Where the joints are wanted after dt s, and how fast, before any correction. */
+/* Compute the wanted angles and rates of the joints after dt s, before any correction. */
 void cpg_plan(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS], clock = dt;
@@ -131,7 +132,7 @@ void cpg_plan(cpg *c, cpg_real dt)
     }
 }
 
-/* Take joints to where they are wanted, or to the goal that a correction makes of it. */
+/* Move the joints to the wanted angles, or to the goal of a correction. */
 void cpg_follow(cpg *c, cpg_real dt, int corrected)
 {
     cpg_real rate[CPG_JOINTS];
@@ -152,8 +153,8 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
     c->state = newest->net.now;
 }
 
-/* What a correction goes by: level, phase of the first leg, share of the gait that is entered,
- * strides per second, whether the gait changes; and the gait that is left, and the entered one. */
+/* Fill the inputs of a correction: level, phase of the first leg, share of the gait that is
+ * entered, strides per second, whether the gait changes; keys of both gaits, the entered last. */
 void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
 {
     const cpg_track *newest = c->track[c->tracks - 1];

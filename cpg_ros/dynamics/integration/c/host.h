@@ -45,7 +45,7 @@ typedef struct {
 typedef struct {
     const cpg_gait *gait;
     void (*advance)(void *lane, cpg_real *clock, cpg_real duration, cpg_real *now);
-    cpg_net net, home, seed;  /* in use; the track's own; on the orbit at phase 0 */
+    cpg_net net, home, seed;  /* net: in use; home: the track's own; seed: on the orbit, phase 0 */
     cpg_real transition, progress, phase, phase_carry;
     cpg_real settling, calm, still, astray;  /* strides */
     cpg_real distance, sum;
@@ -82,9 +82,9 @@ typedef struct {
     cpg_ramp ramp, lead;
     cpg_real slowing, slower, frequency, frequency_scale, substep, absorbed, fraction;
     cpg_real stall, stall_past, stall_low;
-    /* Of the newest track, after each tick. */
+    /* Phases and state of the newest track, after each tick. */
     const cpg_real *legs, *state;
-    /* What other threads ask for: a ramp to the gait, or down if negative, s; a gait to fade to. */
+    /* Requests of other threads. go: ramp to the gait, or down if negative, s; waiting: gait. */
     cpg_real go;
     cpg_track *waiting;
 } cpg;

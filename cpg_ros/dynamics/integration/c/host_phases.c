@@ -1,7 +1,7 @@
 
 #define PHASE_SHARE 4.0
 
-/* A phase off by a quarter of PHASE_SHARE (cycles) counts as far off as a half range. */
+/* PHASE_SHARE: weight of an error of phase, cycles, relative to one of the state, half ranges. */
 static void watch_phases(cpg_track *t, cpg_real strides)
 {
     const cpg_gait *gait = t->gait;

@@ -1,11 +1,11 @@
 
-/* Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead of
- * the clock by this share of a cycle, for longer than this many strides. */
+/* A network is off its orbit if, for more than PATIENCE strides, a cell is further away than the
+ * share FAR of the peak, or the phase differs from the clock by more than ASTRAY cycles. */
 #define FAR 0.3
 #define ASTRAY 0.15
 #define PATIENCE 0.5
 
-/* Read joints and legs off a track, so many strides after the last time. */
+/* Read joints and legs off a track, a number of strides after the last time. */
 void cpg_track_look(cpg_track *t, cpg_real strides)
 {
     t->distance = t->sum = 0.0;
@@ -17,7 +17,7 @@ void cpg_track_look(cpg_track *t, cpg_real strides)
 static uint8_t settle(cpg_track *t, cpg_real strides)
 {
     const cpg_gait *gait = t->gait;
-    /* A stride on the orbit is the end of it; for an instant a small state may look so. */
+    /* It has settled after a whole stride on the orbit: a small state may look so at times. */
     t->calm = t->distance < FAR / 3.0 ? t->calm + strides : 0.0;
     t->settling = t->calm > 1.0 ? 0.0 : t->settling - strides;
     cpg_real moving = 0.0;

@@ -1,9 +1,9 @@
 
-/* How far the network is from where its gait has it: the largest of what is watched. */
+/* Return the largest distance of a watched value from the gait's orbit. */
 static void watch(cpg_track *t, cpg_real off)
 {
     t->distance = most(t->distance, fabs(off));
-    /* The largest may lose a NaN; the sum keeps it. */
+    /* The maximum may lose a NaN, which the sum keeps. */
     t->sum += off;
 }
 

@@ -32,7 +32,7 @@ void advance(cpg_track *t, cpg_real *clock, cpg_real duration, cpg_real out[3][C
     }
 }
 
-/* Take steps, the first one number `row`, and keep each so many states and slopes. */
+/* Take steps, the first one number `row`, and record states and slopes at regular steps. */
 int steps(cpg_track *t, int head, int count, int every, int row, cpg_real *states,
           cpg_real *slopes)
 {

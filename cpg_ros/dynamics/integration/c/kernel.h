@@ -1,4 +1,4 @@
-/* What network.c needs where the sizes of a history are known at run time only. */
+/* Definitions for network.c if the sizes of a history are known at run time only. */
 #include <stdint.h>
 #include <string.h>
 

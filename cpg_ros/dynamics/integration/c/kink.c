@@ -1,5 +1,6 @@
 
-/* The slope that arrives at a node: that which leaves it, but where parameters have changed. */
+/* Return the slope that arrives at a node, which differs from the one that leaves it only where
+ * parameters have changed. */
 static const cpg_real *arriving(const cpg_track *t, int16_t node)
 {
     return node == t->kink ? t->before : t->slope[node];
@@ -16,7 +17,7 @@ static void begin_kink(cpg_track *t)
     }
 }
 
-/* A node that is new has one slope. */
+/* A new node has one slope. */
 static void end_kink(cpg_track *t, int16_t node)
 {
     if (t->kink == node) {

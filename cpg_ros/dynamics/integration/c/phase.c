@@ -25,7 +25,7 @@ static void begin_clocks(cpg_track *t, cpg_real phase)
     }
 }
 
-/* Draw a cell's clock to what the cell does; now is its first two variables. */
+/* Correct a cell's clock by the cell's state; now is its first two variables. */
 static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_real *now)
 {
     CPG_ROM cpg_gait *gait = gait_of(t);

@@ -1,4 +1,4 @@
-/* Strides and pace approach their targets with this time constant, s. */
+/* Time constant with which strides and pace approach their targets, s. */
 #define TIME_CONSTANT R(0.2)
 
 /* e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target. */
@@ -27,7 +27,7 @@ static void approach(cpg_drive *drive, int16_t legs, cpg_real dt)
     }
 }
 
-/* Advance what steers, if anything does; return the pace. */
+/* Advance the steering, if there is one; return the pace. */
 static cpg_real steered(cpg *c, cpg_real dt)
 {
     if (!STEERED(c)) {

@@ -19,7 +19,7 @@ static cpg_real periodic(CPG_ROM cpg_real *table, int16_t width, cpg_real cycles
     return value;
 }
 
-/* Replace x, y and their derivatives by those at the phase that the duty factor makes of theirs. */
+/* Replace x, y and their derivatives by those at the phase that the duty factor maps to. */
 static void retime(CPG_ROM cpg_gait *gait, CPG_ROM cpg_real *map, cpg_real z, cpg_real *x,
                    cpg_real *y, cpg_real *dx, cpg_real *dy)
 {

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node ``servo_bridge``: drives a robot of servo motors by what a generator publishes."""
+"""The node ``servo_bridge``: drives a robot of servo motors from a generator's output."""
 
 import secrets
 import sys

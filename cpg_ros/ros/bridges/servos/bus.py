@@ -125,7 +125,7 @@ SPECS = fixed({
 QUIET = 5.0
 #: QUEUE: most commands that wait for a tick.
 QUEUE = 100
-#: How often the network is checked for others who command the servos, s.
+#: LOOK: period in which the graph is checked for others who command the servos, s.
 LOOK = 0.25
 #: SHOWN: time for which /diagnostics reports a refused command, s.
 SHOWN = 2.0
@@ -153,14 +153,14 @@ class ServoBus(StartedNode):
                              'robot in its rest pose, and set no_position_feedback to true')
         self._reads = not blind
         self._timeout: float = self._value('command_timeout')
-        # Room for those of others, which must not displace the owner's.
+        # Leave room for the commands of other senders, which must not displace the owner's.
         self._commands = PolledSubscription(self, Float64MultiArray, Servos.command_topic,
                                             QoSProfile(depth=QUEUE))
         self._owner = CommandOwner(Servos.watchdog_name())
         self._publisher = self.create_publisher(JointState, Servos.state_topic, command_qos())
-        #: Where servos that cannot be asked are taken to be: at rest, until they are commanded.
+        #: Assumed angles of servos that cannot be read, rad: at rest until they are commanded.
         self._assumed = self._calibration.rest
-        #: When the owner, and one whose commands are refused, last commanded angles, s.
+        #: Times of the last commands of the owner, and of a refused sender, s.
         self._commanded_at = self._refused_at = -math.inf
         self._refusal = self._others = self._senders = ''
         self._reason = 'not commanded yet'

@@ -91,7 +91,7 @@ class Pca9685(ServoBoard):
         """
         self._bus, self._channels = bus, channels
         scale = prescale(frequency)
-        # A count has this many microseconds: what PRE_SCALE was rounded to, not what was wanted.
+        # Duration of a count, us, by the rounded PRE_SCALE, not by the wanted frequency.
         self._count = 1e6 * (scale + 1) / OSCILLATOR
         self.detach()
         # PRE_SCALE can be written while the oscillator is off only.

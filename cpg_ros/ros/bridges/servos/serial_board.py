@@ -60,7 +60,7 @@ class SerialPort:
         """Open a port such as ``/dev/ttyUSB0``.
 
         Raises:
-            ServoError: the baud rate is none that Linux knows by name.
+            ServoError: Linux does not support the baud rate.
             OSError: the port cannot be opened, or is no serial port.
 
         """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node ``unitree_bridge``: drives a Unitree robot by what a generator publishes."""
+"""The node ``unitree_bridge``: drives a Unitree robot from a generator's output."""
 
 from collections.abc import Callable, Mapping
 from importlib import import_module
