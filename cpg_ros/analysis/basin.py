@@ -152,7 +152,7 @@ def end_of(run: Trajectory, orbit: Orbit) -> str:
 
 
 def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
-    """Whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
+    """Return whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
     points = len(cycle.signals)
     exact = orbit(np.arange(points) / points * orbit.period)
     seen = np.fft.rfft(cycle.signals - cycle.signals.mean(axis=0), axis=0)

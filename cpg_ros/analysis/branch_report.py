@@ -141,7 +141,7 @@ def _span(analysis: Analysis) -> tuple[float, float]:
 
 
 def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
-    """Whether a branch passes through an orbit."""
+    """Return whether a branch passes through an orbit."""
     try:
         return any(abs(other.period / orbit.period - 1.0) < 1e-6 for other in branch.at(value))
     except NoOrbit:

@@ -287,7 +287,7 @@ def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
 
 
 def _order(score: Score) -> tuple[float, float]:
-    """Smallest phase errors first, then the most stable."""
+    """Return the smallest phase errors first, then the most stable."""
     return np.ceil(score.errors.max() / SAME), score.stability
 
 

@@ -234,7 +234,7 @@ def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
 
 
 def objective_names(symmetry: Symmetry) -> tuple[str, ...]:
-    """Names of the objectives with their units, in the order of Score.objectives."""
+    """Return the names of the objectives with their units, in the order of Score.objectives."""
     names = []
     for group in pairs(symmetry):
         cells = sorted(cell + 1 for cell, _ in group)

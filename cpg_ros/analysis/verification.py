@@ -66,7 +66,7 @@ class VerifiedGait(ShortRepr):
 
 
 def orbit_signals(orbit: Orbit, points: int = POINTS) -> np.ndarray:
-    """States on even points of an orbit's cycle, shape (points, components)."""
+    """Return the states on even points of an orbit's cycle, shape (points, components)."""
     return orbit(np.arange(points) / points * orbit.period)
 
 
@@ -112,13 +112,13 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
 
 
 def _holds(signals: np.ndarray, symmetry: Symmetry) -> bool:
-    """Whether the cells are alive and in phase on the mean of a few noisy cycles."""
+    """Return whether the cells are alive and in phase on the mean of a few noisy cycles."""
     alive = np.ptp(signals[:, :symmetry.group.cells], axis=0).min() >= ALIVE
     return bool(alive and phase_errors(_folded(signals), symmetry).max() <= LOST)
 
 
 def _folded(signals: np.ndarray) -> np.ndarray:
-    """Mean over the cycles of a window, shape (window // CYCLES, components)."""
+    """Return the mean over the cycles of a window, shape (window // CYCLES, components)."""
     points = signals.shape[0] // CYCLES
     return signals[:points * CYCLES].reshape(CYCLES, points, -1).mean(axis=0)
 

@@ -98,7 +98,7 @@ def _warn_untrusted(reason: str) -> None:
 
 
 def _writable_by_others(status: os.stat_result) -> bool:
-    """Whether more than the owner, or a group of the user alone, may write."""
+    """Return whether more than the owner, or a group of the user alone, may write."""
     if status.st_mode & stat.S_IWOTH:
         return True
     if not status.st_mode & stat.S_IWGRP:

@@ -188,7 +188,7 @@ class ResilientExecutor(Executor):
                 yield result
 
     def lost(self, error: BaseException) -> bool:
-        """Whether an error means that the executor broke, not that the job failed."""
+        """Return whether an error means that the executor broke, not that the job failed."""
         return self._renew is not None and isinstance(error, BrokenProcessPool | CancelledError)
 
     def renew(self) -> None:

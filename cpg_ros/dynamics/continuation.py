@@ -135,7 +135,7 @@ def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _winds(slopes: np.ndarray) -> bool:
-    """Whether the value spirals in, or no longer changes."""
+    """Return whether the value spirals in, or no longer changes."""
     return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
 
 

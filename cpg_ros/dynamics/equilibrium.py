@@ -112,12 +112,12 @@ class Quotient(Field[Network]):
 
 
 def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
-    """State of the network with all cells in one state, shape (..., components)."""
+    """Return the state of the network with all cells in one state, shape (..., components)."""
     return np.repeat(cell, network.cells, axis=-1)
 
 
 def odd(network: Network) -> bool:
-    """Whether the network has the symmetry x -> -x."""
+    """Return whether the network has the symmetry x -> -x."""
     return network.symmetry(network.gaits()[0]).odd
 
 
@@ -168,7 +168,7 @@ def _scanned(network: type[Network]) -> int | None:
 
 
 def _roots(cell: Quotient, scanned: int) -> Iterator[np.ndarray]:
-    """States close to those at which ``f0 + F1 y`` vanishes for a y."""
+    """Return the states close to those at which ``f0 + F1 y`` vanishes for a y."""
     n = cell.kept.size
     others = [k for k in range(n) if k != scanned]
 

@@ -86,7 +86,7 @@ class NormalForm:
         return 1 if self.k1.real * self.k2.real < 0.0 else -1
 
     def radius(self, mu: float) -> float:
-        """Radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
+        """Return the radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
 
         Raises:
             NoOrbit: there is none on this side, or the form is degenerate.
@@ -313,7 +313,7 @@ class HopfPoint(ShortRepr):
         return 2.0 * abs(self.vector[0]) * self.normal_form.radius(value - self.value)
 
     def period(self, value: float) -> float:
-        """Period near onset in model time, to first order in value' - value.
+        """Return the period near onset in model time, to first order in value' - value.
 
         Raises:
             NoOrbit: the orbits lie on the other side.

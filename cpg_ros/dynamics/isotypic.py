@@ -244,7 +244,7 @@ class Block(ShortRepr):
         return roots_right_of(bound, self.now, self.past, self.network.delay, self.real)
 
     def within(self, other: 'Block') -> bool:
-        """Whether the class lies in the fixed-point space of the K of the other's gait.
+        """Return whether the class lies in the fixed-point space of the K of the other's gait.
 
         With the symmetry x -> -x, the elements with a shift of 1/2 belong to K, too.
         """

@@ -260,7 +260,7 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
 
 
 def _fits(path: Path, symmetry: Symmetry) -> bool:
-    """Whether a cycle has the symmetry of a gait, and no more."""
+    """Return whether a cycle has the symmetry of a gait, and no more."""
     count = 24 * symmetry.order
     x = path(np.arange(count) / count)[:, :symmetry.group.cells]
     gap = np.abs(x[:, symmetry.turn] - np.roll(x, -24, axis=0)).max()

@@ -185,7 +185,7 @@ class PhaseReadout:
 
 
 def _crest(terms: np.ndarray) -> float:
-    """Phase at which x is largest, cycles, [0, 1)."""
+    """Return the phase at which x is largest, cycles, [0, 1)."""
     grid = np.arange(512) / 512
     place = float(grid[evaluate(terms, grid).argmax()])
     for _ in range(4):

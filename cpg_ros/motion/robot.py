@@ -210,7 +210,7 @@ class Robot(ShortRepr):
         return self.motions.get(preset) or self.motions.get(gait) or Motion()
 
     def networks_with(self, gait: str) -> tuple[str, ...]:
-        """Names of those of its networks that have a gait or preset."""
+        """Return the names of those of its networks that have a gait or preset."""
         return tuple(name for name in self.networks if gait in NETWORKS[name].presets())
 
     def shift(self, motion: Motion) -> np.ndarray:

@@ -240,7 +240,7 @@ def read_robot(path: str | Path) -> Robot:
 
 
 def _alike(cells: Mapping[str, tuple[int, ...]], others: Mapping[str, tuple[int, ...]]) -> bool:
-    """Whether two networks have the same legs, led by the same cells; others may differ."""
+    """Return whether two networks have the same legs, led by the same cells; others may differ."""
     return set(cells) == set(others) and all(cells[leg][0] == others[leg][0] for leg in cells)
 
 

@@ -255,7 +255,7 @@ class NetworkDefinition(ABC):
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
-        """Names of the parameters, in their own order."""
+        """Return the names of the parameters, in their own order."""
         return _names(cls)
 
     @classmethod
@@ -298,7 +298,7 @@ class NetworkDefinition(ABC):
     @classmethod
     @abstractmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the gaits it knows."""
+        """Return the names of the gaits it knows."""
 
     @classmethod
     def by_cell(cls) -> dict[str, tuple[str, ...]]:

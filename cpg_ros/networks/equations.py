@@ -277,7 +277,7 @@ class Field(Generic[AnyDefinition]):
         return out
 
     def rates(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Right-hand side at states, shape (..., d).
+        """Return the right-hand side at states, shape (..., d).
 
         Args:
             now: states, shape (..., d).

@@ -44,7 +44,7 @@ _NUMBERED = re.compile(r'(?P<family>\w*?[a-z_])(?P<legs>\d+)')
 
 
 def pairs(legs: int) -> tuple[str, ...]:
-    """Names of the pairs of legs, hindmost first.
+    """Return the names of the pairs of legs, hindmost first.
 
     Raises:
         InputError: the number is not even, or not from 2 to MOST.
@@ -60,7 +60,7 @@ def pairs(legs: int) -> tuple[str, ...]:
 
 
 def leg_names(legs: int) -> tuple[str, ...]:
-    """Names of the legs, pair by pair from behind, left before right.
+    """Return the names of the legs, pair by pair from behind, left before right.
 
     Raises:
         InputError: as of pairs.

@@ -226,7 +226,7 @@ class Planner:
                 for name, readout in gait_readouts(self.robot, motion).items()}
 
     def _values(self, network: Network) -> dict[str, float]:
-        """Parameters and groups by their bare names."""
+        """Return the parameters and groups by their bare names."""
         values = network.as_dict()
         return {**values, **{group: math.fsum(values[key] for key in members) / len(members)
                              for group, members in network.groups.items()}}

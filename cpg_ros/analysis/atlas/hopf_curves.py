@@ -379,7 +379,7 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
 
 
 def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
-    """Whether a solution lies in the plane, close to the end of the curve."""
+    """Return whether a solution lies in the plane, close to the end of the curve."""
     return bool((fraction >= -1e-9).all() and (fraction <= 1.0 + 1e-9).all()
                 and np.abs(fraction - last[:2]).max() < REACH)
 

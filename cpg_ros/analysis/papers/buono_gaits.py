@@ -237,7 +237,7 @@ def all_subgroups(group: Subgroup) -> frozenset[Subgroup]:
 
 
 def cyclic(h: Subgroup, k: Subgroup) -> bool:
-    """Whether k is normal in h with a cyclic quotient."""
+    """Return whether k is normal in h with a cyclic quotient."""
     return k <= h and all(conjugate(g, k) == k for g in h) and any(
         generated(g, *k) == h for g in h)
 
@@ -421,7 +421,7 @@ class Action:
 
     def _keeps_a_component(self, k: Subgroup, h: Subgroup, basis: np.ndarray, points: np.ndarray
                            ) -> bool:
-        """Whether h fixes a component of Fix(K) - L_K, which only hyperplanes divide."""
+        """Return whether h fixes a component of Fix(K) - L_K, which only hyperplanes divide."""
         normals = []
         for g in self.group - k:
             # (g - 1) on Fix(K) has rank 1 where Fix(g) meets it in a hyperplane.

@@ -136,7 +136,7 @@ class Tables:
 
 
 def square_root(phi: float, psi: float) -> complex:
-    """Square root of ``phi + i psi`` as in eq. 5.3, which holds for psi >= 0 only."""
+    """Return the square root of ``phi + i psi`` as in eq. 5.3, which holds for psi >= 0 only."""
     size = np.hypot(phi, psi)
     return complex(np.sqrt((phi + size) / 2.0), np.sqrt((size - phi) / 2.0))
 
@@ -172,7 +172,7 @@ class Sample:
         return complex(self.trace(name)**2 - 4.0 * np.linalg.det(self.blocks[name].now))
 
     def largest(self, name: str) -> float:
-        """Largest real part of a block's eigenvalues."""
+        """Return the largest real part of a block's eigenvalues."""
         return float(self.blocks[name].roots(2).real.max())
 
 

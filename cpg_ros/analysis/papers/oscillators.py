@@ -112,7 +112,7 @@ def neurons() -> Iterator[ReproducedRow]:
 
 
 def frequency() -> Iterator[ReproducedRow]:
-    """The frequency formula by harmonic balance, where it is exact and where it is not."""
+    """Return the frequency formula by harmonic balance, where it is exact and where it is not."""
     cite = Citation(MATSUOKA, 'frequency (2011)')
     base = _alone(Matsuoka.presets()['trot'].network)
     for a, within in ((1.26, 0.001), (1.5, 0.005), (2.0, 0.015)):

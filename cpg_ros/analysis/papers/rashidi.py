@@ -127,7 +127,7 @@ def cell() -> Iterator[ReproducedRow | Picture]:
 
 
 def _oscillates(sign: float) -> bool:
-    """Whether Table 2's walk still oscillates after 300, u' being multiplied by a sign."""
+    """Return whether Table 2's walk still oscillates after 300, u' being multiplied by a sign."""
     network = printed('walk')
 
     def rates(_: float, x: np.ndarray) -> np.ndarray:

@@ -80,7 +80,7 @@ FEW = 90
 
 
 def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Chebyshev points of [0, 1], the derivative matrix there, and barycentric weights."""
+    """Return Chebyshev points of [0, 1], the derivative matrix there, and barycentric weights."""
     k = np.arange(degree + 1)
     points = 0.5 * (1.0 - np.cos(np.pi * k / degree))
     weights = (-1.0) ** k

@@ -46,7 +46,7 @@ def _circulant(n: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def derivative_matrix(n: int) -> np.ndarray:
-    """Matrix of d/dtheta on nodal values, shape (n, n)."""
+    """Return the matrix of d/dtheta on nodal values, shape (n, n)."""
     return np.fft.irfft(_waves(n), n)[_circulant(n)]
 
 
@@ -87,7 +87,7 @@ def tail(values: np.ndarray) -> float:
 
 
 def resample(values: np.ndarray, n: int) -> np.ndarray:
-    """Nodal values on n nodes, more than there are, of the same interpolant."""
+    """Return the nodal values on n nodes, more than there are, of the same interpolant."""
     return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)
 
 

@@ -87,7 +87,7 @@ class FourierCurve(ShortRepr):
         return solutions[:, 0], solutions[:, 1]
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Half the range of cell 1's first variable; of an odd one its peak."""
+        """Return half the range of cell 1's first variable; of an odd one its peak."""
         row = self._rows(z)[0]
         return float(row[0] if self.symmetry.odd else 0.5 * np.ptp(row))
 
@@ -211,7 +211,7 @@ def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, f
 
 
 def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
-    """Waveforms and period near onset."""
+    """Return the waveforms and period near onset."""
     symmetry = network.symmetry(gait)
     if _simple(network, symmetry):
         return _first_harmonic(network, symmetry)

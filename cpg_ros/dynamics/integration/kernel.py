@@ -113,7 +113,7 @@ def _compiled(numba, network):
 
     @own
     def field(n, system, driven, x, weight, k, work, out):
-        """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
+        """Return the right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
         P projects on the rows of the basis; work is scratch, room for z and for what the rates
         need.
@@ -144,7 +144,7 @@ def _compiled(numba, network):
 
     @own
     def past_state(n, ring, head, back, first, stride, out):
-        """State ``back`` steps before the head node, by the cubic Hermite interpolant.
+        """Return the state ``back`` steps before the head node, by the cubic Hermite interpolant.
 
         Only every stride-th component from first on is filled in.
         """

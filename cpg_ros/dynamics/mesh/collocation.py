@@ -73,7 +73,7 @@ def power_coefficients(left: np.ndarray, slopes: np.ndarray, lengths: np.ndarray
 
 
 def last_share(slopes: np.ndarray) -> np.ndarray:
-    """Size of the last Legendre coefficient of each interval, shape (n,)."""
+    """Return the size of the last Legendre coefficient of each interval, shape (n,)."""
     return np.abs(np.einsum('s,nsd->nd', LEGENDRE[-1], slopes)).max(axis=1)
 
 

@@ -38,6 +38,7 @@ from numpy.polynomial import polynomial
 
 #: RESOLVED: relative size of the last terms of the polynomials at which a mesh is resolved.
 RESOLVED = 1e-11
+#: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
 FEWEST, MOST_INTERVALS = 12, 800
 #: FEW: number of intervals of a first mesh; LOOKED: places of each at which the curvature of the
 #: guess is evaluated.

@@ -232,7 +232,7 @@ class MeshCurve(ShortRepr):
         return columns
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Half the range of cell 1's first variable at the mesh points."""
+        """Return half the range of cell 1's first variable at the mesh points."""
         reduced, now = self._solution(z)
         return float(0.5 * np.ptp(now.points[:, self._columns(reduced)]))
 
@@ -488,7 +488,7 @@ def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
 
 
 def _states(orbit: MeshOrbit, symmetry: Symmetry) -> np.ndarray:
-    """State at phase 0 of the orbit's waveforms with the phases of another symmetry."""
+    """Return the state at phase 0 of the orbit's waveforms with the phases of another symmetry."""
     cells = orbit.network.cells
     out = np.empty(orbit.network.components)
     for cell in range(cells):

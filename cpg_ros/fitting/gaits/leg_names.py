@@ -78,11 +78,11 @@ class Legs:
     unassigned: tuple[str, ...] = ()
 
     def __getitem__(self, leg: str) -> tuple[str, ...]:
-        """Names of a leg's joints."""
+        """Return the names of a leg's joints."""
         return self.joints[leg]
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the legs."""
+        """Return the names of the legs."""
         return iter(self.joints)
 
     def __len__(self) -> int:

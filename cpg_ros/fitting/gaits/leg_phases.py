@@ -348,7 +348,7 @@ def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
 
 
 def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
-    """Distance of leg phases; between different waveforms any phase will do."""
+    """Return the distance of leg phases; between different waveforms any phase will do."""
     squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
                * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
     return float(np.sqrt(sum(squares) / phases.size))

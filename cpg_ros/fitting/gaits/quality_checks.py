@@ -69,7 +69,7 @@ class QualityIssue:
 
 def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
                  ) -> list[QualityIssue]:
-    """Return issues of a frequency from few samples, of a cycle of several strides or no leg's.
+    """Return issues: a mean cycle of several strides, few samples, or a stride that is too slow.
 
     Args:
         frequency: Hz.

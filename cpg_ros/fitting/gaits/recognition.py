@@ -38,7 +38,7 @@ CENTRES = np.linspace(-0.6, 0.6, 13)
 
 
 def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
+    """Return the shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
 
     The largest circular cross-correlation, refined by Newton's method on its Fourier series: no
     single harmonic or extreme decides.

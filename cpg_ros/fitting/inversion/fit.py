@@ -252,7 +252,7 @@ class Optimum(ShortRepr):
         return Estimate(value, float(np.hypot(error, by_model)), low, high, below and above)
 
     def _rise(self, values: np.ndarray, held: int | None = None) -> float:
-        """Distance in standard errors that the cost at values stands for.
+        """Return the distance in standard errors that the cost at values stands for.
 
         With a number that is held, of the least cost that a linear step of the others makes of it:
         where a valley of the cost is curved, a straight line leaves it.

@@ -234,7 +234,7 @@ def _stride(found: RecordingFit) -> list[str]:
 
 
 def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
-    """Rows of the fitted parameters, with a head."""
+    """Return rows of the fitted parameters, with a head."""
     rows: list[tuple[str, ...]] = [('parameter', 'value', 'standard error', '95 % interval')]
     for name, one in found.fit.parameters.items():
         rows.append((name, f'{one.value:.6g}', f'{one.stderr:.2g}',
@@ -245,7 +245,7 @@ def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
 
 
 def joints(found: RecordingFit) -> list[tuple[str, ...]]:
-    """Rows of the joints' errors, with a head."""
+    """Return rows of the joints' errors, with a head."""
     fit = found.fit
     rms, fraction = fit.rms, fit.rms_share
     rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'share of range')]
@@ -255,7 +255,7 @@ def joints(found: RecordingFit) -> list[tuple[str, ...]]:
 
 
 def starts(found: RecordingFit) -> list[tuple[str, ...]]:
-    """Rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
+    """Return rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
     names = found.fit.free
     rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
     for trial in found.fit.starts:

@@ -118,6 +118,6 @@ def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
 
 
 def _highest(explained: np.ndarray, place: tuple[int, ...]) -> bool:
-    """Whether no neighbour on the grid explains more."""
+    """Return whether no neighbour on the grid explains more."""
     near = explained[tuple(slice(max(k - 1, 0), k + 2) for k in place)]
     return bool(explained[place] >= near.max())

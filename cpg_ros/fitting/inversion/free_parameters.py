@@ -275,7 +275,7 @@ class Coordinates:
         return found
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
-        """Values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
+        """Return values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
         found = np.array(coordinates, dtype=float)
         if not self.straight:
             found[self.delay] *= self._onset(found).value

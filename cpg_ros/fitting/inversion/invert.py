@@ -241,7 +241,7 @@ def _numbers(network: Network, gait: str, names: Sequence[str],
 
 
 def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
-    """Values of a start, checked."""
+    """Return values of a start, checked."""
     duty = problem.readout.duty or EVEN
     known = {one.name: one.value(problem.network) if one.members else duty
              for one in problem.free}

@@ -136,7 +136,7 @@ def _facts(found: RecordingFit) -> dict[str, Any]:
 
 
 def _files(task: Task, found: RecordingFit) -> dict[str, str]:
-    """The parameter file and the robot file, as they will be in their folder."""
+    """Return the parameter file and the robot file, as they will be in their folder."""
     with TemporaryDirectory(prefix='cpg_ros_') as folder:
         written = write_fitted(Path(folder, f'{task.name}.yaml'), found, task.settings.robot,
                                robot_file_of(task.folder / f'{task.name}.yaml'))
@@ -144,7 +144,7 @@ def _files(task: Task, found: RecordingFit) -> dict[str, str]:
 
 
 def picture(found: RecordingFit) -> str:
-    """Mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
+    """Return the mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
     recorded, fitted = found.fit.recorded, found.fit.fitted
     span = recorded.max(axis=1) - recorded.min(axis=1)
     largest = sorted(span.argsort()[::-1][:DRAWN])

@@ -174,7 +174,7 @@ def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
 
 
 def as_rows(found: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
-    """Rows of a table, with a head."""
+    """Return rows of a table, with a head."""
     rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
                                     'all numbers', 'told from the least')]
     least = min((one.error for one in found), default=np.inf)

@@ -237,7 +237,7 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
 
 
 def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:
-    """Phase of an orbit, cycles, at which its cells come nearest to samples."""
+    """Return the phase of an orbit, cycles, at which its cells come nearest to samples."""
     def gap(shift: float) -> float:
         return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))
 

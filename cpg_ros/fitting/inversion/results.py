@@ -179,7 +179,7 @@ class Results:
         write_atomically(self._place(recording), json.dumps(kept))
 
     def name(self, recording: Path) -> str:
-        """Name of a recording's fitted file, without its ending."""
+        """Return the name of a recording's fitted file, without its ending."""
         stem = ''.join(letter if letter.isalnum() or letter in '-_' else '_'
                        for letter in recording.name.split('.')[0])
         return f'{stem[:60]}-{key(recording)[:8]}'
@@ -299,14 +299,14 @@ def library() -> Any:
 
 
 def parameter_columns(rows: Iterable[dict[str, Any]]) -> list[str]:
-    """Names of the columns of the parameters, those of all rows, sorted."""
+    """Return the names of the columns of the parameters, those of all rows, sorted."""
     names = {f'{row["network"]}.{name}' for row in rows for name in row.get('parameters', {})}
     return [f'{name}{"" if part == "value" else f".{part}"}' for name in sorted(names)
             for part in PARTS]
 
 
 def flat(row: dict[str, Any], columns: list[str]) -> dict[str, Any]:
-    """A row with a field for every column."""
+    """Return a row with a field for every column."""
     cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
     cells |= dict.fromkeys(columns)
     for name, one in row.get('parameters', {}).items():
@@ -367,7 +367,7 @@ def write_tables(folder: Path, rows: Rows) -> list[Path]:
 
 
 def _cells_of(row: dict[str, Any]) -> dict[str, Any]:
-    """A row as text: maps as JSON, lists with bars between."""
+    """Return a row as text: maps as JSON, lists with bars between."""
     return {**row, 'phases': json.dumps(row['phases']) if row['phases'] else '',
             'joints': json.dumps(row['joints']) if row['joints'] else '',
             'warnings': ' | '.join(row['warnings'])}

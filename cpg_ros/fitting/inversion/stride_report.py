@@ -245,7 +245,7 @@ def _names(legs: list[LegStrides]) -> list[str]:
 
 
 def every_stride(legs: list[LegStrides]) -> Rows:
-    """Rows of the strides, leg by leg, with a head; empty cells where nothing tells."""
+    """Return rows of the strides, leg by leg, with a head; empty cells where nothing tells."""
     rows: Rows = [('leg', 'number', 'begin [s]', *_names(legs))]
     for one in legs:
         for k, begin in enumerate(one.begins):
@@ -303,7 +303,7 @@ def gait_summary(found: RecordingFit, legs: list[LegStrides]) -> Rows:
 
 
 def ranges(found: RecordingFit) -> Rows:
-    """Rows of the joints' mean cycles in degrees, with a head."""
+    """Return rows of the joints' mean cycles in degrees, with a head."""
     stride = found.stride
     rows: Rows = [('joint', 'least [deg]', 'largest [deg]', 'range [deg]',
                    'scatter of strides [deg]')]
@@ -340,7 +340,7 @@ def normalised(found: RecordingFit, legs: list[LegStrides]
 
 
 def symmetry(legs: list[LegStrides]) -> Rows:
-    """Rows of the symmetry index of left and right legs, in percent; a head alone for none.
+    """Return rows of the symmetry index of left and right legs, in percent; a head alone for none.
 
     100 (left - right) / ((left + right) / 2), of the means (Robinson, Herzog & Nigg 1987): 0 where
     both sides are alike.

@@ -24,6 +24,7 @@ from itertools import chain
 from cpg_ros.fitting.recordings.cdr import SerializedBlock, UndecodableError
 import numpy as np
 
+#: LOW_STATE: message of the four-legged robots; HUMANOID_STATE: message of the humanoids.
 LOW_STATE, HUMANOID_STATE = 'unitree_go/msg/LowState', 'unitree_hg/msg/LowState'
 _ARM = ('shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_roll', 'wrist_pitch',
         'wrist_yaw')
@@ -36,6 +37,7 @@ MOTORS = {
         (f'{side}_{part}' for side in ('left', 'right') for part in _LEG),
         (f'waist_{axis}' for axis in ('yaw', 'roll', 'pitch')),
         (f'{side}_{part}' for side in ('left', 'right') for part in _ARM)))}
+#: _HEADER: bytes of CDR's header; _LITTLE_ENDIAN: its second byte for little-endian numbers.
 _HEADER, _LITTLE_ENDIAN = 4, 1
 
 

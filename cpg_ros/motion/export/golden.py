@@ -26,7 +26,9 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import StrideCommand
 import numpy as np
 
+#: STEPS: steps of the network alone; EVERY_STEP: steps from one compared state to the next.
 STEPS, EVERY_STEP = 400, 40
+#: RAMP: duration of the ramp, s; BETWEEN: time between switches, s; TRANSITION: cross-fade, s.
 RAMP, BETWEEN, TRANSITION = 1.0, 2.5, 1.0
 SWITCHES = 10
 SEED = 20

@@ -123,7 +123,7 @@ class Biped(Network):
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the four primary and the five secondary gaits."""
+        """Return the names of the four primary and the five secondary gaits."""
         return tuple(GAITS)
 
     def symmetry(self, gait: str) -> Symmetry:

@@ -87,7 +87,7 @@ class Delayed(Network):
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the primary gaits."""
+        """Return the names of the primary gaits."""
         return tuple(cls.modes())
 
     @classmethod

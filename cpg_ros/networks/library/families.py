@@ -140,7 +140,7 @@ def gait_phases(legs: int) -> dict[str, tuple[Fraction, ...]]:
 
 
 def _even(phases: tuple[Fraction, ...]) -> bool:
-    """Whether the phases are evenly spread, with equally many legs at each."""
+    """Return whether the phases are evenly spread, with equally many legs at each."""
     different = sorted(set(phases))
     return (different == [Fraction(n, len(different)) for n in range(len(different))]
             and len({phases.count(phase) for phase in different}) == 1)
@@ -208,7 +208,7 @@ class LegPairs(Network):
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the gaits."""
+        """Return the names of the gaits."""
         return tuple(gait_phases(leg_count(cls)))
 
     @classmethod

@@ -30,6 +30,7 @@ from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
 
 CELLS = 8
+#: CURRENT: current i into the cells; PHI: rate of w.
 CURRENT, PHI = 1.0, 0.2
 #: Constants of section 6.
 CELL = MorrisLecar(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
@@ -97,7 +98,7 @@ class Quadruped(Network):
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the six primary gaits."""
+        """Return the names of the six primary gaits."""
         return tuple(GAITS)
 
     def symmetry(self, gait: str) -> Symmetry:

@@ -284,7 +284,7 @@ def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
 
 
 def soled(robot: Robot) -> bool:
-    """Whether a robot has two legs whose feet can be kept level: of five or six joints."""
+    """Return whether a robot has two legs whose feet can be kept level: of five or six joints."""
     return len(robot.legs) == 2 and all(len(leg) in (5, 6) for leg in robot.legs.values())
 
 

@@ -47,8 +47,8 @@ DURATION = 8.0
 #: FLOORS: floors over which speeds and yaw rates are averaged.
 FLOORS = (Scenario(), Scenario(0.7))
 #: A gait counts as steered if its speed rises by RISE per row, m/s, and its yaw rate is at least
-#: TURN for a difference of strides of 1, rad/s; for slow gaits, the shares of the top speed below
-#: apply.
+#: TURN for a difference of strides of 1, rad/s; for slow gaits, RISE_SHARE and TURN_SHARE of the
+#: top speed, m/s, are enough.
 RISE, TURN = 0.01, 0.1
 RISE_SHARE, TURN_SHARE = 0.05, 0.5
 
