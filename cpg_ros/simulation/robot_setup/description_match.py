@@ -423,10 +423,7 @@ def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:
             if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
     if idle:
         yield f'moving joints of the {what} that no leg drives: ' + ', '.join(idle)
-    if any(joint.invented for joint in robot.joints):
-        yield f'limits that the {what} does not have are invented: ' + ', '.join(
-            f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
-            if joint.invented)
+    yield from invented_limits(robot, what)
     slow = sorted({joint.velocity for joint in robot.joints if joint.velocity < SLOW})
     if slow:
         yield (f'velocity limits of {" and ".join(f"{one:g}" for one in slow)} rad/s are slow for '
@@ -437,6 +434,14 @@ def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:
     if unbounded:
         yield f'the {what} has no velocity limit of ' + (
             'any joint' if len(unbounded) == len(driven) else ', '.join(unbounded))
+
+
+def invented_limits(robot: Robot, what: str) -> list[str]:
+    """Say in a line which limits are guesses, if any, as the description does not have them."""
+    listed = [f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
+              if joint.invented]
+    return [f'limits that the {what} does not have are invented: {", ".join(listed)}'] * bool(
+        listed)
 
 
 def _span(limits: Joint | JointDescription) -> str:

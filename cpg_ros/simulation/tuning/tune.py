@@ -38,8 +38,9 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.common.workers import add_options, executor_for
 from cpg_ros.motion.body_file import OwnFeedback
 from cpg_ros.motion.robot import Robot
-from cpg_ros.motion.robot_file import LIMITS, load_robot, write_robot
+from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.simulation.robot_setup.description_match import invented_limits
 from cpg_ros.simulation.tuning.biped import tune_biped
 from cpg_ros.simulation.tuning.feedback import judge_feedback, judged_gaits, tune_feedback
 from cpg_ros.simulation.tuning.gait_design import AIMS
@@ -104,18 +105,6 @@ def figures(tuned: Sequence[Tuned]) -> list[str]:
                      str(trial.hops), f'{100.0 * trial.lift:.1f}', f'{trial.pitch:.1f}',
                      f'{trial.cost:.2f}', f'{trial.slip:.2f}', one.verdict))
     return table(rows, '<>>>>>>>>>><')
-
-
-def invented(robot: Robot) -> list[str]:
-    """Return a line for each kind of limit that is a guess, with its joints."""
-    lines = []
-    for key in LIMITS:
-        joints = [joint for joint in robot.joints if key in joint.invented]
-        if joints:
-            values = sorted({f'{getattr(joint, key):g}' for joint in joints})
-            lines.append(f'limits that the URDF does not have, invented: {key} '
-                         f'{" and ".join(values)} of {", ".join(j.name for j in joints)}')
-    return lines
 
 
 def _refuse_options(args: argparse.Namespace) -> None:
@@ -205,7 +194,7 @@ def _tune(args: argparse.Namespace) -> int:
             robot, args.model, args.gaits, args.evaluations, args.seed,
             executor=executor, seeds=args.seeds, kp=args.kp, kd=args.kd,
             threads=1 if executor else args.jobs, say=report)
-    lines = [*figures(found), *missing, *invented(robot)]
+    lines = [*figures(found), *missing, *invented_limits(robot, 'model')]
     if judged := judged_gaits(robot):
         robot, _ = judge_feedback(robot, args.model, judged, args.kp, args.kd, args.seed)
         lines.append(_verdict(robot))
