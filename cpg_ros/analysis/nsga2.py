@@ -287,7 +287,7 @@ def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
 
 
 def _order(score: Score) -> tuple[float, float]:
-    """Return the smallest phase errors first, then the most stable."""
+    """Return the sort key of a score: phase errors first, then stability."""
     return np.ceil(score.errors.max() / SAME), score.stability
 
 

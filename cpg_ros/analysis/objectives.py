@@ -256,7 +256,7 @@ def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
 
 
 def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
-    """Phase errors of the groups of ``pairs`` in degrees, 0 to 180, shape (..., groups).
+    """Return the phase errors of the groups of ``pairs``, degrees, 0 to 180, (..., groups).
 
     Args:
         signals: of the cells on even points of a cycle, shape (..., m, cells or more).

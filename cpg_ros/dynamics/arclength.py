@@ -278,7 +278,7 @@ class SolutionCurve(Protocol):
         """
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Half the range of the continued orbit or state; zero at a bifurcation from rest."""
+        """Return half the range of the orbit or state; 0 at a bifurcation from rest."""
 
     def orbit(self, z: np.ndarray) -> Any:
         """Make an orbit of a solution."""

@@ -130,7 +130,7 @@ def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
 
 
 def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Derivatives of the value by the period between the last four points, and periods there."""
+    """Return the value's slopes by the period between the last four points, and periods there."""
     return (np.diff(values[-4:]) / np.diff(periods[-4:]), 0.5 * (periods[-4:-1] + periods[-3:]))
 
 

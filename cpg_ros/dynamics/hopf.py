@@ -304,7 +304,7 @@ class HopfPoint(ShortRepr):
         return self.simple and self.unstable_roots == 0
 
     def amplitude(self, value: float) -> float:
-        """Amplitude of every cell's first variable near onset, half its range: 2 |q_1| r.
+        """Return the amplitude, half the range, of a cell's first variable near onset: 2 |q_1| r.
 
         Raises:
             NoOrbit: the orbits lie on the other side.
@@ -322,7 +322,7 @@ class HopfPoint(ShortRepr):
         return 2.0 * np.pi / (self.omega + self.normal_form.shift(value - self.value))
 
     def path(self, value: float, theta: np.ndarray) -> np.ndarray:
-        """States near onset at times in cycles: ``rest + 2 Re(q z)``, shape (m, components).
+        """Return the states ``rest + 2 Re(q z)`` near onset at times in cycles, (m, components).
 
         Raises:
             NoOrbit: the orbits lie on the other side.

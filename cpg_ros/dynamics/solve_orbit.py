@@ -80,7 +80,7 @@ def _line(network: Network) -> tuple[ParameterLine, float, float]:
 
 
 def _repeats(network: Network) -> bool:
-    """Whether the parameter is a delay alone, so that orbits recur at whole periods of it."""
+    """Return whether the parameter is the delay alone: orbits then recur by whole periods."""
     return (bool(network.delay_parameter)
             and network.delay_parameter not in equations_of(type(network)).rows)
 

@@ -324,7 +324,7 @@ class WaveReadout:
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Minimum and maximum of each row, a periodic function on even points, by parabolas."""
+    """Return minimum and maximum of each row, periodic on even points, by parabolas."""
     return -_highest(-values), _highest(values)
 
 

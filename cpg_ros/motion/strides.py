@@ -24,7 +24,7 @@ Real = TypeVar('Real', float, np.ndarray)
 
 
 def smoothstep(s: Real) -> Real:
-    """Smooth step from 0 to 1: 3 s^2 - 2 s^3."""
+    """Return the smooth step from 0 to 1, 3 s^2 - 2 s^3."""
     return s * s * (3.0 - 2.0 * s)
 
 

@@ -302,7 +302,7 @@ class NetworkDefinition(ABC):
 
     @classmethod
     def by_cell(cls) -> dict[str, tuple[str, ...]]:
-        """Names that stand in the equations for a parameter of each cell -> these parameters."""
+        """Return name in the equations -> the parameters of the cells for which it stands."""
         return {**{name: members for name, members in cls.groups.items()
                    if len(members) == cls.cells}, **cls.own_of_cells}
 

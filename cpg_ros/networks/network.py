@@ -61,7 +61,7 @@ class Network(NetworkDefinition):
         return unpickle, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
 
     def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Right-hand side at states now and a delay ago, by default the same; shaped like x."""
+        """Return the right-hand side at states now and a delay ago, by default the same."""
         return Field(self).rates(x, past)
 
     def jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:

@@ -513,5 +513,5 @@ def one_variable() -> Iterator[ReproducedRow | Picture]:
 
 
 def _exponents() -> dict[str, tuple[int, int]]:
-    """Name of an element of Z4 x Z2 -> its exponents of omega and kappa."""
+    """Return name of an element of Z4 x Z2 -> its exponents of omega and kappa."""
     return {name: (element[0] // 2, element[0] % 2) for name, element in Z4_Z2.elements.items()}

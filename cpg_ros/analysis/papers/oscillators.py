@@ -38,7 +38,7 @@ TURN = 2.0 * np.pi
 
 
 def synchronisation() -> Iterator[ReproducedRow]:
-    """Phases, frequency and amplitudes of coupled phase oscillators."""
+    """Compute the rows of phases, frequency and amplitudes of coupled phase oscillators."""
     cite = Citation(IJSPEERT, 'phases')
     for gait, preset in Phase.presets().items():
         if gait == Phase.unnamed:
@@ -112,7 +112,7 @@ def neurons() -> Iterator[ReproducedRow]:
 
 
 def frequency() -> Iterator[ReproducedRow]:
-    """Return the frequency formula by harmonic balance, where it is exact and where it is not."""
+    """Compute the rows of the frequency formula by harmonic balance, exact and approximate."""
     cite = Citation(MATSUOKA, 'frequency (2011)')
     base = _alone(Matsuoka.presets()['trot'].network)
     for a, within in ((1.26, 0.001), (1.5, 0.005), (2.0, 0.015)):

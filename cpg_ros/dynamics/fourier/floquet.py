@@ -96,7 +96,7 @@ POINTS, DERIVATIVE, _WEIGHTS = _differentiation(DEGREE)
 
 
 def _interpolation(points: np.ndarray) -> np.ndarray:
-    """Matrix from values at the points to values at places in [0, 1], shape (m, degree + 1)."""
+    """Return the matrix from values at the points to those at places, (m, degree + 1)."""
     gaps = points[:, None] - POINTS
     exact = np.abs(gaps) < 1e-14
     rows = _WEIGHTS / np.where(exact, 1.0, gaps)

@@ -52,7 +52,7 @@ def derivative_matrix(n: int) -> np.ndarray:
 
 @lru_cache(maxsize=16)
 def shift_matrix(n: int, shift: float) -> np.ndarray:
-    """Matrix that takes nodal values of u to those of u(theta + shift), shape (n, n)."""
+    """Return the matrix from nodal values of u to those of u(theta + shift), shape (n, n)."""
     return np.fft.irfft(np.exp(_waves(n) * shift), n)[_circulant(n)]
 
 

@@ -87,7 +87,7 @@ class FourierCurve(ShortRepr):
         return solutions[:, 0], solutions[:, 1]
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Return half the range of cell 1's first variable; of an odd one its peak."""
+        """Return half the range of cell 1's first variable; its peak in an odd network."""
         row = self._rows(z)[0]
         return float(row[0] if self.symmetry.odd else 0.5 * np.ptp(row))
 
@@ -181,7 +181,7 @@ def _describing(network: Network, symmetry: Symmetry) -> Describing:
 
 
 def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, float] | None:
-    """Waveform and period by harmonic balance; for one variable a cell that swings about 0."""
+    """Return waveform and period by harmonic balance; for one variable that swings about 0."""
     describing = _describing(network, symmetry)
 
     def onset(amplitude: float) -> tuple[float, float]:
@@ -245,7 +245,7 @@ def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None
 
 
 def predicted(network: Network, near: FourierOrbit) -> tuple[np.ndarray, float]:
-    """Waveforms and period that the derivatives of a known orbit predict for a near network."""
+    """Predict waveforms and period for a near network by the derivatives of a known orbit."""
     change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
     u = near.values + near.d_values @ change
     return u.reshape(-1, u.shape[-1]), near.period + float(near.d_period @ change)
@@ -325,7 +325,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
 
 
 def _simple(network: Network, symmetry: Symmetry) -> bool:
-    """Whether cells have one variable and oscillate about 0, as harmonic balance requires."""
+    """Return whether cells have one variable that oscillates about 0, for harmonic balance."""
     return symmetry.odd and network.variables == 1
 
 

@@ -170,7 +170,7 @@ def _compiled(numba, network):
 
     @own
     def past_states(n, tau, ring, head, c, out):
-        """State at t_head + c step - tau, tau of shape (lanes,); one pass if all agree."""
+        """Return the state at t_head + c step - tau, tau (lanes,); one pass if all agree."""
         lanes, step = tau.shape[0], ring.step
         same = True
         for lane in range(1, lanes):

@@ -129,7 +129,7 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
 
 
 def no_leg(joints: Sequence[str], words: Collection[str] = OTHER) -> bool:
-    """Whether names of a limb's joints, but the last, have words of an arm, a head or the like."""
+    """Return whether a limb's joints, but the last, have words of an arm, a head and so on."""
     return any(not set(words).isdisjoint(_moved(words_of(name))) for name in joints[:-1] or joints)
 
 

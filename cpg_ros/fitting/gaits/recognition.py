@@ -88,7 +88,7 @@ def best_shift(terms: np.ndarray) -> tuple[float, float]:
 
 
 def shifted(a: np.ndarray, theta: float) -> np.ndarray:
-    """a(t + theta), theta in cycles, by its Fourier series."""
+    """Return a(t + theta), theta in cycles, by its Fourier series."""
     terms = np.fft.rfft(a)
     return np.fft.irfft(terms * np.exp(TURN * 1j * np.arange(terms.size) * theta), a.size)
 
@@ -113,7 +113,7 @@ def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float
 
 
 def steadiness(v: np.ndarray, w: np.ndarray) -> float:
-    """Smallest angular speed, over its mean, at which a closed curve turns about a centre.
+    """Return the smallest angular speed, over the mean, of a closed curve about a centre.
 
     The best of the centres tried; both variables are scaled to run from -1 to 1. At most 1; not
     positive where the curve turns back somewhere or turns twice, so that the angle does not tell
@@ -328,13 +328,13 @@ def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
 
 
 def _noise(cycle: HarmonicCycle, samples: int) -> float:
-    """Distance that noise makes where a symmetry holds: two cells have it, in every term."""
+    """Return the distance by noise alone if a symmetry holds: two cells have it, in each term."""
     terms, left = 2 * len(cycle.coefficients) - 1, min(cycle.residual, 0.999)**2
     return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))
 
 
 def _sure(nearest: float, others: Sequence[float], scatter: float) -> float:
-    """Probability of the nearest gait, from distances and their scatter; none is one of them."""
+    """Return the probability of the nearest gait among the others and none, by distances."""
     odds = [np.exp(-0.5 * (other**2 - nearest**2) / scatter**2) for other in others]
     none = np.exp(min(0.5 * ((nearest / scatter)**2 - NONE**2), 30.0))
     return float(1.0 / (1.0 + sum(odds) + none))

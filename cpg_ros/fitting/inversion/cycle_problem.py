@@ -279,7 +279,7 @@ class CycleProblem:
         return np.append(left, off), np.vstack([slopes, by_period])
 
     def cost(self, values: np.ndarray) -> float:
-        """Return half the sum of squares; raises NoOrbit as ``begin`` does."""
+        """Return half the sum of squares; raise NoOrbit as ``begin`` does."""
         left = self(values)[0]
         return 0.5 * float(left @ left)
 

@@ -343,7 +343,7 @@ class Optimum(ShortRepr):
         return (inside, False) if outside is None else (outside, True)
 
     def _least(self, k: int, place: float, at: np.ndarray, size: float) -> np.ndarray:
-        """Values of least cost with number k at a place, up to a share of size; from values.
+        """Return the values of least cost with number k at a place, up to a share of size.
 
         Number k is drawn there by a residual of its own, so that no step need start from where
         there is no orbit.

@@ -79,7 +79,7 @@ def _below(place: Path) -> Iterator[Path]:
 
 
 def files_of(recording: Path) -> list[Path]:
-    """The files that a recording is made of, sorted; none of a folder that is no recording."""
+    """Return the sorted files of a recording; none for a folder that is not a recording."""
     if not recording.is_dir():
         return [recording]
     return next((files for one in FORMATS.values()
@@ -104,7 +104,7 @@ def digest(recording: Path) -> str:
 
 
 def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
-    """Names, sizes and times of a recording's files: while it is written they change."""
+    """Return names, sizes and times of a recording's files, which change while it is written."""
     found = []
     for one in files_of(recording):
         try:

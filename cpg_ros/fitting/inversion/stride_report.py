@@ -256,7 +256,7 @@ def every_stride(legs: list[LegStrides]) -> Rows:
 
 
 def by_leg(legs: list[LegStrides]) -> Rows:
-    """Rows of means and standard deviations, and the coefficient of variation of the period."""
+    """Return rows of means and standard deviations, and the period's coefficient of variation."""
     rows: Rows = [('leg', 'strides', *_names(legs), 'variation of strides',
                    'range [rad]', 'by')]
     for one in legs:

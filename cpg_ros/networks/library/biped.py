@@ -137,7 +137,7 @@ class Biped(Network):
 
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
-        """Weights that H of a gait carries into one another: w(g j -> g i) and w(j -> i)."""
+        """Return the weights that H of a gait permutes: w(g j -> g i) and w(j -> i)."""
         elements = [D2.elements[name] for name in symmetry.h]
         members: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
         for name in (name for names in WEIGHTS.values() for name in names):

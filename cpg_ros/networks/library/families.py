@@ -213,7 +213,7 @@ class LegPairs(Network):
 
     @classmethod
     def phases(cls, gait: str) -> tuple[Fraction, ...]:
-        """Phases of a gait's legs in cycles; ValueError where there is none of this name."""
+        """Return the phases of a gait's legs, cycles; ValueError for an unknown gait."""
         return gait_phases(leg_count(cls))[known(gait, cls.gaits())]
 
     def symmetry(self, gait: str) -> Symmetry:
@@ -227,7 +227,7 @@ class LegPairs(Network):
 
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
-        """Weights that H of a gait carries into one another: k(g j -> g i) and k(j -> i)."""
+        """Return the weights that H of a gait permutes: k(g j -> g i) and k(j -> i)."""
         count = leg_count(cls)
         names = leg_names(count)
         elements = [symmetry.group.elements[name] for name in symmetry.h]
