@@ -191,6 +191,11 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
             return float(np.log(np.abs(roots[rank]))) if len(roots) > rank else -10.0
 
         start = plane.last
+        crosses = g(edge.start) * g(edge.end) < 0.0
+        plane.last = start
+        if not crosses:
+            # A neutral multiplier, as of uncoupled rings, may be below 1 by rounding.
+            continue
         fraction = locate(g, partial(_between, edge.start, edge.end), 0.0, 1.0, 1e-9)
         crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
         kind = kind_of(crossing)

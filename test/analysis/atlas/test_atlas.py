@@ -116,6 +116,18 @@ def test_a_row_is_where_the_formula_says_and_as_orbits_alone_are():
     assert one['unstable'] == judged.unstable == (np.abs(judged.transverse) >= 1.0).sum()
 
 
+def test_a_neutral_multiplier_that_rounding_puts_below_1_crosses_nothing(monkeypatch):
+    # With d = 0 the rings are uncoupled, and a shift of one against the other is neutral.
+    chart = chart_of('delayed', replace(TROT, d=2.0), [('d', (0.0, 1.0)), ('tau', (0.3, 0.5))],
+                     (9, 9))
+    orbit = solve_orbit(chart.at(0.0, 0.4), 'walk')
+    wave = orbit(np.arange(65) / 65 * orbit.period).tolist()
+    monkeypatch.setattr(curves, 'spectrum', lambda orbit: [
+        np.array([0.8 if orbit.network.d else 1.0 - 1e-12])])
+    edge = curves.Edge(np.array([0.0, 0.5]), np.array([0.25, 0.5]), wave, orbit.period)
+    assert curves.orbit_curves((chart, 'walk', [edge])) == []
+
+
 def test_a_torus_curve_has_a_pair_on_the_unit_circle(monkeypatch):
     monkeypatch.setattr(curves, 'MOST', 2)
     chart = chart_of('delayed', TROT, OVER, (9, 9))
