@@ -24,7 +24,7 @@ where there is no pose. Nobody is right who names a stretch wrongly and is 95 % 
 import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 import json
 import os
 from pathlib import Path
@@ -32,8 +32,11 @@ from pathlib import Path
 from common import emit, log, ROOT
 from cpg_ros import read_recording
 from cpg_ros.common.errors import CpgError
-from cpg_ros.fitting.inversion.gait_schedule import fit_stretches, StretchFit
+from cpg_ros.fitting.gaits.stride import NoSteadyGait
+from cpg_ros.fitting.inversion.gait_schedule import cut, fit_stretches, StretchFit
+from cpg_ros.fitting.inversion.recording_fit import leg_joints, network_of, stride_of
 from cpg_ros.fitting.recordings.recording import Recording
+from cpg_ros.networks.registry import find_network, with_legs_of
 from cpg_ros.simulation.robot_model import find_model
 import mujoco
 import numpy as np
@@ -57,6 +60,10 @@ AGREE, BETWEEN = 0.8, 0.05
 #: By which phase RH, LF and RF touch down before LH.
 GAITS = {'walk': (0.5, 0.75, 0.25), 'trot': (0.5, 0.5, 0.0), 'pace': (0.5, 0.0, 0.5),
          'bound': (0.0, 0.5, 0.5), 'pronk': (0.0, 0.0, 0.0)}
+
+
+#: CLEAR: gaits that are to be named; BINS: bounds of confidence of the diagram.
+CLEAR, BINS = ('walk', 'trot', 'run', 'pace', 'bound'), (0.0, 0.25, 0.45, 0.7, 0.9, 1.01)
 
 
 @dataclass
@@ -105,6 +112,8 @@ def _phase(touched: np.ndarray, first: np.ndarray) -> complex:
 
 def humanoids(folder: Path) -> Iterator[Clip]:
     """Yield people's walks and runs, retargeted to a Unitree G1."""
+    if not folder.is_dir():
+        return
     model = mujoco.MjModel.from_xml_path(str(find_model('unitree_g1')))
     data = mujoco.MjData(model)
     bodies = [model.body(f'{side}_ankle_roll_link').id for side in ('left', 'right')]
@@ -119,8 +128,8 @@ def humanoids(folder: Path) -> Iterator[Clip]:
             # Soles are capsules.
             half = np.abs(data.geom_xmat[:, 8]) * model.geom_size[:, 1] + model.geom_size[:, 0]
             height[:] = [(data.geom_xpos[geoms, 2] - half[geoms]).min() for geoms in soles]
-        yield Clip('G1', Recording(G1, np.arange(len(rows)) / 30.0, rows[:, 7:19], path.stem),
-                   heights, ('left', 'right'))
+        yield Clip('G1', Recording(G1, np.arange(len(rows)) / 30.0, rows[:, 7:19], path.stem,
+                                   body=rows[:, :3]), heights, ('left', 'right'))
 
 
 def dogs(paths: Iterable[Path], body: str) -> Iterator[Clip]:
@@ -148,18 +157,56 @@ def dogs(paths: Iterable[Path], body: str) -> Iterator[Clip]:
 
 
 def others(folder: Path) -> Iterator[Clip]:
-    """Yield what is named, and has no pose."""
+    """Yield what is named, and has no pose of feet."""
     for body, named, pattern in (
             ('person', 'run', 'opensim-models/Pipelines/Hamner/**/*running_ik.mot'),
             ('person', 'walk', 'opensim-models/Pipelines/Gait*/Output*/**/*walk*_[iI][kK].mot'),
+            ('person', 'run', 'opensim-models/Pipelines/Hamner/*running.trc'),
+            ('person', 'walk', 'opensim-models/Pipelines/Gait2392_Simbody/*walk1.trc'),
+            ('person', 'walk', 'opensim-models/Pipelines/Rajagopal/ExpData/*walk.trc'),
+            ('person', 'walk', 'ezc3d-testFiles/Qualisys.c3d'),
+            ('person', 'walk', 'ezc3d-testFiles/BTS.c3d'),
             ('Go1', 'trot', 'serow/evaluation/unit_tests/data/go1.csv')):
         for path in sorted(folder.glob(pattern)):
-            yield Clip(body, read_recording(path, progress=False), named=named)
+            markers = {'segments': 'human_plug_in_gait'} if path.suffix in ('.trc', '.c3d') else {}
+            yield Clip(body, read_recording(path, progress=False, **markers), named=named)
     for body, named, name in (('person', 'walk', 'human_walking.csv'),
                               ('person', 'run', 'human_running.mot'),
                               ('fly', '', 'fly_walking.csv.gz')):
         yield Clip(body, read_recording(ROOT / 'test' / 'data' / name, progress=False),
                    named=named)
+
+
+def stretches(clip: Clip, fits: bool) -> list[StretchFit]:
+    """Return the stretches of a clip; one of fewer strides than these need is one of its own."""
+    try:
+        return fit_stretches(clip.recording) if fits else [
+            StretchFit(*one, None) for one in cut(clip.recording)]
+    except NoSteadyGait:
+        legs, _ = leg_joints(clip.recording, None)
+        kind = with_legs_of(find_network(network_of(legs)), legs)
+        _, stride = stride_of(clip.recording, legs, kind, None)
+        return [StretchFit(stride.begin, stride.end, stride, None)]
+
+
+def picture(path: Path, known: list[dict]) -> None:
+    """Draw how often a confidence is right: a reliability diagram."""
+    import matplotlib
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+    _, axes = plt.subplots(figsize=(5.0, 4.0), layout='constrained')
+    axes.plot([0, 1], [0, 1], '--', color='gray', linewidth=1)
+    for low, high in pairwise(BINS):
+        own = [one for one in known if low <= one['confidence'] < high]
+        if own:
+            right = sum(one['named'] == one['truth'] for one in own)
+            x, y = np.mean([one['confidence'] for one in own]), right / len(own)
+            half = 1.96 * np.sqrt((y * (1.0 - y) + 1.0 / len(own)) / (len(own) + 4.0))
+            axes.errorbar(x, y, [[min(half, y)], [min(half, 1.0 - y)]], fmt='o', color='C0')
+            axes.annotate(f'{right} of {len(own)}', (x, y), (6, -12), textcoords='offset points')
+    axes.set(xlabel='confidence', ylabel='share that is named right', xlim=(0, 1.05),
+             ylim=(-0.05, 1.05))
+    plt.savefig(path, dpi=130)
 
 
 def row(clip: Clip, one: StretchFit) -> dict[str, object]:
@@ -174,7 +221,10 @@ def row(clip: Clip, one: StretchFit) -> dict[str, object]:
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__).parse_args()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--names', action='store_true', help='name the stretches, fit none')
+    parser.add_argument('--picture', type=Path, metavar='FILE', help='reliability diagram to draw')
+    args = parser.parse_args()
     folder = Path(os.environ.get('RECORDINGS', '.'))
     rows: list[dict[str, object]] = []
     clips = chain(
@@ -184,7 +234,7 @@ def main() -> None:
         humanoids(folder / 'LAFAN1_Retargeting_Dataset' / 'g1'))
     for clip in clips:
         try:
-            found = fit_stretches(clip.recording)
+            found = stretches(clip, not args.names)
         except CpgError as error:
             log(str(error))
             continue
@@ -192,12 +242,18 @@ def main() -> None:
             rows.append(row(clip, one))
             log(json.dumps(rows[-1]))
     known = [one for one in rows if one['truth']]
+    if args.picture:
+        picture(args.picture, known)
+    clear = [one for one in known if one['truth'] in CLEAR]
     sure = [one for one in known if one['confidence'] >= 0.95]
     wrong = [one for one in sure if one['named'] != one['truth']]
     by_body = {body: {
         'stretches': len(own), 'truth_known': sum(one in known for one in own),
         'sure': sum(one in sure for one in own),
         'sure_and_wrong': sum(one in wrong for one in own),
+        'clear': sum(one in clear for one in own),
+        'clear_and_named': sum(one in clear and one['confidence'] >= 0.9
+                               and one['named'] == one['truth'] for one in own),
         'median_errors_percent': np.round(np.nanmedian(
             [one['errors_percent'] or [np.nan] * 3 for one in own], axis=0), 1).tolist()}
         for body in dict.fromkeys(one['body'] for one in rows)

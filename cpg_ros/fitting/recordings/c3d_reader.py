@@ -26,7 +26,9 @@ from cpg_ros.common import files
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.c3d_process import read_apart, UnreadableC3D
 from cpg_ros.fitting.recordings.markers import (
+    body_of,
     joint_recording,
+    load_segments,
     marker_names,
     Markers,
     SEGMENTS,
@@ -94,7 +96,7 @@ def contacts(events: Mapping[str, Any], start: float, times: np.ndarray) -> Foot
         times: of the recording, s, shape (n,).
 
     Returns:
-        1 on the ground and 0 in the air; None unless both feet land and leave the ground.
+        1 on the ground and 0 in the air; None unless both feet are in both where both are known.
 
     """
     known: dict[str, list[tuple[float, bool]]] = {'left': [], 'right': []}
@@ -108,12 +110,20 @@ def contacts(events: Mapping[str, Any], start: float, times: np.ndarray) -> Foot
             known[side.lower()].append((time - start, name in STRIKE))
     if not all(len({down for _, down in own}) == 2 for own in known.values()):
         return None
-    within = [min(own)[0] for own in known.values()], [max(own)[0] for own in known.values()]
-    times = times[(times >= max(within[0])) & (times <= min(within[1]))]
+    begin, end = (most([one([time for time, _ in own]) for own in known.values()])
+                  for most, one in ((max, min), (min, max)))
+    # Whole strides where there are any, so that shares of the time are those of a stride.
+    landed = [[time for time, down in own if down and begin <= time <= end]
+              for own in known.values()]
+    begin, end = max(((own[0], own[-1]) for own in map(sorted, landed) if len(own) > 1),
+                     key=lambda one: one[1] - one[0], default=(begin, end))
+    times = times[(times >= begin) & (times <= end)]
     rows = []
     for own in known.values():
         when, down = zip(*sorted(own), strict=True)
         rows.append(np.array(down, float)[np.searchsorted(when, times, side='right') - 1])
+    if not len(times) or min(map(np.ptp, rows)) == 0.0:
+        return None
     return FootLoads(tuple(known), times, np.column_stack(rows))
 
 
@@ -189,7 +199,9 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     if silent:
         notes.append(f'without a value, left out: {abbreviate(silent)}')
     return recording_of(source, points.stamps, [wanted[k] for k in kept],
-                        unwrapped(first[:, kept]), notes)
+                        unwrapped(first[:, kept]), notes, body=body_of(
+                            load_segments('human_plug_in_gait').named_as(points.names),
+                            points, points.points))
 
 
 def _stated(path: Path) -> int:

@@ -353,10 +353,10 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
     kept = [name for name in angles if name not in silent]
     return recording_of(source, markers.stamps, kept,
                         np.column_stack([angles[name] for name in kept]), notes,
-                        body=_body(segments, markers, points))
+                        body=body_of(segments, markers, points))
 
 
-def _body(segments: Segments, markers: Markers, points: np.ndarray) -> np.ndarray | None:
+def body_of(segments: Segments, markers: Markers, points: np.ndarray) -> np.ndarray | None:
     """Return where the body is, m, shape (n, 3), the last axis from the feet upward."""
     body, feet = ([markers.names.index(name) for name in names if name in markers.names]
                   for names in (segments.body, segments.feet))

@@ -59,22 +59,23 @@ def test_events_say_which_foot_is_on_the_ground(path, style):
     file = ezc3d.c3d(str(path))
     events = [('Left', 'Foot Off', 0.02), ('Right', 'Foot Off', 0.07),
               ('Right', 'Foot Strike', 0.1), ('Left', 'Foot Strike', 0.05),
-              ('Left', 'Foot Off', 0.12), ('Right', 'Foot Off', 0.16)]
+              ('Left', 'Foot Off', 0.12), ('Right', 'Foot Off', 0.16),
+              ('Left', 'Foot Strike', 0.15)]
     labels = [label if style == 'contexts' else side[0] + ('TO' if 'Off' in label else 'HS')
               for side, label, _ in events]
     file.add_parameter('EVENT', 'LABELS', labels)
     if style == 'contexts':
         file.add_parameter('EVENT', 'CONTEXTS', [side for side, *_ in events])
     # Minutes and seconds, from the first frame of the trial, of which the file begins at the 21st.
-    file.add_parameter('EVENT', 'TIMES', np.array([[0.0] * 6, [t + 0.101 for *_, t in events]]))
+    file.add_parameter('EVENT', 'TIMES', np.array([[0.0] * 7, [t + 0.101 for *_, t in events]]))
     file['header']['points']['first_frame'] = 20
     file.write(str(path))
     found = read_c3d(path, 'human_plug_in_gait')
     assert found.loads.legs == ('left', 'right')
-    # Both are known from .071 to .121 s: before, nobody has seen the right foot.
-    assert found.loads.times == pytest.approx(np.arange(0.075, 0.1201, 0.005))
+    # Both are known from .071 to .151 s: before, nobody has seen the right foot.
+    assert found.loads.times == pytest.approx(np.arange(0.075, 0.1501, 0.005))
     t = found.loads.times + 1e-9
-    assert found.loads.loads[:, 0].tolist() == [1.0] * len(t)
+    assert found.loads.loads[:, 0].tolist() == (t < 0.121).astype(float).tolist()
     assert found.loads.loads[:, 1].tolist() == (t > 0.101).astype(float).tolist()
 
 
