@@ -49,7 +49,8 @@ import matplotlib
 from matplotlib.axes import Axes
 import numpy as np
 
-#: Colours of the waveforms, of sets that were tried or solved, and of the front.
+#: Colours. WAVES: of the waveforms; TRIED, SOLVED: of sets without and with an exact orbit; BEST:
+#: of the Pareto front.
 WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
 #: FLOOR: smallest multiplier that is drawn.
 FLOOR = 1e-6

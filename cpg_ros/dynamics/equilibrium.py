@@ -89,7 +89,7 @@ class Quotient(Field[Network]):
         return out
 
     def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
-        """Solve for an equilibrium near a state; None where there is none."""
+        """Solve for an equilibrium near a state by Newton's method; None if it fails."""
         return next(iter(self.newton_from_all(state[None], most)), None)
 
     def newton_from_all(self, states: np.ndarray, most: int = 50) -> np.ndarray:

@@ -80,7 +80,7 @@ def is_out(monitor, now):
     """Update the low-passed age of the measurements, s; tell whether the input is out."""
     stale, late = now - monitor[BELIEVED] > STALE, False
     if stale:
-        # What comes after a gap is as old as it is, whatever was before.
+        # After a gap the low-pass starts anew: earlier ages do not matter.
         monitor[AGE], monitor[IS_LATE] = math.nan, 0.0
     elif not math.isnan(monitor[MEASURED]):
         age = max(now - monitor[MEASURED], 0.0)

@@ -31,7 +31,7 @@ ACCURACY = Accuracy(4, 1e-12, 1e-8, 5)
 
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first; that of the class first, without 1."""
+    """Multipliers of each subspace, largest first; the class comes first, without 1."""
     return multipliers(orbit, accuracy=ACCURACY).subspaces
 
 

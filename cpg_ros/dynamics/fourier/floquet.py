@@ -240,7 +240,7 @@ EXACT = Accuracy(None, 1e-10, 1e-9, 4)
 
 
 def within(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class but the trivial one, and that."""
+    """Return the multipliers within the gait's class, without the trivial one, and that one."""
     roots = variation(orbit, accuracy)[1]
     trivial = int(np.abs(roots - 1.0).argmin())
     return np.delete(roots, trivial), complex(roots[trivial])
@@ -255,7 +255,7 @@ def transverse(orbit: FourierOrbit, gain: float = 0.0, accuracy: Accuracy = EXAC
 
 
 def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
-    """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
+    """Return the largest modulus of the transverse multipliers, to a relative error, or 0."""
     equation = variation(orbit)[0]
     return max((float(np.abs(equation.multipliers(part, gain, 2, exact)).max())
                 for part in equation.outside), default=0.0)
@@ -263,7 +263,7 @@ def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e
 
 @lru_cache(maxsize=4)
 def variation(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[Variation, np.ndarray]:
-    """Return the variational equation, fine enough, and the multipliers within the class."""
+    """Return a sufficiently fine variational equation and the multipliers within the class."""
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
     for halving in range(accuracy.halvings):
         equation = Variation(orbit, n * 2**halving)
@@ -309,7 +309,7 @@ def mode(orbit: FourierOrbit, part: int, multiplier: complex
     return path
 
 
-#: Unknowns at most: the matrices are dense.
+#: MOST: largest number of unknowns, as the matrices are dense.
 MOST = 4096
 
 

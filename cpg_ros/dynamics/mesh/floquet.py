@@ -140,7 +140,7 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
 
 
 def within(orbit: MeshOrbit, accuracy: object = None) -> tuple[np.ndarray, complex]:
-    """Return the multipliers within the gait's class but the trivial one, and that."""
+    """Return the multipliers within the gait's class, without the trivial one, and that one."""
     roots, _, trivial = multipliers(orbit)
     return roots, complex(trivial)
 

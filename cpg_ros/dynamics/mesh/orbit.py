@@ -39,6 +39,7 @@ from numpy.polynomial import polynomial
 #: RESOLVED: relative size of the last terms of the polynomials at which a mesh is resolved.
 RESOLVED = 1e-11
 #: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
+#: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
 FEWEST, MOST_INTERVALS = 12, 800
 #: FEW: number of intervals of a first mesh; LOOKED: places of each at which the curvature of the
 #: guess is evaluated.
@@ -158,7 +159,7 @@ def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bo
 
 
 def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float) -> Solution:
-    """Take a guess at the points of a mesh from a path over the places 0 to 1."""
+    """Return a guess at the points of a mesh from a path over the places 0 to 1."""
     inner = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
     return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 

@@ -147,7 +147,7 @@ class SerialBoard(ServoBoard):
             self._attached = True
 
     def read(self) -> np.ndarray | None:
-        """Ask all servos where they are; None if one does not answer within ANSWER s."""
+        """Return the positions of all servos; None if one does not answer within ANSWER s."""
         values: dict[int, int] = {}
         for question, count in self._protocol.questions(self._servos):
             self._port.forget()
