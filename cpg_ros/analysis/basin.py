@@ -40,11 +40,12 @@ if TYPE_CHECKING:
 CYCLES, KEPT, TOGETHER = 100, 64, 64
 #: WIDTH: range of the random states over the orbit's range.
 WIDTH = 2.0
-#: Relative differences of equal signals and of equal periods.
+#: SAME: relative difference of equal signals; SAME_PERIOD: relative difference of equal periods.
 SAME, SAME_PERIOD = 0.05, 0.01
 #: Relative difference of signals up to which a symmetry holds.
 HOLDS = 0.01
-#: Range of the last cycles, over the orbit's range, below which a network rests; number of cycles.
+#: RESTS: range of the last cycles, over the orbit's, below which a network rests; LAST: number of
+#: these cycles.
 RESTS, LAST = 1e-3, 3
 #: Ends of runs that are not a gait.
 REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'

@@ -29,7 +29,7 @@ from cpg_ros.common.errors import CpgError, InputError, MissingLibraryError, Sho
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Generations between two migrations, and the fraction of a population that migrates.
+#: EPOCH: generations between two migrations; MIGRANTS: share of a population that migrates.
 EPOCH, MIGRANTS = 3, 0.1
 
 
@@ -179,7 +179,7 @@ def migrate(results: Sequence[EpochResult]
 
 #: Sets of the front that are verified, at most.
 TRIALS = 20
-#: Resolution of phase errors in the choice of a set, and the largest allowed, degrees.
+#: SAME: resolution of phase errors in the choice of a set, degrees; LARGEST: largest allowed one.
 SAME, LARGEST = 0.1, 1.0
 
 

@@ -178,13 +178,16 @@ LARGEST_BATCH = 256
 START_MISMATCH = 0.2
 #: Resolution of phase errors, degrees.
 RESOLUTION = 0.001
-#: Phase errors (degrees) and mismatch below which the exact orbit is solved for.
+#: The exact orbit is solved for at phase errors up to NEAR, degrees, and mismatch to
+#: NEAR_MISMATCH.
 NEAR, NEAR_MISMATCH = 5.0, 0.15
-#: Sets of a generation whose orbit is solved for, the most stable ones, as it takes 20 to 300 ms;
-#: and relative difference of the period from that of the simulation.
+#: MOST_EXACT: most sets of a generation, the most stable ones, whose orbit is solved for, as it
+#: takes 20 to 300 ms; SAME_PERIOD: largest relative difference of its period from the simulated
+#: one.
 MOST_EXACT, SAME_PERIOD = 16, 0.02
-#: Least range of every cell, steadiness of its rotation (fitting.gaits.recognition.steadiness) and
-#: difference in shape of two waveforms; the search multiplies them by a margin.
+#: LEAST_RANGE: least range of every cell; LEAST_STEADINESS: least steadiness of its rotation (see
+#: fitting.gaits.recognition.steadiness); LEAST_DIFFERENCE: least difference in shape of two
+#: waveforms; MARGIN: factor of these limits in the search.
 LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
 #: WORST: phase error of a set without a gait, degrees; DEAD: stability of a set that rests or runs
 #: away; APERIODIC: stability of a set whose motion does not repeat.

@@ -29,14 +29,14 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Noise that a gait survives (per square root of model time), its duration (model time), and runs
-#: of it at once, as many as fit into the vector registers.
+#: NOISE: intensity of noise that a gait survives, per square root of model time; DURATION: of the
+#: runs, model time; RUNS: number of runs, which fit into the vector registers.
 NOISE, DURATION, RUNS = 0.01, 500.0, 8
 #: PEACE: periods without noise after that; BACK: largest phase error then, degrees.
 PEACE, BACK = 30, 1.0
-#: Largest phase errors (degrees) in a number of cycles under noise.
+#: LOST: phase error, degrees, averaged over CYCLES cycles under noise, at which a gait is left.
 LOST, CYCLES = 60.0, 4
-#: Points of a cycle, and digits of the start and period of a preset.
+#: POINTS: points of a cycle; DIGITS: digits of the start and period of a preset.
 POINTS, DIGITS = 1024, 10
 
 

@@ -134,7 +134,7 @@ TOLERANCE = 1e-9
 NEWTON = 8
 #: Without an exact tangent it ends where the next step would be shorter than this.
 NEGLIGIBLE = 1e-4 * TOLERANCE
-#: Steps along the curve, in the norm of its product.
+#: FIRST, SHORTEST, LONGEST: lengths of steps along the curve, each unknown relative to its scale.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
 #: Once the period has grown by this factor, steps grow with it.
 GROWN = 3.0

@@ -88,8 +88,8 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
 
 #: Exponent above which exp overflows, so that W is computed from a logarithm.
 LARGEST = 690.0
-#: Chebyshev points at first and at most, and relative change by Newton's method below which a root
-#: is resolved.
+#: POINTS, MOST_POINTS: first and largest number of Chebyshev points; RESOLVED: relative change by
+#: Newton's method up to which a root is resolved.
 POINTS, MOST_POINTS, RESOLVED = 24, 192, 1e-6
 #: Roots computed first in the search for all to the right of a line.
 FIRST = 9

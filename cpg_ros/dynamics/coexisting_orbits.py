@@ -35,10 +35,12 @@ import numpy as np
 
 #: MORE_RANDOM: number of random states from which a thorough search simulates.
 MORE_RANDOM = 37
-#: Relative differences of periods and of ranges below which two orbits are the same, up to phase
-#: and the network's symmetry.
+#: Relative differences up to which two orbits are the same, up to phase and the network's
+#: symmetry.
+#: SAME_PERIOD: of the periods; SAME_LEVEL: of the ranges.
 SAME_PERIOD, SAME_LEVEL = 1e-6, 1e-4
-#: Differences below which a simulation's cycle is an orbit that has been solved for.
+#: Relative differences up to which a simulation's cycle is a known orbit. NEAR_PERIOD: of the
+#: periods; NEAR_WAVEFORM: of the waveforms.
 NEAR_PERIOD, NEAR_WAVEFORM = 5e-3, 0.02
 #: Starts of the deflated method: factors of an orbit's size about its mean, and of its period.
 SCALED = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))

@@ -35,11 +35,11 @@ import numpy as np
 
 # The ends of branches, extrapolated beyond the last orbit.
 
-#: A branch ends near a homoclinic orbit if its period has grown by this factor while the value
-#: changes by less than this fraction of its scale per period.
+#: A branch ends near a homoclinic orbit if its period has grown by the factor GROWN while the
+#: value changes by less than STILL of its scale per period.
 GROWN, STILL = 3.0, 1e-2
-#: The period grows alone in a step in which it grows by this fraction while the value changes by
-#: less than this fraction of its scale.
+#: The period grows alone in a step in which it grows by the share LONGER while the value changes
+#: by less than ROUNDING of its scale.
 LONGER, ROUNDING = 0.01, 1e-9
 #: Near a saddle-node the slope of the value falls as the period to the power -3; a fall from this
 #: power on is taken for an exponential one.

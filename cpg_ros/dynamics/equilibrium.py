@@ -35,7 +35,7 @@ _FAR = np.geomspace(3.0, 100.0, 400)[1:]
 GRID = np.concatenate([-_FAR[::-1], np.linspace(-3.0, 3.0, 2001), _FAR])
 #: Start states where there is no such x.
 STARTS = 400
-#: Largest relative change of the state in a step, and relative error of its prediction.
+#: LONGEST: largest relative change of the state in a step; MISS: largest error of its prediction.
 LONGEST, MISS = 0.1, 0.01
 #: Size at which an equilibrium has gone to infinity.
 FURTHEST = 1e3

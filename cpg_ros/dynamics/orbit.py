@@ -59,8 +59,8 @@ NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a dist
                 'than along it does not decay, either')
 #: Grid on which extremes are searched before they are refined.
 POINTS = 1024
-#: Least number of points at which signals are compared; and numbers of equal parts of a cycle that
-#: an orbit must not repeat.
+#: COMPARED: fewest points at which signals are compared; PARTS: numbers of equal parts of a cycle
+#: that an orbit must not repeat.
 COMPARED, PARTS = 60, (2, 3, 5)
 #: Difference of two equal signals, over their range.
 SAME = 1e-4

@@ -147,7 +147,8 @@ class Linearised:
         return np.zeros_like(y[0]), past
 
 
-#: Distance below which a multiplier is on the unit circle, and below which a power of it is 1.
+#: CRITICAL: distance from the unit circle up to which a multiplier is on it; RESONANT: distance of
+#: a power of it from 1 up to which there is a resonance.
 CRITICAL, RESONANT = 1e-3, 0.02
 #: Largest relative change of a coefficient when the mesh is halved.
 SAME = 0.01

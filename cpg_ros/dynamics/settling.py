@@ -25,14 +25,14 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Duration of a simulation, and time between the states that are kept, model time.
+#: SPAN: duration of a simulation, model time; KEPT_FRACTION: time between recorded states.
 SPAN, KEPT_FRACTION = 500.0, 0.1
 #: Step over the network's real-time step; more exact than adaptive methods with their usual
 #: tolerances (benchmarks/bench_optimize.py).
 COARSE_STEPS = 2.5
 #: Standard deviation of the start's disturbance, which breaks all symmetry.
 DISTURBANCE = 0.05
-#: Cycles that are averaged, and points of a cycle.
+#: AVERAGED: number of cycles that are averaged; POINTS: points of a cycle.
 AVERAGED, POINTS = 3, 256
 #: ALIVE: range of the first variable below which nothing oscillates.
 ALIVE = 0.05
@@ -145,20 +145,23 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     return LimitCycle(run, float(begin), period, signals, drift)
 
 
-#: Periods of a simulation that is locked to a gait, and gain of the lock, 1/model time.
+#: SETTLING: periods of a simulation that is locked to a gait; HOLD: gain of the lock, 1/model
+#: time.
 SETTLING, HOLD = 30, 1.0
-#: Starts of a gait without a known one: sizes of waves about the equilibrium, number of random
-#: states in the gait's class, and their standard deviation, all over the size of a variable at the
-#: equilibrium if that is above 1.
+#: Starts of a gait without a known one. SIZES: of waves about the equilibrium; RANDOM: number of
+#: random states in the gait's class; SCATTER: their standard deviation; all over the size of a
+#: variable at the equilibrium if that is above 1.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: Steps after which starts are checked, further checks on request, and factor of the step without
-#: a delay.
+#: LOOKED: numbers of steps after which starts are checked; LONGER: further ones, on request;
+#: COARSER: factor of the step without a delay.
 LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
-#: Rates below which a network rests, 1/model time, and relative difference of cycles that repeat.
+#: RESTING: rates below which a network rests, 1/model time; REPEATING: relative difference up to
+#: which cycles repeat.
 RESTING, REPEATING = 1e-9, 1e-3
 #: Range of the first variable below which a locked network does not oscillate.
 SMALLEST = 1e-3
-#: Relative errors of the gait's shifts, and of a further symmetry.
+#: KEPT: largest relative error of the gait's shifts; ADDED: error up to which a further symmetry
+#: is there.
 KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]

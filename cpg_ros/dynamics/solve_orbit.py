@@ -38,7 +38,7 @@ import numpy as np
 
 #: Largest delay at which Hopf points are searched, over the network's delay.
 FURTHEST = 4.0
-#: Points of a branch, and whole periods by which a delay is longer, at most.
+#: POINTS: most points of a branch; MOST_PERIODS: most whole periods that are added to a delay.
 POINTS, MOST_PERIODS = 80, 12
 
 

@@ -56,7 +56,7 @@ from scipy.optimize import minimize_scalar
 #: the last fold of a curve, in fractions of the first parameter's range.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
 BEYOND = (0.00125, 0.005, 0.02)
-#: Tolerances of the extremum along a branch and of the cusp, in fractions.
+#: ALONG: tolerance of the extremum along a branch; EXACT: tolerance of the cusp, as a fraction.
 ALONG, EXACT = 1e-7, 1e-13
 #: Amplitude of the smallest orbits at a cusp.
 SMALLEST = 0.02
@@ -238,7 +238,8 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
 REACHES = (0.01, 0.03, 0.1, 0.3)
 #: Amplitude below which an orbit is an equilibrium.
 REST = 5e-3
-#: Edges tried for a gait, points of a branch, and distance of equal curves in fractions.
+#: TRIED: edges of the grid that are tried for a gait; MOST: most points of a branch; SAME:
+#: distance of equal curves, as a fraction of the ranges.
 TRIED, MOST, SAME = 8, 80, 0.02
 
 
@@ -369,11 +370,11 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: Distances from the Bautin point, in fractions of the ranges, at which branches start, the
-#: amplitude of their first orbit, their longest step, and points at most.
+#: BESIDE: distances from the Bautin point, as fractions of the ranges, at which branches start;
+#: AMPLITUDE: of their first orbit; LONGEST: longest step; MOST_POINTS: most points.
 BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: Largest distance of the fold from its Hopf point, and of the curve's end from the Bautin point,
-#: in fractions.
+#: NEAR: largest distance of a fold from its Hopf point; END: largest distance of the curve's end
+#: from the Bautin point; both as fractions.
 NEAR, END = 0.2, 0.02
 #: Distance of equal curves in fractions.
 SAME_CURVE = 3e-3

@@ -176,8 +176,8 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
 
 #: FIRST, LONGEST, SHORTEST: steps along a curve, as fractions of the ranges; MOST: most points.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: Distance from a curve below which a start lies on it, error of points that two classes share, in
-#: fractions of the ranges, and number of points at which that is checked.
+#: SAME: distance, as a fraction of the ranges, up to which a start lies on a known curve. Two
+#: classes share a curve if CHECKED points on it are solutions of both to SHARED.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 
 
@@ -284,7 +284,8 @@ def hopf_curves(chart: ParameterPlane, gaits: tuple[str, ...],
 
 #: Largest distance of a curve's end from its last point, in fractions of the ranges.
 REACH = 0.03
-#: Steps of Newton's method at the end of a curve, and the largest residual there.
+#: END_NEWTON: most steps of Newton's method at the end of a curve; RESIDUAL: largest residual
+#: there.
 END_NEWTON, RESIDUAL = 30, 1e-9
 #: Imaginary part of the root at which the derivative of a real determinant is taken.
 SLIGHT = 1e-6

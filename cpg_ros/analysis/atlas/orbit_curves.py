@@ -47,10 +47,11 @@ import numpy as np
 SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
 #: Newton's method: steps, tolerance and differences in fractions.
 RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
-#: Largest distance of a resonance from a point of the curve, in fractions, and difference from its
-#: sum within which an end of the curve is tried.
+#: REACH: largest distance of a resonance from a point of the curve, as a fraction; CLOSE:
+#: difference of the multipliers' sum from SUMS within which an end of the curve is tried.
 REACH, CLOSE = 0.08, 0.5
-#: Largest residual of product and sum, and distance of equal resonances.
+#: RESIDUAL: largest residual of the multipliers' product and sum; SAME: distance of equal
+#: resonances.
 RESIDUAL, SAME = 1e-8, 1e-5
 
 
@@ -132,7 +133,8 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
 #: CURVES: most curves of a gait; MOST: most points of each; STEP, SHORTEST: longest and shortest
 #: step, as fractions of the ranges.
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
-#: Tolerance of g, differences for its slope, and steps of Newton's method.
+#: EXACT: tolerance of g = 0; DIFFERENCE: step of its finite differences, as a fraction; NEWTON:
+#: most steps of Newton's method.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
 
 Distance = Callable[[np.ndarray], float]

@@ -36,8 +36,8 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 
-#: Labels of a gait at a point: no orbit, one that is unstable in its class, one that attracts with
-#: a symmetry lock, one that attracts by itself.
+#: Labels of a gait at a point. NONE: no orbit; UNSTABLE: unstable in its class; LOCKED: attracts
+#: with a symmetry lock; STABLE: attracts by itself.
 NONE, UNSTABLE, LOCKED, STABLE = range(4)
 #: KEPT: number of points of a waveform that are kept.
 KEPT = 65
@@ -45,8 +45,8 @@ KEPT = 65
 ACCURACY = Accuracy(4, 1e-6, 1e-4, 4)
 #: Random states from which the basin of an orbit is estimated.
 STARTS = 8
-#: Points of a branch from a Hopf point at most; orbits close by that are continued to a point, and
-#: numbers of steps.
+#: MOST: most points of a branch from a Hopf point; TRIED: most nearby orbits that are continued to
+#: a point; STEPS: numbers of steps in which this is tried.
 MOST, TRIED, STEPS = 60, 3, (1, 4)
 
 

@@ -43,7 +43,8 @@ AUTHORS = 'Rashidi et al. 2016'
 NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
 
 PRINTED = printed_values('rashidi')
-#: Model time in which a gait settles; degrees from 0 that an objective may be.
+#: SETTLING: model time in which a gait settles; CLOSE: largest objective that counts as 0,
+#: degrees.
 SETTLING, CLOSE = 1500.0, 1.0
 #: SAME: difference in shape, over the RMS, up to which two waveforms are one.
 SAME = 0.02

@@ -278,7 +278,7 @@ def _shown(value: Value) -> str:
 
 # Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
 
-#: Potentials at which m is 0 or 1 to rounding, and at which m and n bend.
+#: FAR: potentials at which m is 0 or 1 to rounding; NEAR: potentials at which m and n bend.
 FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
 
 

@@ -73,7 +73,7 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     return waveform
 
 
-#: Polynomial degree on an element, and largest length of an element in periods.
+#: DEGREE: polynomial degree on an element; SPAN: largest length of an element, in periods.
 DEGREE, SPAN = 20, 0.4
 #: Size of a matrix up to which all eigenvalues take no longer than the largest.
 FEW = 90
