@@ -156,8 +156,7 @@ class FourierOrbit(Orbit):
 
 NODES = 63
 MOST_NODES = 1023
-#: TOLERANCE: residual at which Newton's method ends; STEPS: most steps of it; RESOLVED: size of
-#: the last harmonics at which a waveform is resolved.
+#: TOLERANCE: residual at which Newton's method ends; STEPS: most steps of it.
 TOLERANCE, STEPS = 1e-12, 12
 #: RESOLVED: relative size of the last harmonics at which a waveform is resolved.
 RESOLVED = 1e-12
