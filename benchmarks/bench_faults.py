@@ -22,7 +22,7 @@ each row of ``test/support/sensor_faults.py`` with some seeds. A seed draws the 
 at which the fault begins.
 
 With --gaps something holds up a generator at 1 kHz; the longest gap between two of its messages
-is compared with that of one that is left alone, which is measured before and after each.
+is compared with that of one that is left alone, which is measured first and last.
 
 usage: bench_faults.py [--times 20] [--only NAME] [--sensors] [--seeds 5] [--gaps]
 """
@@ -74,8 +74,9 @@ TARGETS = {'failed': 0, 'skipped': 0}
 #: requests of changes.
 KINDS = 'log', 'garbage', 'lock', 'compile'
 DISTURBANCES = 'terminal', 'pipe', 'parameters', *KINDS
-#: Longest gap beyond that of an idle run, ms; time from the start to the first message, s.
-MOST_MORE, SETTLE = 5.0, 5.0
+#: MOST_MORE: longest gap beyond that of an idle run, ms; SETTLE: time from the start to the first
+#: message, s, on a busy machine.
+MOST_MORE, SETTLE = 5.0, 10.0
 #: Faults that stop the legs, too: the servos keep the pose of an instant in mid-trot.
 LEGS_STOP = 'stalled'
 SENSOR_TARGETS = {'fell': 0, 'crossed': 0}
@@ -134,10 +135,11 @@ def sensor_table(seeds: int, only: str) -> None:
              if key == 'crossed' or not fault.startswith(LEGS_STOP)))
 
 
-def gap_ms(kind: str, seconds: float) -> float:
+def gap_ms(kind: str, seconds: float, priority: int) -> float:
     """Return the longest time between two messages being handed to the middleware, ms."""
     own, output = pty.openpty() if kind == 'terminal' else os.pipe()
-    words = {'rate': 1000.0, 'robot': 'unitree_go2', 'combined_topic': 'joint_states'}
+    words = {'rate': 1000.0, 'robot': 'unitree_go2', 'combined_topic': 'joint_states',
+             'thread_priority': priority}
     disturbance = 'log' if kind in ('terminal', 'pipe') else kind if kind in KINDS else 'idle'
     command = [sys.executable, str(HERE / 'disturbed_generator.py'), disturbance, '--ros-args',
                *(word for name, value in words.items() for word in ('-p', f'{name}:={value}'))]
@@ -158,17 +160,18 @@ def gap_ms(kind: str, seconds: float) -> float:
     return float(np.diff(source).max()) * 1e-6
 
 
-def gap_table(seconds: float, only: str) -> None:
-    """Measure the longest gaps."""
-    found = {}
-    for kind in DISTURBANCES:
-        if only in kind:
-            before, gap, after = (gap_ms(one, seconds) for one in ('idle', kind, 'idle'))
-            found[kind] = {'gap_ms': gap, 'idle_ms': [before, after],
-                           'more_ms': gap - max(before, after)}
-            log(f'{kind}: {found[kind]}')
-    emit(benchmark='gaps', seconds=seconds, **found, targets={'more_ms': MOST_MORE},
-         passed=all(one['more_ms'] <= MOST_MORE for one in found.values()))
+def gap_table(seconds: float, only: str, priority: int) -> None:
+    """Measure the longest gaps, idle ones first and last."""
+    kinds = ['idle', *(kind for kind in DISTURBANCES if only in kind), 'idle']
+    gaps = []
+    for kind in kinds:
+        gaps.append(gap_ms(kind, seconds, priority))
+        log(f'{kind}: {gaps[-1]:.3f} ms')
+    idle = max(gaps[0], gaps[-1])
+    found = dict(zip(kinds[1:-1], gaps[1:-1], strict=True))
+    emit(benchmark='gaps', seconds=seconds, priority=priority, idle_ms=[gaps[0], gaps[-1]],
+         gap_ms=found, targets={'more_ms': MOST_MORE},
+         passed=max(found.values()) - idle <= MOST_MORE)
 
 
 def main() -> None:
@@ -179,10 +182,11 @@ def main() -> None:
     parser.add_argument('--seeds', type=int, default=5, help='of each fault of the sensors')
     parser.add_argument('--gaps', action='store_true', help='longest gaps between messages')
     parser.add_argument('--seconds', type=float, default=20.0, help='of each run with --gaps')
+    parser.add_argument('--priority', type=int, default=0, help='thread_priority with --gaps')
     given = parser.parse_args()
     enter_workspace()
     if given.gaps:
-        gap_table(given.seconds, given.only)
+        gap_table(given.seconds, given.only, given.priority)
         return
     if given.sensors:
         sensor_table(given.seeds, given.only)

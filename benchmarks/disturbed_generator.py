@@ -30,7 +30,7 @@ from numba import njit
 from rclpy.logging import get_logger
 
 #: From the start to the first disturbance, and between two, s.
-BEGIN, PAUSE = 6.0, 2.0
+BEGIN, PAUSE = 11.0, 2.0
 
 
 def log() -> None:
@@ -75,4 +75,4 @@ def disturb(kind: str) -> None:
 
 if __name__ == '__main__':
     threading.Thread(target=disturb, args=sys.argv[1:2], daemon=True).start()
-    sys.exit(generator.main(sys.argv[1:]))
+    sys.exit(generator.main(sys.argv[2:]))
