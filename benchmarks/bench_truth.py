@@ -180,15 +180,15 @@ def random_covered(name: str, runs: int, seed: int, stalls: str = '') -> dict[st
             'inside': {key: count / max(fitted, 1) for key, count in inside.items()}}
 
 
-def generated_covered(seeds: int, only: str = '') -> dict[str, object]:
+def generated_covered(seeds: range, only: str = '') -> dict[str, object]:
     """Count the truths inside of what the generator publishes of everything shipped."""
-    inside = total = none = 0
+    inside = total = unbounded = none = 0
     missed: dict[str, int] = {}
     for robot, network, gait in walks():
         if only not in f'{robot} {network} {gait}':
             continue
-        preset = NETWORKS[network].presets()[gait].network
-        for seed in range(seeds):
+        preset, began, held = NETWORKS[network].presets()[gait].network, time.process_time(), []
+        for seed in seeds:
             try:
                 fit = fit_recording(generated(robot, network, gait, seed), load_robot(robot),
                                     network, gait).fit
@@ -201,14 +201,17 @@ def generated_covered(seeds: int, only: str = '') -> dict[str, object]:
                 one = fit.parameters[name]
                 value = truth[preset.groups.get(name, (name,))[0]] if name != GAIT_DUTY else (
                     truth[name])
-                held = value is not None and one.low <= value <= one.high
-                inside, total = inside + held, total + 1
-                if not held:
-                    missed[f'{robot} {network} {gait} {name}'] = missed.get(
-                        f'{robot} {network} {gait} {name}', 0) + 1
-        log(f'{robot} {network} {gait}: {inside} of {total} inside so far')
+                held.append(value is not None and one.low <= value <= one.high)
+                unbounded += not one.bounded
+                if not held[-1]:
+                    key = f'{robot} {network} {gait} {name}'
+                    missed[key] = missed.get(key, 0) + 1
+                    log(f'{key} seed {seed}: {value} not in {one.low:.6g} to {one.high:.6g}')
+        inside, total = inside + sum(held), total + len(held)
+        log(f'{robot} {network} {gait}: {sum(held)} of {len(held)} inside, '
+            f'{time.process_time() - began:.2f} s; {inside} of {total} so far')
     return {'fits_failed': none, 'intervals': total, 'inside': inside / max(total, 1),
-            'missed': missed}
+            'unbounded': unbounded, 'missed': missed}
 
 
 def main() -> None:
@@ -217,16 +220,20 @@ def main() -> None:
     parser.add_argument('--seed', type=int, default=1)
     parser.add_argument('--generator', nargs='?', const='', metavar='WORDS', help='only what the '
                         'generator publishes, of robots, networks and gaits with these words')
+    parser.add_argument('--seeds', type=int, nargs=2, default=(0, GENERATED),
+                        metavar=('FROM', 'TO'),
+                        help='of the noise of what the generator publishes')
     given = parser.parse_args()
+    seeds = range(*given.seeds)
     if given.generator is not None:
-        emit(benchmark='truth', generator=generated_covered(GENERATED, given.generator))
+        emit(benchmark='truth', generator=generated_covered(seeds, given.generator))
         return
     random = {f'{name} {stalls}'.strip(): random_covered(name, given.runs, given.seed, stalls)
               for stalls in ('', 'missing', 'repeated') for name in DRAWN}
     found = {f'{case[0]} {case[1]} order {case[2]}': covered(*case) for case in CASES}
     found |= {f'{name} {gait} phases': phases_covered(name, gait) for name, gait in STATED}
     worst = min(fraction for case in found.values() for fraction in case['inside'].values())
-    generator = generated_covered(GENERATED)
+    generator = generated_covered(seeds)
     emit(benchmark='truth', seeds=SEEDS, cases=found, worst=worst, target=GOAL, seed=given.seed,
          drawn=random, generator=generator,
          passed=min(worst, generator['inside']) >= GOAL and not generator['fits_failed'])

@@ -26,7 +26,6 @@ from itertools import pairwise
 
 from cpg_ros.common.errors import InputError, ShortRepr
 import numpy as np
-from scipy.linalg import solve_toeplitz, toeplitz
 
 # The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
 
@@ -103,6 +102,9 @@ def resolvable_harmonics(t: np.ndarray, period: float) -> int:
     As many as a least-squares fit bears without magnifying noise: the smallest eigenvalue of
     its normal matrix (1 for even sampling, 0 where harmonics are aliases) is kept from 0.
     """
+    # Loaded where it is used, as is all of scipy here, for programs that fit nothing.
+    from scipy.linalg import toeplitz
+
     most = min(HARMONICS, (t.size - 1) // 4)
     bins = np.bincount((t / period % 1.0 * BINS).astype(int) % BINS, minlength=BINS)
     sums = np.fft.fft(bins)[:2 * most + 1] / t.size
@@ -127,6 +129,8 @@ def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     The normal matrix of exp(2 pi i n phase), n = -N..N, is Toeplitz. No BLAS here: on a busy
     computer waiting for its threads takes longer than all of this.
     """
+    from scipy.linalg import solve_toeplitz, toeplitz
+
     n = len(rows) // 2
     cos, sin = rows[1:1 + n], rows[1 + n:]
     sums = np.ones(2 * n + 1, dtype=complex)
@@ -386,7 +390,6 @@ def _tracked_period(t: np.ndarray, x: np.ndarray,
 
 def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
     """Return lags at which the recording repeats, each better than all shorter ones."""
-    # Loaded here: it takes longer than all else that optimize --help loads.
     from scipy.interpolate import PchipInterpolator
 
     m = min(4 * t.size, GRID)

@@ -46,8 +46,6 @@ from cpg_ros.fitting.inversion.leg_duty import (
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: SHIFTS: number of phases among which the initial one between recording and orbit is chosen.
-SHIFTS = 32
 #: KEPT: number of orbits that are kept, the last ones.
 KEPT = 64
 #: ERRORS: number of harmonics of a waveform that may differ from the model's.
@@ -111,11 +109,16 @@ class CycleProblem:
         waves, phases = self._symmetry.waves, self._symmetry.phases
         keys = [(int(waves[cell]), float(phases[cell]), int(waves[lead]), float(phases[lead]))
                 for cell, lead in zip(joints.cells, leading, strict=True)]
-        self._places = {(int(joints.cells[keys.index(key)]), int(leading[keys.index(key)])):
-                        [j for j, other in enumerate(keys) if other == key]
-                        for key in dict.fromkeys(keys)}
+        #: Joints that see the same have the same place: which, and cell and leading cell of each.
+        self._rows = np.array([list(dict.fromkeys(keys)).index(key) for key in keys])
+        first = [keys.index(key) for key in dict.fromkeys(keys)]
+        self._cells, self._leads = joints.cells[first], leading[first]
+        #: Whether a joint is the first, second, ... of its leg, (joints,).
+        self.kinds = np.array([np.count_nonzero(leading[:j] == lead)
+                               for j, lead in enumerate(leading)])
         self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
         self._held: dict[bytes, tuple[Orbit, Signals]] = {}
+        self._without: dict[bytes, str] = {}
         self._placed: tuple[bytes, ReadoutFit] | None = None
 
     def duty(self, values: np.ndarray) -> float | None:
@@ -170,8 +173,14 @@ class CycleProblem:
             if near is None or network.delay_parameter:
                 # With a delay the way from the onset is as short as that from a neighbour.
                 return self._keep(values, solve_orbit(network, self.gait, near))
-            # A step too long for Newton's method is one too long for the trust region.
-            return self._keep(values, solve_beside(network, near))
+            if key in self._without:
+                raise NoOrbit(self._without[key])
+            try:
+                # A step too long for Newton's method is one too long for the trust region.
+                return self._keep(values, solve_beside(network, near))
+            except NoOrbit as error:
+                self._without[key] = str(error)
+                raise
         return self._solved[key]
 
     def _nearest(self, values: np.ndarray) -> Orbit | None:
@@ -192,10 +201,10 @@ class CycleProblem:
         return self._placed[1]
 
     def by_waveform(self, values: np.ndarray) -> np.ndarray:
-        """Return the derivative of the residual over its sizes by errors of the waveforms.
+        """Return the derivative of the residual by errors of the waveforms, rad.
 
         By the cosine and sine terms of the first ``ERRORS`` harmonics of every waveform, relative
-        to half its range, readouts staying the best; shape (residuals, terms).
+        to half its range, readouts staying the best; shape (m, joints, terms).
         """
         orbit, seen = self._solve(values)
         waves, count = len(seen.terms), min(ERRORS, seen.terms.shape[1] - 1) + 1
@@ -204,59 +213,59 @@ class CycleProblem:
             slopes[wave, :count, wave] = np.eye(count)[:, None] * np.array([1.0, -1j])[:, None]
         slopes = slopes.reshape(*seen.terms.shape, -1)
         terms = slopes.shape[-1]
-        jacobian = self._read(orbit, Signals(seen.terms, slopes), values, np.eye(terms),
-                              np.zeros(terms))[2][..., :-1]
-        found = (jacobian / self.sizes[:, None]).reshape(-1, terms)
-        return found if self._period is None else np.vstack([found, np.zeros(terms)])
+        return self._read(orbit, Signals(seen.terms, slopes), values, np.eye(terms),
+                          np.zeros(terms))[2][..., :-1]
+
+    @property
+    def noise(self) -> float:
+        """Sum of squares of the weighted residual that noise alone would leave."""
+        return (len(self.joints.data) - self.weights) * float(np.sum(
+            (self.joints.stated / self.sizes)**2))
+
+    def left(self, values: np.ndarray) -> np.ndarray:
+        """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
+        residual = self.best_readouts(values).residual
+        return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - self.weights))
 
     def stance_share(self, values: np.ndarray) -> float:
         """Return the share of the stride that the leg of the first joint stands."""
         duty = self.duty(values)
         if duty is not None:
             return duty
-        (orbit, seen), (_, lead) = self._solve(values), next(iter(self._places))
-        return self._own_stance(orbit, seen, lead).fraction
+        orbit, seen = self._solve(values)
+        return self._own_stance(orbit, seen, int(orbit.waves[self._leads[0]])).fraction
 
-    def _own_stance(self, orbit: Orbit, seen: Signals, lead: int) -> OwnStance:
-        return own_stance(seen, int(orbit.waves[lead]), orbit.network.readout == 'waveform',
-                          self.readout.stance)
+    def _own_stance(self, orbit: Orbit, seen: Signals, wave: int) -> OwnStance:
+        return own_stance(seen, wave, orbit.network.readout == 'waveform', self.readout.stance)
 
-    def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray,
-                 members: np.ndarray, of_duty: np.ndarray
-                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Return the phases of a cell retimed by the gait's duty, or None without a duty.
+    def _phases(self, orbit: Orbit, seen: Signals, values: np.ndarray, members: np.ndarray,
+                of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the phases of the cells at which joints are read, and their derivatives.
 
-        Phases at which joints are read on theta, cycles, and their derivatives as of
-        leg_duty.retimed.
+        Cycles, shape (places, m); by the numbers, (places, m, numbers), and by the phase.
         """
-        duty, place = self.duty(values), float(orbit.phases[cell])
+        duty, cells = self.duty(values), orbit.phases[self._cells]
+        phases = self.joints.theta + (cells + values[-1])[:, None]
+        moved, steep = np.zeros((*phases.shape, of_duty.size)), np.ones_like(phases)
+        ahead, waves = (cells - orbit.phases[self._leads])[:, None], orbit.waves[self._leads]
         if duty is None:
-            return None
-        return retimed(self.joints.theta + place + values[-1], duty,
-                       self._own_stance(orbit, seen, lead), place - float(orbit.phases[lead]),
-                       members, of_duty)
+            return phases, moved, steep
+        for wave in np.unique(waves):
+            rows, own = waves == wave, self._own_stance(orbit, seen, int(wave))
+            phases[rows], moved[rows], steep[rows] = retimed(phases[rows], duty, own, ahead[rows],
+                                                             members, of_duty)
+        return phases, moved, steep
 
     def _read(self, orbit: Orbit, seen: Signals, values: np.ndarray, members: np.ndarray,
               of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        m, joints = self.joints.data.shape
-        weights = np.empty((self.weights, joints))
-        residual, jacobian = np.empty((m, joints)), np.empty((m, joints, of_duty.size + 1))
-        for (cell, lead), columns in self._places.items():
-            wave = int(orbit.waves[cell])
-            theta, shift = self.joints.theta, float(orbit.phases[cell] + values[-1])
-            mapped = self._retimed(orbit, seen, cell, lead, values, members, of_duty)
-            if mapped is not None:
-                theta, shift = mapped[0], 0.0
-            x, y, z = seen.values(theta, shift, wave)
-            psi, by_phase = basis(self.order, x, y, z)
-            moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave, members))
-            if mapped is not None:
-                moved += by_phase[..., None] * mapped[1][:, None]
-                by_phase *= mapped[2][:, None]
-            weights[:, columns], residual[:, columns], jacobian[:, columns] = project(
-                psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
-                self.joints.data[:, columns])
-        return weights, residual, jacobian
+        phases, by_number, steep = self._phases(orbit, seen, values, members, of_duty)
+        waves = orbit.waves[self._cells]
+        x, y, z = seen.values(phases, waves)
+        psi, by_phase = basis(self.order, x, y, z)
+        moved = basis_moved(self.order, x, y, seen.derivatives(phases, waves, members))
+        moved += by_phase[..., None] * by_number[:, :, None]
+        return project(psi, np.concatenate([moved, (by_phase * steep[..., None])[..., None]], -1),
+                       self.joints.data, self._rows)
 
     def at_order(self, order: int) -> 'CycleProblem':
         """Return the same problem with readouts of another order."""
@@ -264,19 +273,31 @@ class CycleProblem:
         found.order, found._placed = order, None
         return found
 
+    def weighted(self, columns: np.ndarray) -> np.ndarray:
+        """Divide what is given for each instant and joint by the sizes.
+
+        Args:
+            columns: rad, shape (m, joints, n).
+
+        Returns:
+            An array of shape (residuals, n), with an entry of 0 for a period that is data.
+
+        """
+        found = (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
+        return found if self._period is None else np.vstack([found, np.zeros(found.shape[-1])])
+
     def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual over its standard errors, joint by joint within each instant, and derivative.
 
         The last entry is that of the period, where it is data.
         """
         placed = self.best_readouts(values)
-        left = (placed.residual / self.sizes).ravel()
-        slopes = (placed.jacobian / self.sizes[:, None]).reshape(left.size, -1)
-        if self._period is None:
-            return left, slopes
-        by_period = np.append(placed.orbit.d_period @ self._members, 0.0) / self._period.error
-        off = (placed.orbit.period - self._period.value) / self._period.error
-        return np.append(left, off), np.vstack([slopes, by_period])
+        both = self.weighted(np.concatenate([placed.residual[..., None], placed.jacobian], -1))
+        if self._period is not None:
+            both[-1, 0] = placed.orbit.period - self._period.value
+            both[-1, 1:-1] = placed.orbit.d_period @ self._members
+            both[-1] /= self._period.error
+        return both[:, 0], both[:, 1:]
 
     def cost(self, values: np.ndarray) -> float:
         """Return half the sum of squares; raise NoOrbit as ``begin`` does."""
@@ -292,23 +313,24 @@ class CycleProblem:
 
         As a sum of squares over the squares of the sizes, the mean of each joint included.
         """
-        (orbit, seen), m = self._solve(values), self.joints.theta.size
-        # Shifts by whole instants: what a cell gives is worked out once for all of them.
-        steps = np.unique(np.arange(SHIFTS) * m // SHIFTS)
-        rows, found = (np.arange(m) + steps[:, None]) % m, np.zeros(steps.size)
-        values = np.append(values[:-1], 0.0)
-        for (cell, lead), columns in self._places.items():
-            theta, shift = self.joints.theta, float(orbit.phases[cell])
-            mapped = self._retimed(orbit, seen, cell, lead, values, self._members,
-                                   self._of_duty)
-            if mapped is not None:
-                theta, shift = mapped[0], 0.0
-            psi = basis(self.order, *seen.values(theta, shift, int(orbit.waves[cell])))[0]
-            sums = np.einsum('smn,mj->snj', psi[rows],
-                             (self.joints.data / self.sizes)[:, columns])
-            found += np.sum(sums * np.linalg.solve(psi.T @ psi, sums), axis=(1, 2))
-        best = int(found.argmax())
-        return float(steps[best] / m), float(found[best])
+        explained = self.explained_by(values).sum(axis=0)
+        best = int(explained.argmax())
+        return best / explained.size, float(explained[best])
+
+    def explained_by(self, values: np.ndarray) -> np.ndarray:
+        """Return how much the readout of each joint explains at phases of an even grid.
+
+        As a sum of squares over the square of its size, its mean included; shape (joints, m).
+        """
+        orbit, seen = self._solve(values)
+        phases = self._phases(orbit, seen, np.append(values[:-1], 0.0), self._members,
+                              self._of_duty)[0]
+        psi = basis(self.order, *seen.values(phases, orbit.waves[self._cells]))[0]
+        inverse = np.linalg.inv(np.linalg.qr(psi, mode='r'))
+        # The basis at all shifts, by the correlation theorem.
+        spectra = np.fft.rfft(psi @ inverse, axis=1)[self._rows]
+        data = np.fft.rfft(self.joints.data / self.sizes, axis=0).T[..., None]
+        return np.sum(np.fft.irfft(spectra * data.conj(), phases.shape[1], axis=1)**2, axis=-1)
 
     def rephased(self, values: np.ndarray) -> np.ndarray:
         """Return values with the guessed phase if it leaves less than their own does.

@@ -17,13 +17,12 @@
 The residual of a model that is not the truth is no noise: it is larger than the standard errors
 of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
 leaves where that is more, and variances are inflated by how far the residual is correlated along
-the cycle. Intervals are quadratic where the cost is, and those of the profile likelihood where it
-is not. A residual that noise does not explain widens them: the model's waveforms are taken to be
-off by as much as explains it, and so are the numbers that such waveforms move.
+the cycle. Intervals are those of the profile of the cost. A residual that noise does not explain
+widens them: the model's waveforms are taken to be off by as much as explains it, and so are the
+numbers that such waveforms move.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from cpg_ros.common.errors import short, ShortRepr
@@ -31,8 +30,8 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.stability import GaitAssessment
-from cpg_ros.fitting.inversion.fit_starts import distinct
-from cpg_ros.fitting.inversion.free_parameters import Evaluate, Free, Minimisation
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
+from cpg_ros.fitting.inversion.free_parameters import distinct, Minimisation
 from cpg_ros.networks.network import Network
 import numpy as np
 from scipy.special import stdtrit
@@ -42,11 +41,9 @@ QUANTILE = 1.959964
 #: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; SHARE:
 #: component of a number in such a direction above which the number is not determined.
 ZERO, SHARE = 1e-7, 1e-3
-#: An interval is computed without a profile if the root of the cost's rise, over the quadratic's,
-#: is within REGULAR and its end is found in STEPS_NEARBY steps.
-REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
-#: STEPS: most steps of a profile on either side; CLOSE: its relative tolerance.
-STEPS, CLOSE = 10, 0.03
+#: STEPS: most steps of a profile on either side; CLOSE: its tolerance, standard errors; FURTHER:
+#: length of a step over that of the last one, at most.
+STEPS, CLOSE, FURTHER = 10, 0.03, 3.0
 #: NEGLIGIBLE: distance from a bound, as a share of a step, up to which a number is at the bound.
 NEGLIGIBLE = 1e-6
 #: Descents of a profile. TOLERANCE: at which they stop; MOST: most evaluations; DRAWN: width, over
@@ -55,9 +52,6 @@ TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 
 #: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
 EXPLAINED = 1.2
-
-#: Minimises: problem, start, tolerance, most evaluations.
-Descend = Callable[[Evaluate, np.ndarray, float, int], Minimisation]
 
 
 @dataclass(frozen=True)
@@ -78,6 +72,11 @@ class Estimate:
     low: float
     high: float
     bounded: bool
+
+    def together(self, other: 'Estimate') -> 'Estimate':
+        """Return this one with an interval that holds another's as well."""
+        return replace(self, low=min(self.low, other.low), high=max(self.high, other.high),
+                       bounded=self.bounded and other.bounded)
 
 
 def correlation_length(residual: np.ndarray) -> float:
@@ -107,12 +106,14 @@ class Spread(ShortRepr):
         blind: directions that change nothing, one a row, each number in units of what it takes
             to change the cost by itself, shape (directions, n).
         scale: those units, shape (n,).
+        inflation: factor on all variances, which they have.
 
     """
 
     covariance: np.ndarray
     blind: np.ndarray
     scale: np.ndarray
+    inflation: float
 
     @property
     def errors(self) -> np.ndarray:
@@ -146,7 +147,8 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
     values, rows = np.linalg.svd(jacobian * scale, full_matrices=False)[1:]
     seen = values > ZERO * max(values[0], 1e-300)
     half = rows[seen] / values[seen, None]
-    return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale)
+    return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale,
+                  inflation)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,172 +195,102 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
                       / np.where(size > 0.0, size, 1.0), float(stdtrit(max(freedom, 1.0), 0.975)))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Optimum(ShortRepr):
-    """A minimum of the cost, and the quantities from which its intervals are computed.
+def estimates(problem: CycleProblem, values: np.ndarray, known: Spread, model: ModelError,
+              profiles: bool) -> dict[str, Estimate]:
+    """Estimate the free numbers with intervals, by the profile of the cost if that is asked for.
 
-    Attributes:
-        evaluate: the problem.
-        values: where the cost is least, shape (n,).
-        free: the free numbers, which the values begin with.
-        cost: half the sum of squares.
-        inflation: factor on variances.
-        spread: covariance.
-        model: what errors of the model add to it.
-        descend: goes down from values that have an orbit.
-        moved: values after a step, along lines that follow the valleys of the cost.
-        rephased: values with a better phase, if there is one.
-        elsewhere: other values where the cost is least nearby.
+    Where errors of the model count, which are as uncertain, and where a number is not determined,
+    intervals are quadratic.
+
+    Args:
+        problem: the fit.
+        values: where its cost is least, shape (n,).
+        known: their covariance.
+        model: errors of the model.
+        profiles: whether intervals are those of the profile.
 
     """
-
-    evaluate: Evaluate
-    values: np.ndarray
-    free: Sequence[Free]
-    cost: float
-    inflation: float
-    spread: Spread
-    model: ModelError
-    descend: Descend
-    moved: Callable[[np.ndarray, np.ndarray], np.ndarray]
-    rephased: Callable[[np.ndarray], np.ndarray]
-    elsewhere: Sequence[np.ndarray] = ()
-
-    def estimate(self, k: int, profiles: bool = True) -> Estimate:
-        """Estimate number k with its interval, by its profile where the cost is not quadratic.
-
-        What errors of the model make of the number is added to either side, as independent.
-        """
-        value, error = float(self.values[k]), float(self.spread.errors[k])
-        by_model = float(self.model.errors[k])
-        least, most = self.free[k].low, self.free[k].high
+    found = {}
+    for k, one in enumerate(problem.free):
+        value, noise, by_model = (float(each[k]) for each in (values, known.errors, model.errors))
+        error = float(np.hypot(noise, by_model))
         if not np.isfinite(error):
-            return Estimate(value, error, least, most, False)
-        beside = self.model.quantile * by_model
-        if not profiles or error <= 0.0 or beside > QUANTILE * error:
-            half = float(np.hypot(QUANTILE * error, beside))
-            return Estimate(value, float(np.hypot(error, by_model)), max(least, value - half),
-                            min(most, value + half), least <= value - half <= value + half <= most)
-        (low, below), (high, above) = (self._end(k, error, side) for side in (-1.0, 1.0))
-        as_good = [at for at in self.elsewhere if self._rise(at) < QUANTILE]
-        for at in sorted(as_good, key=lambda at: float(at[k]))[:1]:
-            if at[k] < low:
-                low, below = self._profile(k, 0.5 * abs(at[k] - value), -1.0, at)
-        for at in sorted(as_good, key=lambda at: float(at[k]))[-1:]:
-            if at[k] > high:
-                high, above = self._profile(k, 0.5 * abs(at[k] - value), 1.0, at)
-        low = max(least, value - float(np.hypot(value - low, beside)))
-        high = min(most, value + float(np.hypot(high - value, beside)))
-        return Estimate(value, float(np.hypot(error, by_model)), low, high, below and above)
+            found[one.name] = Estimate(value, error, one.low, one.high, False)
+        elif not profiles or model.size > 0.0 or noise <= 0.0:
+            half = float(np.hypot(QUANTILE * noise, model.quantile * by_model))
+            low, high = value - half, value + half
+            found[one.name] = Estimate(value, error, max(one.low, low), min(one.high, high),
+                                       one.low <= low and high <= one.high)
+        else:
+            (low, below), (high, above) = (_end(problem, values, known, k, side)
+                                           for side in (-1.0, 1.0))
+            found[one.name] = Estimate(value, error, low, high, below and above)
+    return found
 
-    def _rise(self, values: np.ndarray, held: int | None = None) -> float:
-        """Return the distance in standard errors that the cost at values stands for.
 
-        With a number that is held, of the least cost that a linear step of the others makes of it:
-        where a valley of the cost is curved, a straight line leaves it.
-        """
-        left, slopes = self.evaluate(values)
-        if held is not None:
-            others = np.delete(slopes, held, axis=1) * np.delete(self.spread.scale, held)
-            left = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
-        rise = 0.5 * float(left @ left) - self.cost
-        return float(np.sqrt(max(0.0, 2.0 * rise / self.inflation)))
+def _end(problem: CycleProblem, values: np.ndarray, known: Spread, k: int, side: float
+         ) -> tuple[float, bool]:
+    """Follow the least cost for given values of number k to the end of its interval.
 
-    def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
-        """One end of the interval, and whether the data set it."""
-        bound = self.free[k].high if side > 0.0 else self.free[k].low
-        if abs(bound - self.values[k]) <= NEGLIGIBLE * error:
-            return bound, False
-        end = self._nearby(k, error, side)
-        if end is not None:
-            return end, True
-        try:
-            return self._profile(k, QUANTILE * error, side, self.values)
-        except NoOrbit:
-            # No orbit was found on the way: use the quadratic, and do not call it a bound.
-            end = float(self.values[k]) + side * QUANTILE * error
-            return min(max(end, self.free[k].low), self.free[k].high), False
+    Returns:
+        Number k there, and whether the cost has risen enough: not at a bound of the number, or the
+        edge of where there is an orbit.
 
-    def regular(self, k: int) -> bool:
-        """Return whether the cost is about quadratic in number k within its interval."""
-        error = float(self.spread.errors[k])
-        return not np.isfinite(error) or all(self._nearby(k, error, side) is not None
-                                             for side in (-1.0, 1.0))
+    """
+    limit = problem.free[k].high if side > 0.0 else problem.free[k].low
+    least, step = problem.cost(values), QUANTILE * float(known.errors[k])
+    low, high = (0.0, values), (np.inf, values)
+    place = float(values[k]) + side * step
+    for _ in range(STEPS):
+        place = limit if side * (place - limit) >= 0.0 else place
+        at = low[1]
+        if abs(place - at[k]) <= NEGLIGIBLE * step:
+            return float(at[k]), False
+        there, cost = _least(problem, known, k, place, at)
+        rise = float(np.sqrt(max(0.0, 2.0 * (cost - least) / known.inflation)))
+        if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+            return float(there[k]), True
+        if rise > QUANTILE:
+            high = rise, there
+        elif place == limit or abs(there[k] - place) > CLOSE * abs(place - at[k]):
+            return float(there[k]), False
+        else:
+            further = (QUANTILE - rise) / max(rise - low[0], 0.1 * (QUANTILE - rise))
+            place = float(there[k] + min(FURTHER, 1.05 * further) * (there[k] - low[1][k]))
+            low = rise, there
+        if np.isfinite(high[0]):
+            fraction = np.clip((QUANTILE - low[0]) / (high[0] - low[0]), 0.1, 0.9)
+            place = float(low[1][k] + fraction * (high[1][k] - low[1][k]))
+    return (float(low[1][k]), False) if np.isinf(high[0]) else (float(high[1][k]), True)
 
-    def _nearby(self, k: int, error: float, side: float) -> float | None:
-        """Return the interval's end where the cost is about quadratic as far as there, or None."""
-        step = QUANTILE
-        for _ in range(STEPS_NEARBY):
-            try:
-                there = self._along(k, self.values, side * step * error)
-                rise, least = self._rise(there), self._rise(there, k)
-            except NoOrbit:
-                return None
-            if least < (1.0 - CLOSE) * rise:
-                return None
-            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
-                return float(there[k])
-            if not REGULAR[0] <= rise / QUANTILE <= REGULAR[1]:
-                return None
-            step *= QUANTILE / rise
-        return None
 
-    def _along(self, k: int, values: np.ndarray, step: float) -> np.ndarray:
-        """Move number k by a step, and the others as they go with it."""
-        return self.moved(values, step * self.spread.covariance[:, k]
-                          / self.spread.covariance[k, k])
+def _least(problem: CycleProblem, known: Spread, k: int, place: float, at: np.ndarray
+           ) -> tuple[np.ndarray, float]:
+    """Values of least cost with number k about at a place, and that cost; from values.
 
-    def _profile(self, k: int, step: float, side: float, at: np.ndarray) -> tuple[float, bool]:
-        """Follow the least cost for given values of number k to where it has risen enough.
+    Number k is drawn there by a residual of its own, so that no step need start from where there
+    is no orbit.
+    """
+    row = (np.arange(at.size) == k) / (DRAWN * CLOSE * abs(place - at[k]))
 
-        From values where it has not, by a step to begin with.
-        """
-        limit = self.free[k].low if side < 0.0 else self.free[k].high
-        best = inside = float(at[k])
-        inside_rise = self._rise(at)
-        outside, outside_rise = None, np.inf
-        place = best + side * step
-        for _ in range(STEPS):
-            place = limit if side * (place - limit) >= 0.0 else place
-            if abs(place - inside) <= NEGLIGIBLE * step:
-                # At its bound already.
-                return inside, False
-            found = self._least(k, place, at, CLOSE * min(step, abs(place - inside)))
-            rise, reached = self._rise(found), float(found[k])
-            short = abs(reached - place) > CLOSE * abs(place - inside)
-            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
-                return reached, True
-            if rise < QUANTILE:
-                inside, inside_rise, at = reached, rise, found
-                if short or place == limit:
-                    # A bound, or the edge of where there is an orbit.
-                    return reached, False
-            else:
-                outside, outside_rise = reached, rise
-            if outside is None:
-                place = best + (place - best) * min(3.0, 1.02 * QUANTILE / max(rise, 0.1))
-            else:
-                fraction = (QUANTILE - inside_rise) / (outside_rise - inside_rise)
-                place = inside + float(np.clip(fraction, 0.1, 0.9)) * (outside - inside)
-        return (inside, False) if outside is None else (outside, True)
+    def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        left, slopes = problem(values)
+        return np.append(left, row @ values - row[k] * place), np.vstack([slopes, row])
 
-    def _least(self, k: int, place: float, at: np.ndarray, size: float) -> np.ndarray:
-        """Return the values of least cost with number k at a place, up to a share of size.
-
-        Number k is drawn there by a residual of its own, so that no step need start from where
-        there is no orbit.
-        """
-        row = (np.arange(at.size) == k) / (DRAWN * size)
-
-        def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            left, slopes = self.evaluate(values)
-            return np.append(left, row @ values - row[k] * place), np.vstack([slopes, row])
-
-        try:
-            begin = self.rephased(self._along(k, at, place - at[k]))
-        except NoOrbit:
-            begin = at
-        return self.descend(evaluate, begin, TOLERANCE, MOST).values
+    try:
+        begin = problem.rephased(problem.coordinates.moved(
+            at, (place - at[k]) * known.covariance[:, k] / known.covariance[k, k]))
+        left, slopes = problem(begin)
+        others = np.delete(slopes * known.scale, k, axis=1)
+        rest = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
+        cost, least = 0.5 * float(left @ left), 0.5 * float(rest @ rest)
+        # A linear step of the others leaves little to be gained: none need be taken.
+        if cost - least < CLOSE * known.inflation:
+            return begin, least
+    except NoOrbit:
+        begin = at
+    there = problem.coordinates.descend(evaluate, begin, TOLERANCE, MOST).values
+    return there, problem.cost(there)
 
 
 # A gait fitted to a recording: parameters, readouts, errors and uncertainties.
@@ -463,11 +395,11 @@ class Fit(ShortRepr):
 
     @property
     def minima(self) -> list[Minimisation]:
-        """Where the starts ended, each place once, the least cost first."""
+        """Where the starts converged, each place once, the least cost first."""
         found: list[Minimisation] = []
         for trial in sorted(self.starts, key=lambda one: one.cost):
-            if not trial.why and all(distinct(trial.values[:-1], one.values[:-1])
-                                     for one in found):
+            if not found or (trial.converged and all(
+                    distinct(trial.values[:-1], one.values[:-1]) for one in found)):
                 found.append(trial)
         return found
 

@@ -16,7 +16,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Protocol
 
 from cpg_ros.common.errors import InputError, ShortRepr
@@ -54,49 +53,52 @@ def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
 
 
 def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Return the derivatives of 1 and the monomials, shape (m, 1 + weights, numbers).
+    """Return the derivatives of 1 and the monomials, shape (..., 1 + weights, numbers).
 
     Args:
         order: 1 to 3.
-        x: signal, shape (m,).
+        x: signal, any shape.
         y: its derivative by phase in radians.
-        slopes: derivatives of x and y by some numbers, shape (2, m, numbers).
+        slopes: derivatives of x and y by some numbers, shape (2, ..., numbers).
 
     """
     one, zero = np.ones_like(x), np.zeros_like(x)
-    by_x = np.stack([zero, one, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=1)
-    by_y = np.stack([zero, zero, one, zero, x, zero, x * x], axis=1)
+    by_x = np.stack([zero, one, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=-1)
+    by_y = np.stack([zero, zero, one, zero, x, zero, x * x], axis=-1)
     count = 1 + WEIGHTS[order]
-    return (by_x[:, :count, None] * slopes[0][:, None]
-            + by_y[:, :count, None] * slopes[1][:, None])
+    return (by_x[..., :count, None] * slopes[0][..., None, :]
+            + by_y[..., :count, None] * slopes[1][..., None, :])
 
 
-def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray
+def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray, rows: np.ndarray
             ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit a basis to joints and differentiate the residual.
+    """Fit bases to joints and differentiate the residual.
 
     Args:
-        psi: basis, shape (m, n).
-        moved: its derivatives, shape (m, n, variables).
+        psi: bases, shape (bases, m, n).
+        moved: their derivatives, shape (bases, m, n, variables).
         data: of the joints, shape (m, joints).
+        rows: number of each joint's basis, shape (joints,).
 
     Returns:
         Offset and weights of each joint, shape (n, joints); the residual, fitted minus recorded,
         (m, joints); and its derivative, the readout staying the best, (m, joints, variables).
 
     Raises:
-        numpy.linalg.LinAlgError: the basis is not independent.
+        numpy.linalg.LinAlgError: a basis is not independent.
 
     """
     q, r = np.linalg.qr(psi)
-    weights = np.linalg.solve(r, q.T @ data)
-    left = psi @ weights - data
-    along = np.einsum('mnv,nj->mjv', moved, weights)
-    along -= np.tensordot(q, np.tensordot(q, along, (0, 0)), (1, 0))
-    pulled = np.einsum('mnv,mj->njv', moved, left)
-    pulled = np.linalg.solve(r.T, pulled.reshape(len(r), -1))
+    q, inverse, moved = q[rows], np.linalg.inv(r)[rows], moved[rows]
+    turned = q.transpose(0, 2, 1)
+    weights = inverse @ (turned @ data.T[..., None])
+    left = psi[rows] @ weights - data.T[..., None]
+    along = (moved.swapaxes(2, 3) @ weights[:, None])[..., 0]
+    along -= q @ (turned @ along)
+    pulled = (moved.transpose(0, 2, 3, 1) @ left[:, None])[..., 0]
     # The second part vanishes with the residual: it is what Kaufman (1975) leaves out.
-    return weights, left, along - (q @ pulled).reshape(along.shape)
+    along -= q @ (inverse.transpose(0, 2, 1) @ pulled)
+    return weights[..., 0].T, left[..., 0].T, along.swapaxes(0, 1)
 
 
 # The signals of a gait that drive joints, as harmonics, and their derivatives by parameters.
@@ -119,50 +121,46 @@ class Signals(ShortRepr):
     terms: np.ndarray
     slopes: np.ndarray
 
-    def values(self, theta: np.ndarray, shift: float | np.ndarray, wave: int
+    def values(self, theta: np.ndarray, waves: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y and the derivative of y by phase in radians.
 
         Args:
-            theta: cycles, shape (m,); few different ones, since what they give is kept.
-            shift: added to them, cycles, a number or several.
-            wave: number of the waveform.
+            theta: cycles, shape (places, m).
+            waves: number of the waveform at each place, shape (places,).
 
         Returns:
-            Three arrays of shape (m,), or (m, shifts).
+            Three arrays of shape (places, m).
 
         """
         k = np.arange(self.terms.shape[1])
-        terms = (self.terms[wave] * np.exp(TURN * 1j * np.multiply.outer(shift, k))).T
-        k = k.reshape(-1, *[1] * (terms.ndim - 1))
-        turns = _turns(theta.tobytes(), k.size)
-        return ((turns @ terms).real, (turns @ (1j * k * terms)).real,
-                (turns @ (-k * k * terms)).real)
+        terms = self.terms[waves]
+        found = _turns(theta, k.size) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=-1)
+        return found[..., 0].real, found[..., 1].real, found[..., 2].real
 
-    def derivatives(self, theta: np.ndarray, shift: float, wave: int, members: np.ndarray
-                    ) -> np.ndarray:
+    def derivatives(self, theta: np.ndarray, waves: np.ndarray, members: np.ndarray) -> np.ndarray:
         """Return the derivatives of x and y by numbers that move the parameters.
 
         Args:
             theta: as above.
-            shift: as above.
-            wave: number of the waveform.
+            waves: as above.
             members: how much each parameter moves with each number, (parameters, numbers).
 
         Returns:
-            An array of shape (2, m, numbers).
+            An array of shape (2, places, m, numbers).
 
         """
         k = np.arange(self.terms.shape[1])
-        slopes = (self.slopes[wave] @ members) * np.exp(TURN * 1j * k * shift)[:, None]
-        return (_turns(theta.tobytes(), k.size)
-                @ np.stack([slopes, 1j * k[:, None] * slopes])).real
+        slopes = (self.slopes @ members)[waves]
+        return (_turns(theta, k.size) @ np.stack([slopes, 1j * k[:, None] * slopes])).real
 
 
-@lru_cache(maxsize=16)
-def _turns(theta: bytes, count: int) -> np.ndarray:
-    """``exp(2 pi i k theta)``, shape (m, count)."""
-    return np.exp(TURN * 1j * np.multiply.outer(np.frombuffer(theta), np.arange(count)))
+def _turns(theta: np.ndarray, count: int) -> np.ndarray:
+    """``exp(2 pi i k theta)``, shape (..., count)."""
+    found = np.empty((*theta.shape, count), dtype=complex)
+    found[..., 0] = 1.0
+    found[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
+    return np.cumprod(found, axis=-1)
 
 
 def signals(orbit: Orbit, harmonics: int) -> Signals:

@@ -24,7 +24,7 @@ from contextlib import suppress
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
-from cpg_ros.fitting.inversion.free_parameters import Free
+from cpg_ros.fitting.inversion.free_parameters import Free, TINY
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
 
@@ -35,16 +35,8 @@ DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)
 #: LATE: delays that are tried, over the critical one; PLACES: places in a narrow range, whose ends
 #: have one sign and a ratio up to NARROW; FACTORS: factors of numbers without such a range.
 LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.5) / 9, 10.0
-#: TINY: scale of a number near 0, in its unit, for relative distances.
-TINY = 1e-3
-#: LEAST, MOST: numbers of starts beside the network's own values; APART: relative distance above
-#: which two minima are distinct.
-LEAST, MOST, APART = 2, 3, 0.03
-
-
-def distinct(one: np.ndarray, other: np.ndarray) -> bool:
-    """Return whether two sets of the free numbers, shape (numbers,), are distinct."""
-    return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
+#: LEAST, MOST: numbers of starts beside the network's own values.
+LEAST, MOST = 2, 3
 
 
 def _tried(problem: CycleProblem, k: int, one: Free, here: float) -> tuple[float, ...]:

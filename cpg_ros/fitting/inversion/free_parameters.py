@@ -20,7 +20,6 @@ bound.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -37,6 +36,14 @@ N = TypeVar('N', bound=Network)
 #: PLACES: places between a value and a bound at which the edge of the Hopf set is searched for;
 #: HALVINGS: halvings that then locate it.
 PLACES, HALVINGS = 64, 40
+#: APART: relative distance above which two minima are distinct; TINY: scale of a number near 0, in
+#: its unit, for relative distances.
+APART, TINY = 0.03, 1e-3
+
+
+def distinct(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether values of the free numbers, shape (numbers,), are not about the same."""
+    return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
 
 
 @dataclass(frozen=True)
@@ -228,10 +235,6 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
 
 #: ABOVE: least relative distance of the delay above the critical one.
 ABOVE = 1e-7
-#: Further starts. NEAR: delay over the critical one if other numbers vary; LATE: delays if none
-#: do;
-#: FACTORS: factors of the other numbers.
-NEAR, LATE, FACTORS = 1.03, (1.03, 1.3, 2.0, 4.0), (0.45, 0.7, 1.4, 2.0, 3.0)
 
 
 class Coordinates:
@@ -299,29 +302,13 @@ class Coordinates:
     def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Move values by a step along straight lines of the coordinates, within the bounds."""
         if self.straight:
-            low, high = self._bounds(values)
+            low, high = self.bounds(values)
             return np.clip(values + step, low, high)
         begin = self.of(values)
-        low, high = self._bounds(values)
+        low, high = self.bounds(values)
         return self.values(np.clip(begin + np.linalg.solve(self.slopes(begin), step), low, high))
 
-    def valley(self, values: np.ndarray) -> list[np.ndarray]:
-        """List values along the Hopf set, where other least costs may lie; none without delay."""
-        if self.straight:
-            return []
-        here, found = self.of(values), []
-        low, high = self._bounds(values)
-        others = [j for j, one in enumerate(self.free) if j != self.delay and one.members]
-        for late in LATE if not others else (NEAR, here[self.delay]):
-            for j, factor in [(j, factor) for j in others for factor in FACTORS] or [(-1, 1.0)]:
-                there = here.copy()
-                there[self.delay] = late
-                there[j] *= factor
-                with suppress(NoOrbit):
-                    found.append(self.values(np.clip(there, low, high)))
-        return found
-
-    def _bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the coordinates; a single number's are those of its Hopf set, too."""
         free = self.free
         if len(free) == 1 and self.straight and free[0].members:
@@ -353,7 +340,7 @@ class Coordinates:
             left, slopes = evaluate(self.values(coordinates))
             return left, slopes if self.straight else slopes @ self.slopes(coordinates)
 
-        low, high = self._bounds(start)
+        low, high = self.bounds(start)
         begin = np.clip(self.of(start), low, high)
         trial = minimise(moved, begin, low, high, tolerance, most)
         if self.straight or trial.why:

@@ -22,6 +22,7 @@ counts only where a time scale is given.
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.arclength import NoOrbit
@@ -29,23 +30,25 @@ from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Period
 from cpg_ros.fitting.inversion.fit import (
     correlation_length,
     Estimate,
+    estimates,
     Fit,
     mean_share,
     model_error,
     ModelError,
-    Optimum,
     QUANTILE,
     SHARE,
     Spread,
     spread,
 )
 from cpg_ros.fitting.inversion.fit_data import (
+    Joints,
     joints_of,
     MeanCycle,
     WEIGHTS,
 )
-from cpg_ros.fitting.inversion.fit_starts import best_starts, distinct, upside_down
+from cpg_ros.fitting.inversion.fit_starts import best_starts, upside_down
 from cpg_ros.fitting.inversion.free_parameters import (
+    distinct,
     Free,
     free_numbers,
     Minimisation,
@@ -140,6 +143,11 @@ KNOWN_FREQUENCY = 1e-4
 TOLERANCE, LAST = 1e-5, 1e-8
 #: NEARLY: cost of a minimum, as a multiple of the least, up to which it is compared with the best.
 NEARLY = 2.0
+#: FIRST: evaluations after which a start is left whose cost is above HOPELESS times the least one
+#: plus PROMISING times its own first one.
+FIRST, HOPELESS, PROMISING = 5, 10.0, 0.01
+#: BEYOND: distances over the half width of an interval at which lags of joints are tested.
+BEYOND = (1.4, 2.0, 2.8, 4.0)
 #: WEIGHINGS: most iterations of the joints' weights; SAME: relative change of a weight at which
 #: these stop.
 WEIGHINGS, SAME = 4, 0.02
@@ -169,8 +177,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         bounds: free number -> lower and upper bound, where narrower than the range.
         time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
             as the generator's frequency does.
-        profiles: whether intervals are those of the profile likelihood where the cost is not
-            quadratic; they take most of the time.
+        profiles: whether intervals are those of the profile of the cost; otherwise they are
+            quadratic.
         done: called with the share of the work that is done, 0 to 1.
 
     Raises:
@@ -179,11 +187,35 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         NoOrbit: no start has such a gait; the message is that of the first.
 
     """
+    numbers = _numbers(network, gait, free or network.free, bounds)
+    problem = _problem(cycle, joints_of(cycle, cells, network), network, gait, numbers, order,
+                       readout or GaitReadout.of(type(network), gait), time_scale)
+    trials = _trials(problem, starts, done)
+    best = min(trials, key=lambda trial: trial.cost)
+    values = _weighed(problem, best.values)
+    problem.hold(values)
+    values, others, turned = _preferred(problem, values, trials)
+    runs, flaw = _that_runs(problem, [values, *others], best.path[:, 1:])
+    warnings = [] if problem.readout.weights else [
+        'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
+            f'{free.name} {value:.4g}' for free, value in zip(problem.free, one, strict=False))
+        + ' fits as well, all joints reversed' for one in turned]
+    if flaw:
+        warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
+            '' if runs is None else '; using the best fit that the generator can run')]
+    done(0.6)
+    fit = _judged(problem, trials, others, values if runs is None else runs,
+                  profiles and not flaw, warnings)
+    done(1.0)
+    return fit
+
+
+def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
+             numbers: tuple[Free, ...], order: int, readout: GaitReadout, time_scale: float
+             ) -> CycleProblem:
+    """Return what is to be solved, checked; arguments as of ``invert``."""
     if order not in WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
-    joints = joints_of(cycle, cells, network)
-    readout = readout or GaitReadout.of(type(network), gait)
-    numbers = _numbers(network, gait, free or network.free, bounds)
     taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
     if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
@@ -193,7 +225,12 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         value = 1.0 / (cycle.frequency * time_scale)
         fraction = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
         period = Period(value, value * fraction)
-    problem = CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period)
+    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period)
+
+
+def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],
+            done: Callable[[float], None]) -> list[Minimisation]:
+    """Go down from all starts; raise NoOrbit where none has an orbit."""
     begins = [np.append(_begin(problem, start), 0.0) for start in starts or ({},)]
     if not starts:
         begins = best_starts(problem, begins[0])
@@ -201,35 +238,14 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     for begin in begins:
         done(0.5 * len(trials) / len(begins))
         trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
-    done(0.5)
     best = min(trials, key=lambda trial: trial.cost)
     if best.why:
         raise NoOrbit(trials[0].why)
     with suppress(NoOrbit):
         if not starts and (other := upside_down(problem, best.values)) is not None:
             trials.append(_trial(problem, other, weigh=False))
-    values = _weighed(problem, best.values)
-    problem.hold(values)
-    values, others, turned = _preferred(problem, values, trials)
-    if profiles:
-        others += [trial.values for trial in _along_the_valley(problem, values)]
-    by_cost = sorted([values, *others], key=problem.cost)
-    if others and problem.cost(by_cost[0]) < problem.cost(values) - _as_good(problem, values):
-        by_cost[0] = _weighed(problem, by_cost[0])
-        problem.hold(by_cost[0])
-    else:
-        by_cost = [values, *(one for one in by_cost if one is not values)]
-    runs, flaw = _that_runs(problem, by_cost, best.path[:, 1:])
-    warnings = [] if problem.readout.weights else [
-        'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
-            f'{free.name} {value:.4g}' for free, value in zip(problem.free, one, strict=False))
-        + ' fits as well, all joints reversed' for one in turned]
-    if flaw:
-        warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
-            '' if runs is None else '; using the best fit that the generator can run')]
-    # The cost is not least there, so that there is no profile to follow.
-    return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
-                   profiles and not flaw, warnings, done)
+    done(0.5)
+    return [_pursued(problem, trial, best.cost) for trial in trials]
 
 
 def _numbers(network: Network, gait: str, names: Sequence[str],
@@ -256,12 +272,6 @@ def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
     return np.array(list(known.values()))
 
 
-def _left(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
-    """Return the residual RMS of each joint, rad, corrected for the readout's freedom."""
-    residual = problem.best_readouts(values).residual
-    return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
-
-
 def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisation:
     """Minimise from one start; the first start with an orbit sets the joints' weights."""
     values = values.copy()
@@ -271,14 +281,27 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
     except NoOrbit as error:
         return Minimisation.without_orbit(values, error)
     if weigh:
-        problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
-    return problem.coordinates.descend(problem, values, TOLERANCE)
+        problem.sizes = np.maximum(problem.joints.stated, problem.left(values))
+    trial = problem.coordinates.descend(problem, values, TOLERANCE, FIRST)
+    problem.hold(trial.values)
+    return trial
+
+
+def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimisation:
+    """Go on from where a trial has been left, unless that is hopeless."""
+    if trial.converged or trial.why or (
+            trial.cost > HOPELESS * least + PROMISING * trial.path[0, 0]):
+        return trial
+    rest = problem.coordinates.descend(problem, trial.values, TOLERANCE)
+    problem.hold(rest.values)
+    return replace(rest, start=trial.start, path=np.vstack([trial.path, rest.path[1:]]),
+                   evaluations=trial.evaluations + rest.evaluations)
 
 
 def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     """Weight the joints by their residuals, and fit again."""
     for last in range(WEIGHINGS):
-        sizes = np.maximum(problem.joints.stated, _left(problem, values))
+        sizes = np.maximum(problem.joints.stated, problem.left(values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
             break
         problem.sizes = sizes
@@ -316,14 +339,23 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
                 there = problem.coordinates.descend(problem, there, TOLERANCE).values
                 problem.hold(there)
             found.append(there)
-    most = least + _as_good(problem, values)
+    most = min(problem.cost(one) for one in found) + _as_good(problem, values)
+
+    def reverse(one: np.ndarray) -> bool:
+        return float(np.sum(readouts(one) * readouts(values))) < 0.0
+
+    # Half a cycle later cells of some gaits are the same upside down: that is no other motion.
+    for k, one in enumerate(found):
+        later = one + np.append(np.zeros(one.size - 1), 0.5)
+        if reverse(one) and problem.cost(later) <= problem.cost(one) + SAME:
+            found[k] = later
     best = max((one for one in found if problem.cost(one) <= most), key=meant)
-    turned = [one for one in found if float(np.sum(readouts(one) * readouts(values))) < 0.0]
-    if any(one is best for one in turned):
+    turned = [one for one in found if reverse(one)]
+    if best is not values and (any(one is best for one in turned) or problem.cost(values) > most):
         turned, values = [values], _weighed(problem, best)
         problem.hold(values)
     others = [one for one in found if distinct(one[:-1], values[:-1])
-              and float(np.sum(readouts(one) * readouts(values))) >= 0.0]
+              and not reverse(one)]
     return values, others, [one for one in turned if problem.cost(one) <= most]
 
 
@@ -369,64 +401,83 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
     return here, first
 
 
-def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
-             ) -> Optimum:
+def _estimates(problem: CycleProblem, values: np.ndarray, profiles: bool
+               ) -> tuple[dict[str, Estimate], Spread, ModelError]:
+    """Return the estimates at values, and what they are made from."""
     left, slopes = problem(values)
-    sharing = correlation_length(problem.best_readouts(values).residual / problem.sizes)
-    noise = (problem.joints.theta.size - problem.weights) * float(np.sum(
-        (problem.joints.stated / problem.sizes)**2))
-    model = model_error(left, slopes, problem.by_waveform(values), noise)
-    return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
-                   spread(slopes, sharing), model, problem.coordinates.descend,
-                   problem.coordinates.moved, problem.rephased, elsewhere)
+    known = spread(slopes, correlation_length(
+        problem.best_readouts(values).residual / problem.sizes))
+    model = model_error(left, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
+    return estimates(problem, values, known, model, profiles), known, model
 
 
-def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
-    """Search for other minima along the valley if the cost is not quadratic at the values."""
-    optimum = _optimum(problem, values)
-    # If the model itself is wrong, its cost does not tell minima apart.
-    if optimum.model.size > 0.0 or all(optimum.regular(k) for k in range(len(problem.free))):
+def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping[str, Estimate],
+                   known: Spread) -> list[str]:
+    """Name numbers beyond their intervals that fit as well if joints lag their cells.
+
+    The generator's do not; a free readout nearly hides it of those of other robots and animals.
+    """
+    if not problem.kinds.any():
         return []
+    left = problem(values)[0]
+    data = problem.joints.data / problem.sizes
+    enough = float(np.sum(data * data) - left @ left) - 2.0 * _as_good(problem, values)
+
+    def fits(there: np.ndarray) -> bool:
+        by_joint = problem.explained_by(there)
+        return sum(by_joint[problem.kinds == kind].sum(axis=0).max()
+                   for kind in range(problem.kinds.max() + 1)) >= enough
+
     found = []
-    for begin in problem.coordinates.valley(values):
-        with suppress(NoOrbit):
-            problem.begin(begin)
-            found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
-            problem.hold(found[-1].values)
+    for k, (name, one) in enumerate(estimated.items()):
+        ends = [one.low, one.high]
+        for side, half in ((0, one.low - one.value), (1, one.high - one.value)):
+            with suppress(NoOrbit):
+                for times in BEYOND if one.bounded else ():
+                    there = problem.coordinates.moved(
+                        values, times * half * known.covariance[:, k] / known.covariance[k, k])
+                    if not fits(there):
+                        break
+                    ends[side] = float(there[k])
+        if ends != [one.low, one.high]:
+            found.append(f'{name} from {ends[0]:.4g} to {ends[1]:.4g} fits as well if joints of a '
+                         'leg lag one another: the interval is that of joints which move with '
+                         "their cells, as the generator's do")
     return found
 
 
-def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Sequence[np.ndarray],
-            values: np.ndarray, profiles: bool, warnings: Sequence[str],
-            done: Callable[[float], None]) -> Fit:
+def _judged(problem: CycleProblem, trials: Sequence[Minimisation], others: Sequence[np.ndarray],
+            values: np.ndarray, profiles: bool, warnings: Sequence[str]) -> Fit:
     """Return the fit at values, with its uncertainties."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.best_readouts(values)
-    optimum = _optimum(problem, values, elsewhere)
-    known = optimum.spread
-    estimates = {}
-    for k, one in enumerate(problem.free):
-        done(0.6 + 0.4 * k / len(problem.free))
-        estimates[one.name] = optimum.estimate(k, profiles)
-    done(1.0)
+    estimated, known, model = _estimates(problem, values, profiles)
+    for other in others:
+        if problem.cost(other) < problem.cost(values) + _as_good(problem, values):
+            # Another minimum explains the recording as well: the intervals hold both.
+            estimated = {name: one.together(_estimates(problem, other, profiles)[0][name])
+                         for name, one in estimated.items()}
+    if profiles and not model.size:
+        warnings = [*warnings, *_if_joints_lag(problem, values, estimated, known)]
     fractions = {}
     for order in WEIGHTS:
-        other = problem.at_order(order)
-        rest = other.best_readouts(other.rephased(values) if order != problem.order else values)
+        there = problem.at_order(order)
+        rest = there.best_readouts(there.rephased(values) if order != problem.order else values)
         fractions[order] = mean_share(joints.data.T, rest.residual.T)
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
-    misfit = _left(problem, values) / joints.stated
+    misfit = problem.left(values) / joints.stated
     count = len(problem.free)
     return Fit(
         network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
         order=problem.order, fractions=fractions, harmonics=problem.readout.harmonics,
-        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimates,
+        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimated,
         correlation=known.correlation[:count, :count],
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
         recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
-        cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
-        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
-        model_error=optimum.model.size, starts=tuple(trials),
-        warnings=(*findings(problem.free, estimates, known, optimum.model,
+        cost=problem.cost(values),
+        sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=known.inflation,
+        model_error=model.size, starts=tuple(trials),
+        warnings=(*findings(problem.free, estimated, known, model,
                             float(np.sqrt(np.mean(misfit**2))), best), *warnings))

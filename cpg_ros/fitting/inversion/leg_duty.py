@@ -135,20 +135,20 @@ def _extremum(terms: np.ndarray, slopes: np.ndarray, place: float) -> tuple[floa
     return place % 1.0, -((1j * k * turns) @ slopes).real / (bend * TURN if bend else np.inf)
 
 
-def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: float, members: np.ndarray,
-            of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
+            members: np.ndarray, of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the phases at which the joints of a cell are read, and their derivatives.
 
     Args:
-        theta: phases of the cell, cycles, shape (m,).
+        theta: phases of cells, cycles, any shape.
         duty: share of the stride that the leg is to stand.
         own: when it does by itself.
-        ahead: phase of the cell before that of its leg's leading cell, cycles.
+        ahead: phases of the cells before those of their legs' leading cells, cycles, likewise.
         members: how much each parameter moves with each free number, (parameters, numbers).
         of_duty: how much the duty does, shape (numbers,).
 
     Returns:
-        Phases, shape (m,), their derivatives by the free numbers, (m, numbers), and by theta.
+        Phases, their derivatives by the free numbers, (..., numbers), and by theta.
 
     """
     d_begin, d_share = own.d_begin @ members, own.d_share @ members

@@ -93,13 +93,13 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
     readout = readout or GaitReadout.of(type(network), gait)
     first, known = '', tuple(free) or network.free
 
-    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]]
-               ) -> tuple[Fit, tuple[str, ...]]:
+    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]],
+               profiles: bool = True) -> tuple[Fit, tuple[str, ...]]:
         if not names:
             # Phases are known beforehand, and no other parameter shows.
             return _as_it_is(cycle, cells, network, gait, lower, readout, done), ()
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
-                      done=done), ()
+                      profiles=profiles, done=done), ()
 
     for names, lower, begins, relaxation in _ways(known, order, starts):
         try:
@@ -129,15 +129,16 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit without a duty, unless the recording shows that it differs from the cells'."""
     try:
-        other, _ = fitted((*names, GAIT_DUTY), order, ())
+        other, _ = fitted((*names, GAIT_DUTY), order, (), False)
     except NoOrbit:
         return fitted(names, order, ())
-    own, _ = fitted(names, order, [{}, *(dict(zip(names, one.values.tolist(), strict=False))
-                                         for one in other.minima)])
+    minima = [dict(zip(other.free, one.values.tolist(), strict=False)) for one in other.minima]
+    own, _ = fitted(names, order, [{}, *({name: one[name] for name in names}
+                                         for one in minima[:2])])
     sizes = np.array(list(other.sizes.values()))[:, None]
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
     if rise > 0.5 * ASKED**2 * other.sharing:
-        return other, ()
+        return fitted((*names, GAIT_DUTY), order, minima)
     error = other.parameters[GAIT_DUTY].stderr
     return own, () if error < KNOWN else (
         'the recording does not tell how long legs stand: they are taken to stand as the cells of '
@@ -354,6 +355,22 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
     return found
 
 
+def _kind(network: str, legs: Mapping[str, Sequence[str]], robot: Robot | None) -> type[Network]:
+    """Return the network of a name, or by default the robot's first, or the first for the legs."""
+    try:
+        return with_legs_of(find_network(network or (
+            robot.networks[0] if robot is not None else network_of(legs))), legs)
+    except NetworkError as error:
+        raise InputError(f'network {error}') from error
+
+
+def _parameters(kind: type[Network], gait: str, preset: str, stride: Stride) -> Network:
+    """Return the parameters of a preset, with the phases recorded if they leave it its gait."""
+    parameters = preset_of(kind.name, preset or gait).network
+    as_recorded = parameters.with_phases(stride.phases)
+    return parameters if other_gait(as_recorded, gait) else as_recorded
+
+
 def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
                   gait: str = '', *, free: Sequence[str] = (), order: int = 3, preset: str = '',
                   starts: Sequence[Mapping[str, float]] = (),
@@ -381,54 +398,39 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if np.isnan(recording.cycle):
         recording = repeat_stride(recording)
     legs, read = leg_joints(recording, robot)
-    network_given = bool(network)
-    if not network:
-        network = robot.networks[0] if robot is not None else network_of(legs)
-    try:
-        kind = with_legs_of(find_network(network), legs)
-    except NetworkError as error:
-        raise InputError(f'network {error}') from error
-    recording, cells, stride, guessed = _steady(recording, legs, kind, robot, gait)
-    between = ''
-    if not (gait or stride.gait or network_given or kind.offsets):
-        between = _none_of(kind, stride)
+    kind = _kind(network, legs, robot)
+    recording, cells, stride, warnings = _steady(recording, legs, kind, robot, gait)
+    if not (gait or stride.gait or network or kind.offsets):
+        warnings.append(_none_of(kind, stride))
         as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
         if as_they_are is not None:
             kind = as_they_are
             cells, stride = stride_of(recording, legs, kind, robot, gait)
-            between += f'; they are fitted as they are, by the network {kind.name}'
-    warnings = [*guessed, *([between] if between else []), *stride.issues]
+            warnings[-1] += f'; they are fitted as they are, by the network {kind.name}'
+    elif not (gait or stride.gait or not kind.unnamed):
+        warnings.append(_none_of(kind, stride))
+    warnings += stride.issues
+    gait = gait or stride.gait or kind.unnamed
     if not gait:
-        gait = stride.gait or kind.unnamed
-        if not gait:
-            raise InputError('; '.join((
-                f'{recording.source}: {_none_of(kind, stride)}; name the gait to fit it all the '
-                'same', *recording.notes, *stride.notes, *stride.issues)))
-        if not stride.gait and not between:
-            warnings.append(_none_of(kind, stride))
-    elif (stride.gait or kind.unnamed) != gait:
+        raise InputError('; '.join((
+            f'{recording.source}: {_none_of(kind, stride)}; name the gait to fit it all the '
+            'same', *recording.notes, *stride.notes, *stride.issues)))
+    if (stride.gait or kind.unnamed) != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
-    parameters = preset_of(kind.name, preset or gait).network
-    as_recorded = parameters.with_phases(stride.phases)
-    if not other_gait(as_recorded, gait):
-        parameters = as_recorded
-    if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
-        read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
-                 'which, and parameters and intervals hold for that alone')
     if stride.contacts is not None:
         warnings.append('feet bore loads: what servos, the ground and feedback changed of the '
                         "joints' motion counts as the network's, which intervals do not know")
-    readout = GaitReadout.of(kind, gait, preset, robot)
-    fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts,
-                                        readout, done)
+    fit, fallbacks = fit_with_fallbacks(
+        stride, cells, _parameters(kind, gait, preset, stride), gait, free, order, starts,
+        GaitReadout.of(kind, gait, preset, robot), done)
     fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
-    found = RecordingFit(recording, read, legs, stride, fit,
-                         fit.fractions,
+    if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
+        read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
+                 'which, and parameters and intervals hold for that alone')
+    found = RecordingFit(recording, read, legs, stride, fit, fit.fractions,
                          (*warnings, *fallbacks, *fit.warnings))
-    if not found.poor:
-        return found
-    return replace(found, warnings=(
+    return found if not found.poor else replace(found, warnings=(
         f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "
         f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',
         *found.warnings))

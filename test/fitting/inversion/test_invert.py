@@ -67,7 +67,7 @@ def test_parameters_and_readouts_are_found_again(name, gait, free):
     recording, cells = record(orbit, (1, 2, 3, 4), weights)
     truth = {one: truth_of(preset.network, one) for one in free}
     start = {one: 1.02 * value + 0.003 for one, value in truth.items()}
-    fit = invert(recording, cells, preset.network, gait, free, 3, [start], profiles=False)
+    fit = invert(recording, cells, preset.network, gait, free, 3, [start])
     assert fit.mean_rms_share < 1e-5
     for one, value in truth.items():
         found = fit.parameters[one]
@@ -88,7 +88,7 @@ def test_lower_orders_fit_what_they_can():
         assert fit.parameters['c'].value == pytest.approx(TROT.c, abs=1e-4)
         assert all(len(weights) == 2 * order for _, weights in fit.readouts.values())
     cubic, cells = trot(None)
-    fractions = [invert(cubic, cells, TROT, 'trot', ('c',), order, profiles=False).mean_rms_share
+    fractions = [invert(cubic, cells, TROT, 'trot', ('c',), order).mean_rms_share
               for order in (1, 2, 3)]
     assert fractions[0] > fractions[1] > fractions[2] and fractions[0] > 0.02
 
@@ -180,7 +180,7 @@ def test_intervals_of_cells_that_jump_hold_the_truth(name, gait, free):
     for seed in range(4):
         recording, cells = record(solve_preset(preset), (1, 2, 3, 4), weights_of(4),
                                   np.random.default_rng(seed))
-        fit = invert(recording, cells, preset.network, gait, free, profiles=False)
+        fit = invert(recording, cells, preset.network, gait, free)
         inside += [one.low <= truth_of(preset.network, key) <= one.high
                    for key, one in fit.parameters.items()]
     assert sum(inside) >= 6
@@ -193,7 +193,7 @@ def test_the_interval_is_where_the_least_cost_has_risen_enough():
 
     def cost(tau):
         there = invert(recording, cells, replace(TROT, tau=tau), 'trot', ('c',), 3,
-                       [{'c': start} for start in (5.5, 7.0, 9.0)], profiles=False)
+                       [{'c': start} for start in (5.5, 7.0, 9.0)])
         sizes = np.array([[fit.sizes[name]] for name in fit.joints])
         return 0.5 * np.sum((there.errors / sizes)**2) / fit.sharing
 
@@ -206,7 +206,7 @@ def test_a_misfit_widens_the_errors():
     recording, cells = trot(0)
     bump = 0.02 * np.cos(2.0 * np.pi * 9.0 * recording.theta)
     wrong = replace(recording, mean=recording.mean + bump)
-    right, fit = (invert(each, cells, TROT, 'trot', ('c',), profiles=False)
+    right, fit = (invert(each, cells, TROT, 'trot', ('c',))
                   for each in (recording, wrong))
     assert right.sharing < 1.3 < 2.0 < fit.sharing
     assert max(right.misfit.values()) < 1.5 and min(fit.misfit.values()) > 1.5
@@ -257,7 +257,7 @@ def test_a_shape_that_says_little_is_no_sharp_number():
 # -- laws ----------------------------------------------------------------------------------------
 
 BASE, BASE_CELLS = trot(5)
-FITTED = invert(BASE, BASE_CELLS, TROT, 'trot', ('c', 'tau'), profiles=False)
+FITTED = invert(BASE, BASE_CELLS, TROT, 'trot', ('c', 'tau'))
 
 
 @examples(6)
@@ -268,7 +268,7 @@ def test_names_units_and_the_begin_of_the_cycle_do_not_matter(order, factor, tur
     other = replace(BASE, joints=tuple(BASE.joints[k] for k in order),
                     mean=factor * np.roll(BASE.mean[order], turn, axis=1),
                     error=factor * np.roll(BASE.error[order], turn, axis=1))
-    fit = invert(other, BASE_CELLS, TROT, 'trot', ('c', 'tau'), profiles=False)
+    fit = invert(other, BASE_CELLS, TROT, 'trot', ('c', 'tau'))
     for name, one in fit.parameters.items():
         known = FITTED.parameters[name]
         assert one.value == pytest.approx(known.value, abs=0.03 * known.stderr)
@@ -356,7 +356,7 @@ def test_a_joint_that_stands_is_only_an_offset():
     recording, cells = trot(0)
     still = replace(recording, mean=np.vstack([recording.mean[:5], np.full((1, 64), 0.3)]),
                     error=np.vstack([recording.error[:5], np.zeros((1, 64))]))
-    fit = invert(still, cells, TROT, 'trot', ('c',), profiles=False)
+    fit = invert(still, cells, TROT, 'trot', ('c',))
     offset, weights = fit.readouts['joint_5']
     assert offset == pytest.approx(0.3) and weights == pytest.approx([0.0] * 6, abs=1e-9)
     assert fit.rms_share['joint_5'] == 0.0 or fit.rms['joint_5'] < 1e-9

@@ -15,7 +15,10 @@
 """Recordings of the generator that retimes its legs: parameters and duty are found again."""
 
 from dataclasses import replace
+import re
 
+from cpg_ros.dynamics.solve_orbit import solve_beside, solve_preset
+from cpg_ros.fitting.inversion import cycle_problem
 from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
 from cpg_ros.fitting.inversion.fit_data import Joints
 from cpg_ros.fitting.inversion.free_parameters import Free, free_numbers
@@ -26,6 +29,7 @@ from cpg_ros.fitting.inversion.parameter_files import (
     write_fitted,
 )
 from cpg_ros.fitting.inversion.recording_fit import fit_recording
+from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.motion.robot_file import load_robot, read_robot
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from generated import generated
@@ -136,3 +140,34 @@ def test_shipped_presets_are_found_again(robot, network, gait):
     for name, one in wide.items():
         value = stated if name == GAIT_DUTY else truth[name]
         assert abs(one.value - value) < 3.0 * max(one.stderr, one.high - one.low), name
+
+
+def test_a_start_that_leads_nowhere_is_left(monkeypatch):
+    """Two of them took 200 orbits of 270."""
+    solved = []
+
+    def counted(network, near):
+        solved.append(network)
+        return solve_beside(network, near)
+
+    monkeypatch.setattr(cycle_problem, 'solve_beside', counted)
+    found = fit_recording(generated('unitree_go2', 'quadruped', 'trot', 0),
+                          load_robot('unitree_go2'), 'quadruped')
+    assert held(found, alpha=-0.6, beta=-0.6) and len(solved) < 90
+
+
+@pytest.mark.parametrize('seed', [2, 4])
+def test_joints_that_lag_their_cells_are_told(seed):
+    """Calves that lag give a tau of 0.34 +- 0.02 without leaving more than noise."""
+    rng, times = np.random.default_rng(seed), np.arange(0.0, 12.0, 0.01)
+    orbit = solve_preset(PRESETS['delayed']['trot'])
+    seen = [orbit((1.7 * times - lag) * orbit.period) / orbit.peak for lag in (0.0, 0.0, 0.2)]
+    angles = np.array([joint.offset + 0.25 * seen[k % 3][:, joint.cell - 1]
+                       for k, joint in enumerate(QUADRUPED.joints)]).T
+    recording = Recording(tuple(QUADRUPED.order), times,
+                          angles + rng.normal(0.0, 0.005, angles.shape), source='lagging calves')
+    found = fit_recording(recording, QUADRUPED, free=['tau'])
+    told = [re.search('tau from (.*) to (.*) fits as well if joints of a leg lag', line)
+            for line in found.warnings]
+    low, high = next(map(float, one.groups()) for one in told if one)
+    assert low <= 0.4 <= high
