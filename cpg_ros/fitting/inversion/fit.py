@@ -42,8 +42,9 @@ QUANTILE = 1.959964
 #: component of a number in such a direction above which the number is not determined.
 ZERO, SHARE = 1e-7, 1e-3
 #: STEPS: most steps of a profile on either side; CLOSE: its tolerance, standard errors; FURTHER:
-#: length of a step over that of the last one, at most.
-STEPS, CLOSE, FURTHER = 10, 0.03, 3.0
+#: length of a step over that of the last one, at most; SHORT: what a step that meets the edge of
+#: where there is an orbit misses of its length, at least.
+STEPS, CLOSE, FURTHER, SHORT = 10, 0.03, 3.0, 0.2
 #: NEGLIGIBLE: distance from a bound, as a share of a step, up to which a number is at the bound.
 NEGLIGIBLE = 1e-6
 #: Descents of a profile. TOLERANCE: at which they stop; MOST: most evaluations; DRAWN: width, over
@@ -252,7 +253,7 @@ def _end(problem: CycleProblem, values: np.ndarray, known: Spread, k: int, side:
             return float(there[k]), True
         if rise > QUANTILE:
             high = rise, there
-        elif place == limit or abs(there[k] - place) > CLOSE * abs(place - at[k]):
+        elif place == limit or abs(there[k] - place) > SHORT * abs(place - at[k]):
             return float(there[k]), False
         else:
             further = (QUANTILE - rise) / max(rise - low[0], 0.1 * (QUANTILE - rise))
