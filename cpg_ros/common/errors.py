@@ -43,7 +43,7 @@ class ShortRepr:
         return f'{type(self).__name__}({text})'
 
     def _summary(self) -> str:
-        """Return what stands between the parentheses: by default, each field and its value."""
+        """Return the text between the parentheses: by default, each field and its value."""
         return ', '.join(f'{field.name}={short(getattr(self, field.name))}'
                          for field in fields(self))  # type: ignore[arg-type]
 

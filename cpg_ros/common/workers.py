@@ -323,7 +323,7 @@ KEPT = 'stopped; what was finished is kept, and the same command continues from 
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add --jobs, --dask, and what goes with it."""
+    """Add the options --jobs and --dask, and those that go with it."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--jobs', type=int, default=0, metavar='N', help='worker processes on '
                        'this machine (default: one per core); the results do not depend on the '

@@ -74,12 +74,12 @@ class Multipliers(ShortRepr):
 
     @property
     def transverse(self) -> np.ndarray:
-        """Those outside the class."""
+        """Multipliers outside the class."""
         return by_size(np.concatenate([np.zeros(0), *self.parts]))
 
     @property
     def subspaces(self) -> list[np.ndarray]:
-        """Those of the class without the trivial one, then those of each transverse subspace."""
+        """Multipliers of the class without the trivial one, then of each transverse subspace."""
         return [by_size(part) for part in (self.within, *self.parts)]
 
     def _summary(self) -> str:

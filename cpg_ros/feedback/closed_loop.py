@@ -213,7 +213,7 @@ def _slot(tables, key):
 
 @jit
 def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
-    """Find out what interrupts the feedback; tell whether anything does."""
+    """Update the faults that interrupt the feedback; return whether there are any."""
     numbers, out = instant.numbers, 0
     dt = numbers[DT]
     for k in range(len(senses.monitors)):
@@ -289,7 +289,7 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
 
 
 def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:
-    """Run what judges messages once; legs and joints are their numbers; return what it took."""
+    """Run the checks of messages once, for numbers of legs and joints; return the arguments."""
     senses, sensors = (Senses.empty(legs, np.zeros((3, joints)), np.zeros(4), 1.0, FOOT_CONTACTS),
                        SensorData.zeros(1, legs, joints))
     nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)

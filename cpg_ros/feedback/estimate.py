@@ -93,7 +93,7 @@ DISAGREE, WIDENS = 0.2, 0.05
 
 
 class SensorData(NamedTuple):
-    """What a robot measures at an instant, of each run.
+    """Measurements of a robot at an instant, of each run.
 
     Attributes:
         joint_positions: leg by leg, rad, shape (runs, joints).

@@ -53,7 +53,7 @@ class LegArrays(NamedTuple):
 
 @dataclass(frozen=True)
 class Geometry:
-    """Lengths and axes of all legs with all joints at 0, and what they carry.
+    """Lengths and axes of all legs with all joints at 0, and the weight of the robot.
 
     Attributes:
         columns: index of each leg's hip, thigh and calf among the joints, shape (legs, 3); of a

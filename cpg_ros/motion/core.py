@@ -114,7 +114,7 @@ def core() -> ctypes.CDLL:
 
 
 def precompile(name: str) -> None:
-    """Compile or load what a generator of a network runs.
+    """Compile or load the machine code of a network's generator.
 
     Args:
         name: as find_network takes it, and errors as of that.

@@ -326,7 +326,7 @@ def load_urdf(path: str | Path) -> RobotDescription:
 
 
 def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescription:
-    """Return what a URDF describes.
+    """Return the description of a robot from a URDF.
 
     Args:
         tree: as of ``read_tree``.

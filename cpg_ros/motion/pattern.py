@@ -413,7 +413,7 @@ class Pattern:
             1, float, memoryview(self._struct).cast('B'), Core.frequency_scale.offset)
 
     def report(self, numbers: np.ndarray, gaits: np.ndarray) -> None:
-        """Fill what a correction goes by.
+        """Fill the inputs of a correction.
 
         Args:
             numbers: level, phase of the first leg, share of the gait that is entered, strides per
@@ -440,7 +440,7 @@ class Pattern:
         return self._wanted
 
     def follow(self, dt: float, goal: np.ndarray) -> None:
-        """Take joints to what a correction makes of plan_tick's angles, rad, shape (joints,)."""
+        """Move the joints to corrected angles of plan_tick, rad, shape (joints,)."""
         self._goal[:] = goal
         self._core.cpg_follow(self._address, dt, 1)
 

@@ -206,7 +206,7 @@ class Waveform(NamedTuple):
 
 
 class Retiming(NamedTuple):
-    """How joints follow a waveform at another phase than their cells'.
+    """Tables by which joints follow a waveform at another phase than their cells'.
 
     Attributes:
         lead: of the orbit on even angles: phase minus angle, cycles, and its slope per entry,

@@ -238,7 +238,7 @@ class Field(Generic[AnyDefinition]):
     """
 
     def __init__(self, network: AnyDefinition, classes: np.ndarray | None = None) -> None:
-        """Look at a network.
+        """Prepare for a network.
 
         Args:
             network: parameters.

@@ -40,7 +40,7 @@ def stated_gait(network: Network) -> str:
 
 
 def other_gait(network: Network, gait: str) -> str:
-    """Say which gait a network's offsets make instead of another one, or ''."""
+    """Return the gait that a network's offsets make instead of another one, or ''."""
     stated = stated_gait(network)
     if stated in ('', gait):
         return ''

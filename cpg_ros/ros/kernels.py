@@ -66,7 +66,7 @@ class StartProgress:
 
     @property
     def passed(self) -> float:
-        """How long it has taken, s."""
+        """Time that it has taken, s."""
         return time.monotonic() - self._began
 
     def end(self) -> None:

@@ -158,7 +158,7 @@ SHADOW, SAMPLES = 1024, 0
 
 
 class Camera:
-    """Looks at the base of a robot from the front quarter, and goes and turns along with it.
+    """A camera at the front quarter that looks at a robot's base and moves along with it.
 
     To be used in the thread that made it, and closed by it.
     """

@@ -71,7 +71,7 @@ class CodimensionTwo(ShortRepr):
 
     @classmethod
     def of(cls, stored: dict[str, Any]) -> 'CodimensionTwo':
-        """Make one from what as_dict returned."""
+        """Make one from the result of as_dict."""
         first, second = stored['values']
         omegas = [math.nan if stored[name] is None else stored[name]
                   for name in ('omega', 'other_omega')]

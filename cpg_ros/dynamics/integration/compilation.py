@@ -45,7 +45,7 @@ class Kernel:
 
     @cached_property
     def code(self):
-        """What numba makes of the function, or without numba the function."""
+        """The function as compiled by numba, or without numba the function itself."""
         return getattr(_numba(), self._decorator)(self.py_func) if COMPILED else self.py_func
 
     @property

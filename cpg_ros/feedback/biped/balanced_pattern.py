@@ -154,7 +154,7 @@ class BalancedPattern(Pattern):
 
     @property
     def held_angles(self) -> np.ndarray:
-        """Where joints of no leg are to be driven, rad, in the order of ``robot.held``."""
+        """Target angles of joints of no leg, rad, in the order of ``robot.held``."""
         return self._rest if self._arms is None else self._arms.positions
 
     @property
@@ -169,7 +169,7 @@ class BalancedPattern(Pattern):
         self.crouching = self._lowers = False
 
     def lower(self) -> bool:
-        """Go into the crouch once it stands, and stay there: before the end of all commands.
+        """Crouch once the robot stands, and stay there, before the end of all commands.
 
         Returns:
             Whether it will: it balances, or did.

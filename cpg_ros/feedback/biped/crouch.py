@@ -83,7 +83,7 @@ def _centre(ahead_of_soles: '_Ahead', angles: np.ndarray, hips: np.ndarray, low:
 
 
 class _Ahead:
-    """How far the centre of mass is ahead of the middle of the soles, soles level, m."""
+    """Distance of the centre of mass ahead of the middle of the soles, soles level, m."""
 
     def __init__(self, links: Links) -> None:
         self._links, self._pose = links, blank_pose(links)

@@ -147,7 +147,7 @@ class BipedFeedback:
 
     @property
     def kind(self) -> int:
-        """How its legs go: WALKS, RUNS or HOPS."""
+        """Kind of its gait: WALKS, RUNS or HOPS."""
         return KINDS[self.plan.gait]
 
     @property
@@ -156,7 +156,7 @@ class BipedFeedback:
         return self.track is not self._goal
 
     def restart(self, crouch: float = 0.0) -> None:
-        """Stand, and know nothing of what has been, as after a fall.
+        """Stand with an empty memory, as after a fall.
 
         Args:
             crouch: how much lower the centre of mass is now, m; it rises from there.

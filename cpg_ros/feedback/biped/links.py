@@ -58,7 +58,7 @@ class Links(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """Where links are; world's axes, from the base.
+    """Places and rotations of the links; world's axes, from the base.
 
     Attributes:
         turns: rotation of each link, shape (joints + 1, 3, 3).

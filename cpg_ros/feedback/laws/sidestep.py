@@ -84,7 +84,7 @@ def advance(displacement, swinging, wanted, stance, gains, dt):
 
 @jit
 def correct_speed(correction, missing, wanted, turn, gains, dt):
-    """Return what to add to the commanded speed to the left, m/s, dt in s later.
+    """Return the correction of the commanded speed to the left, m/s, dt in s later.
 
     0 where none is commanded, and no turn.
 

@@ -32,7 +32,7 @@ LAW = Law(
 
 @jit
 def stride_change(missing, integral, gains):
-    """Return what to add to the strides; the missing speed in m/s, its integral in m."""
+    """Return the change of the strides; the missing speed in m/s, its integral in m."""
     return limited(gains.speed_share * missing + gains.speed_rate * integral, gains.speed_most)
 
 

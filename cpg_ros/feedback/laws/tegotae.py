@@ -35,7 +35,7 @@ LAW = Law(
 
 @jit
 def rate(load, swinging, progress, gains):
-    """Return what a leg adds to the rate of its phase, rad/s.
+    """Return the change of a leg's phase rate by its load, rad/s.
 
     Args:
         load: on the foot, share of the weight.

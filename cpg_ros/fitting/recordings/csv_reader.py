@@ -91,7 +91,7 @@ LINES = 8192
 
 @dataclass(frozen=True)
 class Column:
-    """Where a number is, what its header says, which joint it is of, and its unit's size."""
+    """A column of numbers: its index, header and joint, and the size of its unit."""
 
     index: int
     header: str

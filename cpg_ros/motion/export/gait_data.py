@@ -40,7 +40,7 @@ LIMITS = ('lower', 'upper', 'velocity')
 
 @dataclass(frozen=True)
 class CFormat:
-    """How gaits become C.
+    """Settings of gaits as C.
 
     Attributes:
         form: ``network``, or ``table`` for their orbits alone.

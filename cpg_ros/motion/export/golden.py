@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Golden vectors: what the Python generator does, and a test in C that compares."""
+"""Golden vectors: output of the Python generator, and a test in C that compares with it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

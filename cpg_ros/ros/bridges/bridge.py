@@ -272,7 +272,7 @@ class BridgeNode(StartedNode):
         return ''
 
     def publish_slow_measurements(self, stamp: int) -> None:
-        """Publish what changes slowly, such as the battery, once a second; stamp in ns."""
+        """Publish slow measurements, such as the battery, once a second; stamp in ns."""
 
     def measured_values(self) -> Mapping[str, object]:
         """Return values for /diagnostics, such as temperatures, by name."""

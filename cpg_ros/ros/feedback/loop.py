@@ -209,7 +209,7 @@ class FeedbackLoop(SensorLoop):
 
     @property
     def faults(self) -> str:
-        """What interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active."""
+        """Faults that interrupt it, such as 'imu: no messages for 3.2 s'; none while active."""
         inputs, plan = self.inputs, self._pattern.plan
         found, _ = inputs.faults(self._instant.numbers[NOW], judge=False)
         if mounted := MOUNTED[int(self._state[MOUNT])]:

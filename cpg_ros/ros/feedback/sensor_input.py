@@ -170,7 +170,7 @@ class _Input:
 
 
 class SensorInput:
-    """What a robot's sensors measure.
+    """Measurements of a robot's sensors.
 
     Attributes:
         sensor_data: of one run, filled in place with the last plausible measurements; joints
@@ -254,7 +254,7 @@ class SensorInput:
             yield
 
     def restart(self) -> None:
-        """Forget when messages came, as where simulated time jumps back."""
+        """Forget the times of messages, as after a jump of simulated time."""
         self.senses.memory[:] = 0.0
         for monitor in self.monitors:
             monitor.restart()

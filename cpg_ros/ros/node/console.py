@@ -56,7 +56,7 @@ class _Stream(io.FileIO):
         return self._terminal
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
-        """Write what fits."""
+        """Write as much of the text as fits."""
         with contextlib.suppress(OSError):
             super().write(data)
         return len(data)

@@ -72,7 +72,7 @@ PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,
 
 
 def node_of(endpoint: TopicEndpointInfo) -> str:
-    """Return the full name of an endpoint's node, or what to call it if it is not known."""
+    """Return the full name of an endpoint's node, or a text if the name is not known."""
     return PLACEHOLDERS.get(endpoint.node_name,
                             f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
 

@@ -184,7 +184,7 @@ def _made(args: Namespace, known: RobotDescription) -> Robot:
 
 
 def _biped(args: Namespace, robot: Robot) -> tuple[Robot, str]:
-    """Return a biped with its links and soles, and what feedback has of it."""
+    """Return a biped with its links and soles, and a line on its feedback."""
     if not soled(robot):
         joints = next(iter(robot.legs.values()))
         raise DescriptionError(

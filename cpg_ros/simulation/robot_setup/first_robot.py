@@ -65,7 +65,7 @@ FLAT = 0.5
 
 
 def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
-    """Make a first robot from a description; return it and what its joints do.
+    """Make a first robot from a description; return it and the roles of its joints.
 
     Args:
         known: the description.
