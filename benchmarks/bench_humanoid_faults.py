@@ -15,8 +15,9 @@
 """Faults of the sensors of a walking humanoid, in process: what becomes of it, limits crossed.
 
 Every fault of ``test/support/sensor_faults.py``, as messages that the generator's own input reads,
-in a walk at 0.3 m/s from 1 s on. Faults that do not last begin at 4 s, with 4 ms of delay and the
-noise of bench_humanoid. A run ends after 10 s in a 'walk', a 'stand', a 'crouch', or a 'fall':
+in a walk at 0.3 m/s from 1 s on, with 4 ms of delay and the noise of bench_humanoid. Faults that
+begin in the walk do so at 3 s and a fifth of a stride later with each seed. A run ends 2.5 s after
+the fault, or at 6.5 s if it lasts, in a 'walk', a 'stand', a 'crouch', or a 'fall':
 the base leans by more than 60 degrees or lies on the floor at any time.
 
 usage: bench_humanoid_faults.py [--seeds 5] [--only NAME] [--jobs 2]
@@ -25,6 +26,7 @@ usage: bench_humanoid_faults.py [--seeds 5] [--only NAME] [--jobs 2]
 import argparse
 from collections import Counter
 from concurrent.futures import ProcessPoolExecutor
+import math
 import multiprocessing
 import sys
 
@@ -34,11 +36,16 @@ sys.path.insert(0, str(ROOT / 'test' / 'support'))
 from humanoid_under_fault import HumanoidUnderFault  # noqa: E402
 from sensor_faults import FAULTS  # noqa: E402
 
+#: When a fault begins, s; a fifth of a stride at 1.65 Hz; how long a run takes after a fault that
+#: ends, and with one that lasts.
+BEGINS, FIFTH, AFTER, LASTS = 3.0, 0.2 / 1.65, 2.5, 6.5
+
 
 def measure(job: tuple[str, int]) -> tuple[str, str, int]:
     fault, seed = job
-    humanoid = HumanoidUnderFault(fault, seed)
-    return fault, humanoid.run(), humanoid.crossed
+    humanoid = HumanoidUnderFault(fault, seed, begins=BEGINS + seed % 5 * FIFTH)
+    ends = humanoid.faults.ends
+    return fault, humanoid.run(LASTS if math.isinf(ends) else ends + AFTER), humanoid.crossed
 
 
 def main() -> None:

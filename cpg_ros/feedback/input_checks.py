@@ -141,6 +141,11 @@ class InputMonitor:
         """Whether messages have come, none of them valid."""
         return self.believed == -math.inf and bool(self.numbers[WRONG])
 
+    def latency(self, now: float) -> float:
+        """Return the time since the last valid measurement by its stamp, s; 0 without stamps."""
+        measured = float(self.numbers[MEASURED])
+        return 0.0 if math.isnan(measured) else max(now - measured, 0.0)
+
     def fault(self, now: float) -> str:
         """Say why the input is out, or ''."""
         is_out(self.numbers, now)

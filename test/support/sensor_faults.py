@@ -206,6 +206,9 @@ FAULTS: dict[str, Fault] = {
     '10 Hz': Fault(every=0.1),
     'publisher dies 3 s': Fault(drop=1.0, seconds=3.0),
     **{f'delay {ms} ms': Fault(lasting=True, delay=1e-3 * ms) for ms in (20, 50, 60, 90, 200)},
+    **{f'delay {ms} ms from a walk on': Fault(seconds=math.inf, delay=1e-3 * ms)
+       for ms in (20, 50)},
+    '0.2 s without imu': Fault(seconds=0.2, inputs=(IMU,), drop=1.0),
     'stamps 1 s ahead': Fault(stamp=1.0),
     'stamps 1 s old': Fault(stamp=-1.0),
     'stamps 0': Fault(stamp=math.nan),

@@ -19,9 +19,18 @@ import math
 
 from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
-from cpg_ros.feedback.biped.gains import STAND, WALK
+from cpg_ros.feedback.biped.gains import SHIFT, STAND, WALK
 from cpg_ros.feedback.biped.stepping import swing_share, WALKS
-from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, FEET, IMU, JOINTS, Substitutes
+from cpg_ros.feedback.biped.substitutes import (
+    ADOPTED,
+    EXTRAPOLATED,
+    FEET,
+    IMU,
+    JOINTS,
+    LastStride,
+    REPEATED,
+    Substitutes,
+)
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
@@ -45,12 +54,24 @@ RETURN, LOWER = 0.3, 0.45
 #: SETTLED: time in the stand before it crouches, s; PATIENCE: longest time after the failure of an
 #: input in which it comes to a stand, s.
 SETTLED, PATIENCE = 0.3, 4.0
+#: BEHIND: how far the centre of mass is behind the middle of the soles in a crouch from a walk, m.
+BEHIND = 0.025
 #: PASSING: begin and end, as shares of a swing, of the time in which the body passes over the foot
 #: that stands: the best time to crouch without any sensor.
 PASSING = 0.38, 0.6
 #: CONTRARY: ratio of the swinging foot's load to the other's above which loads contradict the
 #: gait.
 CONTRARY = 4.0
+#: While both feet stand, each with a share of LOADED of the weight, soles that are not level for
+#: COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT: largest lean
+#: by IMU and joints, rad.
+PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.1, 0.12, 0.06
+#: Largest deviation from the mean over USUAL, s, meanwhile: TWISTED: of the angle between the
+#: soles while the weight shifts; TURNED: of their lean, rad; SEEN_LEVEL: time for which they are
+#: level in a crouch before the IMU counts again, s.
+TWISTED, TURNED, USUAL, SEEN_LEVEL = 0.015, 0.05, 1.0, 1.0
+#: TOPPLES: lean of a robot that holds the stand, rad, above which it topples.
+TOPPLES = 0.05
 #: GOOD: time, s, after which an input that failed counts as valid again.
 GOOD = 0.3
 #: A joint was moved by hand, or its sensor failed, if it moves from one tick to the next by more
@@ -82,10 +103,11 @@ class BalancedPattern(Pattern):
         balancing: whether the feedback bears the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
         falls: how often it fell.
-        ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
+        ages: of inertial unit, joints and feet, s, shape (3,): since the last valid values came.
+        latencies: the same since they were measured.
         failed: whether an input is out.
         doubts: input -> how it contradicts the others, until the pattern is enabled
-            anew, or the robot falls.
+            anew in a crouch, or the robot falls.
         refused: whether messages arrive, but none of an input has been valid yet.
         crouching: whether it holds the crouch or is on its way into it.
 
@@ -100,9 +122,14 @@ class BalancedPattern(Pattern):
         self.wish = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
-        self.ages, self.failed, self.refused, self.crouching = np.zeros(3), False, False, False
+        self.ages, self.latencies = np.zeros(3), np.zeros(3)
+        self.failed, self.refused, self.crouching = False, False, False
         self.doubts: dict[int, str] = {}
         self._contrary, self._gap, self._measured = 0.0, math.inf, np.zeros(1)
+        self._uneven, self._level, self._unchanged = 0.0, 0.0, np.zeros(1)
+        self._settles, self._leant = 0.0, False
+        self._tilts, self._usual = np.zeros((2, 2, 2))
+        self._ages = np.zeros(3)
         self._good, self._blind = GOOD, False
         self._held, self._still = False, np.zeros_like(self._offset)
         self._start, self._pose = self._offset.copy(), self._offset
@@ -110,6 +137,7 @@ class BalancedPattern(Pattern):
         self._lowers, self._known = False, False
         self._substitutes: Substitutes | None = None
         self._crouch, self._depth = self._offset, 0.0
+        self._braced, self._braces = self._offset, False
         self._before: np.ndarray | None = None
         self._places = self.robot.places
         self._rest = np.array(list(self.robot.held.values()))
@@ -201,18 +229,23 @@ class BalancedPattern(Pattern):
         if self._arms is not balance.arms:
             self._attach(balance)
         self._take(balance)
+        self._ages[:] = self.ages
         if sensors is not None:
             assert self._substitutes is not None
             self._doubt(balance, sensors, dt)
-            sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
+            sensors = self._substitutes.fill(sensors, self._ages, self.latencies,
+                                             balance.memory, dt)
             self._watch(balance, sensors, dt)
         self._good = 0.0 if self.failed or self.doubts else self._good + dt
         if self.balancing and self._gives_up(balance, sensors, dt):
             # First, as another thread may ask whether it has come to rest.
             self._time, self.crouching = 0.0, True
+            self._braces = balance.mode == WALK
             self.release()
         measured = self._known or self.refused or sensors is not None
-        if not (self.balancing or self.fallen) and (self._lowers or (self.failed and measured)):
+        if not (self.balancing or self.fallen) and (
+                self._lowers or ((self.failed or self.doubts) and measured)):
+            self._braces = self._braces and self.crouching
             self.crouching = True
         wanted = None
         if self.balancing and sensors is not None:
@@ -222,24 +255,38 @@ class BalancedPattern(Pattern):
         rate = (wanted - self.position) / dt if dt > 0.0 else self._still
         self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
                              self._behind) > 0
+        if self.balancing:
+            self._stride.record(balance, self._unseen, self.position[self._places])
 
     def _attach(self, balance: BipedFeedback) -> None:
         self._arms = balance.arms
-        self._substitutes = Substitutes(balance.links)
-        self._crouch, self._depth = crouch_pose(self.robot, balance.links) or (self._offset, 0.0)
+        self._substitutes, self._stride = Substitutes(balance.links), LastStride(len(self._places))
+        (self._crouch, self._depth), (leant, _) = (
+            crouch_pose(self.robot, balance.links, behind) or (self._offset, 0.0)
+            for behind in (0.0, BEHIND))
+        self._braced = leant - self._crouch
 
     def _gives_up(self, balance: BipedFeedback, sensors: SensorData | None, dt: float) -> bool:
-        """Return whether to crouch now instead of balancing any longer."""
-        if not (self._stops or self._lowers):
+        """Return whether to crouch now instead of balancing any longer.
+
+        A crouch that begins in a walk waits for the moment at which the body is over the foot
+        that stands.
+        """
+        blind = self._unseen > REPEATED
+        if not (self._stops or self._lowers or blind):
             self._waited = self._failing = 0.0
             self._blind = False
             return sensors is None
         self._failing += dt
         self._waited = self._waited + dt if balance.mode == STAND else 0.0
-        self._blind = self._blind or min(self.ages[IMU], self.ages[JOINTS]) > EXTRAPOLATED
+        self._blind = self._blind or blind or (self._stops and self._failing > PATIENCE)
         return (sensors is None or self._waited > SETTLED
-                or (self._stops and self._failing > PATIENCE)
                 or (self._blind and (balance.mode != WALK or self._passes(balance))))
+
+    @property
+    def _unseen(self) -> float:
+        """Age of the newest measurement of IMU and joints that is used now, s."""
+        return float(np.maximum(self._ages, self.latencies)[:FEET].min())
 
     @property
     def _stops(self) -> bool:
@@ -264,7 +311,7 @@ class BalancedPattern(Pattern):
         if self._held:
             self._held = False
             self._start[:] = self.position
-        wanted = balance.advance(sensors, dt)
+        wanted = self._stride.replay(balance, self._unseen, balance.advance(sensors, dt))
         if not np.isfinite(wanted).all():
             self._fall()
             return None
@@ -283,8 +330,12 @@ class BalancedPattern(Pattern):
         if not self._held or pose is not self._pose:
             self._held, self._pose, self._time = True, pose, 0.0
             self._start[:] = self.position
+            if np.abs(pose - self._start).max() > JUMP:
+                self._settles = duration + SETTLED
         self._time += dt
         balance.arms.advance(dt, False)
+        if self.crouching and self._braces:
+            pose = pose + smoothstep(min(max(2.0 - self._time / LOWER, 0.0), 1.0)) * self._braced
         return self._start + smoothstep(min(self._time / duration, 1.0)) * (pose - self._start)
 
     def _take(self, balance: BipedFeedback) -> None:
@@ -292,7 +343,8 @@ class BalancedPattern(Pattern):
         self._core.cpg_take(self._address)
         if self._anew:
             self._anew = False
-            self.doubts.clear()
+            if not self.balancing:
+                self.doubts.clear()
         while self._follow:
             balance.follow(self._follow.popleft())
         if self._tracks != [balance.track]:
@@ -300,22 +352,83 @@ class BalancedPattern(Pattern):
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Count an input as out if it contradicts the others while the robot balances."""
-        memory = balance.memory
-        joints = sensors.joint_positions[0]
-        jumps = np.abs(joints - self._measured) > JUMP + FASTEST * (self._gap + dt)
-        self._measured, self._gap = joints.copy(), self.ages[JOINTS]
-        # Somebody who moves the robot moves more than one joint.
-        if self.balancing and jumps.sum() == 1:
-            self.doubts.setdefault(JOINTS, f'{balance.order[int(jumps.argmax())]} jumped')
+        if self.balancing:
+            self._doubt_joints(balance, sensors, dt)
+        self._doubt_soles(balance, sensors, dt)
         if self.balancing and balance.mode == WALK and balance.kind == WALKS:
-            loads, swings = sensors.foot_forces[0], memory.swinging
-            contrary = (self.ages[FEET] < EXTRAPOLATED and self._passes(balance)
+            loads, swings = sensors.foot_forces[0], balance.memory.swinging
+            contrary = (self._ages[FEET] < EXTRAPOLATED and self._passes(balance)
                         and loads[swings].sum() > CONTRARY * loads[~swings].sum())
             self._contrary = self._contrary + dt if contrary else 0.0
             if self._contrary > STEADY:
                 self.doubts.setdefault(FEET, 'the contacts do not go with the gait')
-        for one in self.doubts:
-            self.ages[one] = max(self.ages[one], EXTRAPOLATED + dt)
+        self._measured, self._gap = sensors.joint_positions[0].copy(), self._ages[JOINTS]
+        assert self._substitutes is not None
+        if not self.doubts:
+            self._substitutes.suspect = None
+        for doubted in self.doubts:
+            if doubted != JOINTS or self._substitutes.suspect is None:
+                self._ages[doubted] = max(self._ages[doubted], EXTRAPOLATED + ADOPTED)
+
+    def _doubt_joints(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+        """Doubt a single joint that jumps, or that stays the same in a walk."""
+        joints = sensors.joint_positions[0]
+        moved = np.abs(joints - self._measured)
+        wrong, reason = moved > JUMP + FASTEST * (self._gap + dt), 'jumped'
+        if self._unchanged.size != joints.size or balance.mode != WALK:
+            self._unchanged = np.zeros(joints.size)
+        self._unchanged = np.where(moved > 0.0, 0.0, self._unchanged + dt)
+        if not wrong.any():
+            wrong, reason = np.zeros(joints.size, dtype=bool), 'is stuck'
+            wrong[balance.rows] = self._unchanged[balance.rows] > STEADY
+        # Somebody who moves the robot moves more than one joint.
+        if wrong.sum() == 1 and JOINTS not in self.doubts:
+            assert self._substitutes is not None
+            self._substitutes.suspect = int(wrong.argmax())
+            self.doubts[JOINTS] = f'{balance.order[self._substitutes.suspect]} {reason}'
+
+    def _doubt_soles(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+        """Doubt joints or IMU by the soles while both feet stand.
+
+        The soles of a robot that is pushed lean, too: it crouches, and as they are level there,
+        the IMU counts again.
+        """
+        if self.balancing and balance.mode == WALK:
+            self._settles = SETTLED
+            return
+        weight = GRAVITY * balance.links.masses.sum()
+        if self._ages.max() > EXTRAPOLATED or (sensors.foot_forces[0] < LOADED * weight).any():
+            return
+        assert self._substitutes is not None
+        tilts, shifts = self._substitutes.sole_tilts(sensors), balance.mode == SHIFT
+        self._settles -= dt
+        if self._settles > 0.0:
+            self._tilts[:] = self._usual[:] = tilts
+            return
+        self._tilts += min(dt / COMPARED, 1.0) * (tilts - self._tilts)
+        if not (self.balancing and shifts):
+            self._usual += min(dt / USUAL, 1.0) * (tilts - self._usual)
+        turned = self._tilts - self._usual
+        off = math.dist(*tilts)
+        twisted = self.balancing and shifts and math.dist(*turned) > TWISTED
+        leaning = max(math.hypot(*tilts.mean(axis=0)), FLAT / TURNED * math.hypot(
+            *turned.mean(axis=0)))
+        uneven = off > PARALLEL or twisted or leaning > FLAT
+        self._uneven = self._uneven + dt if uneven else 0.0
+        self._level = self._level + dt if self.crouching and not uneven else 0.0
+        if self._level > SEEN_LEVEL and self._leant:
+            self._leant = False
+            self.doubts.pop(IMU, None)
+        if self._uneven <= COMPARED or self.doubts:
+            return
+        if off > PARALLEL or twisted:
+            self.doubts[JOINTS] = (f'the soles are {off:.2f} rad from parallel by the joints, or '
+                                   'turn against each other, while both feet stand: encoder '
+                                   'offsets or names of joints')
+        else:
+            self.doubts[IMU] = ('the soles lean by IMU and joints while both feet stand: the '
+                                'mounting of the IMU, its signs, a push, or ground too steep')
+            self._leant = True
 
     def _watch(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Find out whether the robot has fallen, was moved, or stands on its feet again."""
@@ -338,6 +451,9 @@ class BalancedPattern(Pattern):
         weight = GRAVITY * balance.links.masses.sum()
         stands = (lean < (CROUCHED if self.crouching else UPRIGHT) and off < NEAR
                   and sensors.foot_forces.sum() > BORNE * weight)
+        if TOPPLES < lean < UPRIGHT and not (stands or self.fallen or self.crouching):
+            # Its feet do not show that it stands.
+            self.crouching = True
         self._stood = self._stood + dt if stands and not moved else 0.0
         if self._stood >= STEADY:
             balance.restart(self._depth if self.crouching else 0.0)

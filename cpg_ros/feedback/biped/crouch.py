@@ -31,12 +31,14 @@ HALVINGS = 22
 BENT = np.arange(1.0, 0.4, -0.05)
 
 
-def crouch_pose(robot: Robot, links: Links) -> tuple[np.ndarray, float] | None:
+def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
+                ) -> tuple[np.ndarray, float] | None:
     """Return the angles of the crouch and how much lower the centre of mass is, or None.
 
     Args:
         robot: whose legs each have three joints that pitch: hip, knee and ankle.
         links: of the robot.
+        behind: how far the centre of mass is behind the middle of the soles, m.
 
     Returns:
         Angles of the joints of the legs, leg by leg, rad, shape (joints,), and by how much the
@@ -48,7 +50,7 @@ def crouch_pose(robot: Robot, links: Links) -> tuple[np.ndarray, float] | None:
     names, joints = list(robot.biped.links), {joint.name: joint for joint in robot.joints}
     angles = np.array([joints[name].offset if name in joints else robot.held[name]
                        for name in names])
-    ahead_of_soles = _Ahead(links)
+    ahead_of_soles = _Ahead(links, behind)
     stand, legs = ahead_of_soles.height(angles), []
     for chain in links.chains:
         pitching = [row - 1 for row in chain if abs(links.axes[row, 1]) > LATERAL]
@@ -83,10 +85,10 @@ def _centre(ahead_of_soles: '_Ahead', angles: np.ndarray, hips: np.ndarray, low:
 
 
 class _Ahead:
-    """Distance of the centre of mass ahead of the middle of the soles, soles level, m."""
+    """Distance of the centre of mass ahead of where it is to be, soles level, m."""
 
-    def __init__(self, links: Links) -> None:
-        self._links, self._pose = links, blank_pose(links)
+    def __init__(self, links: Links, behind: float) -> None:
+        self._links, self._pose, self._behind = links, blank_pose(links), behind
         self._chain = [row for row in links.chains[0] if abs(links.axes[row, 1]) > LATERAL]
         self._center, self._soles = np.zeros(6), np.zeros((2, 6))
         self._still = np.zeros(3), np.zeros(len(links.masses) - 1)
@@ -94,7 +96,7 @@ class _Ahead:
 
     def __call__(self, angles: np.ndarray) -> float:
         self._place(angles)
-        return float(self._center[0] - self._pose.soles[:, 0].mean())
+        return float(self._center[0] - self._pose.soles[:, 0].mean()) + self._behind
 
     def height(self, angles: np.ndarray) -> float:
         """Return the height of the centre of mass above the soles, m."""

@@ -21,8 +21,10 @@ still and those that swing to be on their paths, while the base moves as the ine
 """
 
 from cpg_ros.dynamics.integration.compilation import specialised
-from cpg_ros.feedback.biped.gains import BipedMemory
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.gains import BipedMemory, WALK
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
+from cpg_ros.feedback.biped.stepping import WALKS
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 import numpy as np
@@ -32,6 +34,8 @@ IMU, JOINTS, FEET = range(3)
 #: EXTRAPOLATED: age, s, up to which a measurement is extrapolated by its rate; later it is
 #: replaced.
 EXTRAPOLATED = 0.05
+#: PROMPT: age, s, above which a measurement that has just arrived is extrapolated, too.
+PROMPT = 0.008
 #: FOLLOWED: rate at which a predicted sole approaches its path, 1/s; DAMPED: damping of the least
 #: squares that give the rates of the joints.
 FOLLOWED, DAMPED = 20.0, 1e-3
@@ -41,11 +45,47 @@ FASTEST = 15.0
 ADOPTED = 0.02
 
 
+#: REPEATED: age of IMU and joints, s, from which on the last stride is repeated; KEPT: ticks that
+#: are kept of it.
+REPEATED, KEPT = 0.025, 512
+
+
+class LastStride:
+    """The commands of the last stride of a walk, which are repeated where nothing is measured.
+
+    A steady walk is periodic: its own last commands hold the torques that legs and body need of
+    each other, which no prediction of a moment later does.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._commands, self._phases = np.zeros((KEPT, joints)), np.full(KEPT, np.inf)
+        self._row = 0
+
+    def record(self, balance: BipedFeedback, age: float, command: np.ndarray) -> None:
+        """Keep the command of a tick of a walk, rad, shape (joints,), if sensors are valid."""
+        if balance.mode != WALK or balance.kind != WALKS:
+            self._phases[:] = np.inf
+        elif age < REPEATED:
+            self._commands[self._row] = command
+            self._phases[self._row] = balance.memory.phases[0]
+            self._row = (self._row + 1) % KEPT
+
+    def replay(self, balance: BipedFeedback, age: float, command: np.ndarray) -> np.ndarray:
+        """Return the command to give in place of another, rad, shape (joints,)."""
+        if age < REPEATED:
+            return command
+        off = np.abs((self._phases - balance.memory.phases[0] + 0.5) % 1.0 - 0.5)
+        row = int(np.argmin(np.where(np.isfinite(off), off, 1.0)))
+        return self._commands[row] if off[row] < 0.02 else command
+
+
 class Substitutes:
     """Fills the gaps in the measurements of one biped; a tick allocates little.
 
     Attributes:
         sensors: measurements with the gaps filled, overwritten by ``fill``.
+        suspect: the joint whose own measurement is not to be used, in the links' order; None for
+            none.
 
     """
 
@@ -53,6 +93,7 @@ class Substitutes:
         """Prepare for a robot's links."""
         joints = len(links.masses) - 1
         self._links, self._pose = links, blank_pose(links)
+        self.suspect: int | None = None
         self.sensors = SensorData.zeros(1, len(links.chains), joints)
         self._still, self._angles = np.zeros(3), np.zeros(joints)
         self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
@@ -61,13 +102,14 @@ class Substitutes:
                                  (self._still, self.sensors.joint_velocities[0]), self._pose,
                                  self._center, self._soles, self._weights)
 
-    def fill(self, measured: SensorData, ages: np.ndarray, memory: BipedMemory, dt: float
-             ) -> SensorData:
+    def fill(self, measured: SensorData, ages: np.ndarray, latencies: np.ndarray,
+             memory: BipedMemory, dt: float) -> SensorData:
         """Return the present measurements, with substitutes for those that are late.
 
         Args:
             measured: the last valid ones.
-            ages: of inertial unit, joints and feet, s, shape (3,).
+            ages: time since those of inertial unit, joints and feet arrived, s, shape (3,).
+            latencies: time since they were measured, s, shape (3,).
             memory: of the feedback at its last tick.
             dt: of a tick, s; younger measurements are taken as they are.
 
@@ -79,9 +121,10 @@ class Substitutes:
         if late[JOINTS]:
             self._move(memory, dt)
         else:
-            self._angles[:] = sensors.joint_positions[0]
-        if late[IMU]:
-            self._turn(measured, min(ages[IMU], EXTRAPOLATED))
+            self._take_joints(latencies[JOINTS], memory, dt)
+        time = max(ages[IMU], latencies[IMU])
+        if late[IMU] or time > PROMPT:
+            self._turn(measured, min(time, EXTRAPOLATED))
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
         if late[IMU] and late[JOINTS]:
@@ -91,6 +134,30 @@ class Substitutes:
             weight = GRAVITY * memory.pose.carried[0]
             sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.fractions)
         return sensors
+
+    def sole_tilts(self, sensors: SensorData) -> np.ndarray:
+        """Return how far each sole leans forward and left by IMU and joints, rad, shape (2, 2)."""
+        rpy = np.array([*sensors.rpy[0, :2], 0.0])
+        self._kinematics(self._links, rpy, sensors.joint_positions[0],
+                         (self._still, sensors.joint_velocities[0]), self._pose, self._center,
+                         self._soles, self._weights)
+        return self._pose.turns[self._links.chains[:, -1], :2, 2].copy()
+
+    def _take_joints(self, latency: float, memory: BipedMemory, dt: float) -> None:
+        """Take the joints as measured a latency in s ago, but for the suspect."""
+        angles, rates = self.sensors.joint_positions[0], self.sensors.joint_velocities[0]
+        if latency > PROMPT:
+            angles += min(latency, EXTRAPOLATED) * rates
+        suspect = self.suspect
+        if suspect is None:
+            self._angles[:] = angles
+            return
+        measured, measured_rates = angles.copy(), rates.copy()
+        self._move(memory, dt)
+        predicted, rate = self._angles[suspect], rates[suspect]
+        angles[:], rates[:] = measured, measured_rates
+        angles[suspect], rates[suspect] = predicted, rate
+        self._angles[:] = angles
 
     def _move(self, memory: BipedMemory, dt: float) -> None:
         """Predict the joints of the legs dt in s later."""

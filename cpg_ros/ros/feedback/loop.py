@@ -371,6 +371,7 @@ class BalanceLoop(SensorLoop):
         ages = [now - monitor.believed for monitor in inputs.monitors]
         # The oldest of the feet's inputs counts; with efforts as contacts, that of the joints.
         pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
+        pattern.latencies[:FEET] = [monitor.latency(now) for monitor in inputs.monitors[:FEET]]
         pattern.sensors = None if self.waiting else sensors
         pattern.wish = self._motion()
         pattern.balance = self.feedback

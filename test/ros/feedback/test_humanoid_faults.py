@@ -15,6 +15,7 @@
 """A humanoid whose sensors fail in a walk stops or crouches, within its limits, and goes on."""
 
 from depth import in_depth
+import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
@@ -23,8 +24,8 @@ from humanoid_under_fault import HumanoidUnderFault  # noqa: E402
 
 
 @pytest.mark.parametrize('fault', ['dropped imu', 'dropped joints', *in_depth(
-    'none', 'NaN imu', 'NaN joints', 'frozen joints', 'NaN feet', 'dropped feet', 'stamps 1 s old',
-    'no velocities')])
+    'none', 'NaN imu', 'NaN joints', 'frozen joints', 'NaN feet', 'dropped feet', 'no velocities',
+    '0.2 s without imu')])
 def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
@@ -38,9 +39,42 @@ def test_late_sensors_make_it_crouch(fault):
     assert not humanoid.crossed and not humanoid.pattern.falls
 
 
-@pytest.mark.parametrize('fault', ['feet swapped', *in_depth('encoder off .25')])
+@pytest.mark.parametrize('begins', [3.202, *in_depth(3.354, 3.454)])
+def test_without_any_sensor_it_repeats_its_last_stride_until_it_can_crouch(begins):
+    humanoid = HumanoidUnderFault('publisher dies 3 s', begins=begins)
+    assert humanoid.run(begins + 2.5) == 'crouch'
+    assert not humanoid.crossed and not humanoid.pattern.falls
+
+
+@pytest.mark.parametrize('fault', ['feet swapped', *in_depth('encoder off .25', 'encoder stuck')])
 def test_an_input_that_contradicts_the_others_makes_it_crouch(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(6.5) == 'crouch'
     assert not humanoid.crossed and not humanoid.pattern.falls
     assert humanoid.loop.faults
+
+
+@pytest.mark.parametrize('fault', ['IMU pitch negated', *in_depth(
+    'tilt 9 degrees', 'IMU turned 90 about z', 'IMU turned 180 about z')])
+def test_an_imu_that_is_mounted_otherwise_is_seen_before_the_first_step(fault):
+    humanoid = HumanoidUnderFault(fault)
+    assert humanoid.run(3.0) == 'crouch'
+    assert not humanoid.crossed and not humanoid.pattern.falls
+    assert 'mounting of the IMU' in humanoid.loop.faults
+
+
+def test_swapped_names_of_joints_are_seen_before_the_first_step():
+    humanoid = HumanoidUnderFault('two names swapped')
+    assert humanoid.run(2.3) == 'crouch'
+    assert not humanoid.crossed and 'names of joints' in humanoid.loop.faults
+
+
+def test_a_push_is_not_taken_for_an_imu_that_is_mounted_otherwise():
+    humanoid, doubts = HumanoidUnderFault('none', 1, speed=0.0), []
+    humanoid.run(1.5)
+    humanoid.body.push(np.array([141.0, 141.0, 0.0]), 0.1)
+    while humanoid.time < 7.0:
+        humanoid.step()
+        doubts.extend(humanoid.pattern.doubts.values())
+    assert any('a push' in one for one in doubts) and not humanoid.fell
+    assert humanoid.pattern.balancing and not humanoid.loop.faults
