@@ -35,7 +35,7 @@ SWING_GAINS = {
     'swing_kd': Gain(176.0, 2e3, 'N s/m', 'the same by its velocity'),
     'swing_mass': Gain(3.37, 30.0, 'kg', 'the same by the acceleration of its path'),
     'sole_kp': Gain(30.2, 500.0, 'N m/rad', 'moment that keeps the sole level and ahead'),
-    'sole_kd': Gain(0.716, 50.0, 'N m s/rad', 'the same by its rate'),
+    'sole_kd': Gain(0.716, 50.0, 'N m s/rad', 'derivative gain of the same'),
     'press': Gain(0.012, 0.1, 'm', 'how far below the ground a path ends')}
 #: LANDED: factor of the swing's forces on a foot that has landed early; SWUNG: factor of the
 #: stance's damping on the joints of a leg that bears nothing.
@@ -163,11 +163,11 @@ def load_shares(phases, landed, gains, fractions):
 FLIGHT_GAINS = {
     'flight_height': Gain(0.97, 1.2, '', 'height of the centre of mass as feet leave and touch '
                           'the ground in gaits with flight, by height', low=0.5),
-    'flight_kp': Gain(7410.0, 5e4, 'N/m', 'upward force by that height'),
-    'flight_kd': Gain(20.0, 5e3, 'N s/m', 'the same by its rate'),
+    'flight_kp': Gain(7410.0, 5e4, 'N/m', 'proportional gain of the upward force on that height'),
+    'flight_kd': Gain(20.0, 5e3, 'N s/m', 'derivative gain of the same'),
     'flight_width': Gain(0.48, 2.0, '', 'width of the steps in gaits with flight, by step_width'),
-    'flight_ahead': Gain(0.444, 1.5, '', 'way from the foot to the body at touchdown, by the way '
-                         'of a stance'),
+    'flight_ahead': Gain(0.444, 1.5, '', 'foot offset at touchdown, as a fraction of the '
+                         'distance travelled in stance'),
     'flight_x': Gain(0.159, 1.0, 's', 'foot further ahead by what the speed is too high'),
     'flight_y': Gain(0.0512, 1.0, 's', 'the same sideways')}
 #: MOST: largest upward force, as a multiple of the weight; REACH: largest distance of a foothold
