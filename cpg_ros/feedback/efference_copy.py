@@ -34,16 +34,16 @@ def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 
 @jit
-def between_phases(place, points):
+def between_phases(phase, points):
     """Return the points of a cycle on either side of a place, and the share of the second.
 
     Args:
-        place: in points, from 0 on.
+        phase: in points, from 0 on.
         points: number of points in the cycle.
 
     """
-    low = int(place) % points
-    return low, (low + 1) % points, place - int(place)
+    low = int(phase) % points
+    return low, (low + 1) % points, phase - int(phase)
 
 
 @jit
@@ -125,10 +125,10 @@ def fold(phases: np.ndarray, signals: np.ndarray) -> np.ndarray:
         InputError: a bin has no sample.
 
     """
-    place = (phases % 1.0 * BINS).astype(int) % BINS
-    count = np.bincount(place, minlength=BINS)
+    bins = (phases % 1.0 * BINS).astype(int) % BINS
+    count = np.bincount(bins, minlength=BINS)
     if not count.all():
         raise InputError(f'an efference copy needs samples in all {BINS} bins of the stride, '
                          f'not in {np.count_nonzero(count)}')
-    return np.stack([np.bincount(place, column, BINS) for column in signals.T], axis=1
+    return np.stack([np.bincount(bins, column, BINS) for column in signals.T], axis=1
                     ) / count[:, None]

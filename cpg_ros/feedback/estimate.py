@@ -174,10 +174,10 @@ def update(legs, sensors, run, dt, velocity, contact, doubt, leg_velocities, scr
         seen[3] = 0.0
         if not contact[leg] or rows[leg, 1] == 0.0:
             continue
-        one, two, three = columns[leg, 0], columns[leg, 1], columns[leg, 2]
-        now[0], now[1], now[2] = angles[one], angles[two], angles[three]
-        velocity_by_leg(rows[leg], now, (rates[one], rates[two], rates[three]), slopes, turning,
-                        up, legs.radius, seen)
+        first, second, third = columns[leg, 0], columns[leg, 1], columns[leg, 2]
+        now[0], now[1], now[2] = angles[first], angles[second], angles[third]
+        velocity_by_leg(rows[leg], now, (rates[first], rates[second], rates[third]), slopes,
+                        turning, up, legs.radius, seen)
         off = 0.0
         for k in range(3):
             off += (seen[k] - velocity[k])**2

@@ -69,8 +69,8 @@ class Feedback:
 
     def slot(self, plan: GaitPlan) -> int:
         """Return the slot of a gait; one that is new is learnt without an efference copy."""
-        for k, known in enumerate(self._programs):
-            if known is plan:
+        for k, plan_of_slot in enumerate(self._programs):
+            if plan_of_slot is plan:
                 return k
         return self.learn(plan)
 

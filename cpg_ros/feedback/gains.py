@@ -120,8 +120,8 @@ class Memory(_MemoryFields):  # type: ignore[misc]
             shape = [legs if size == 'legs' else int(size) for size in variable.shape]
             return np.full((*first, *shape), variable.initial)
 
-        return cls(*(array(one, runs) for one in VARIABLES.values()),
-                   *(array(one) for one in SCRATCH.values()))
+        return cls(*(array(dimensions, runs) for dimensions in VARIABLES.values()),
+                   *(array(dimensions) for dimensions in SCRATCH.values()))
 
 
 # Gains of a robot of another size than the Go2.
@@ -140,20 +140,20 @@ def leg_length(geometry: Geometry) -> float:
 
     Unlike the height of the stand, it does not depend on how far a file bends the knees.
     """
-    known = geometry.turns[:, 1] != 0.0
-    lengths = (np.abs(geometry.uppers) + np.abs(geometry.lowers))[known]
-    return float(lengths.mean()) if known.any() else LENGTH
+    turning = geometry.turns[:, 1] != 0.0
+    lengths = (np.abs(geometry.uppers) + np.abs(geometry.lowers))[turning]
+    return float(lengths.mean()) if turning.any() else LENGTH
 
 
 @cache
 def _powers(unit: str) -> tuple[int, ...]:
     over, *under = unit.split('/')
-    found = np.zeros(3, dtype=int)
+    powers = np.zeros(3, dtype=int)
     for part in over.split(' '):
-        found += POWERS[part]
+        powers += POWERS[part]
     for part in under:
-        found -= POWERS[part]
-    return tuple(found.tolist())
+        powers -= POWERS[part]
+    return tuple(powers.tolist())
 
 
 def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
@@ -171,13 +171,13 @@ def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
 
 def scaled_gains(length: float) -> Gains:
     """Return the usual gains for legs of a length, m, held to their limits."""
-    found = {}
+    result = {}
     for name, gain in GAINS.items():
         ratio = scale_of(gain.unit, length) / scale_of(gain.unit, LENGTH)
         if ratio != 1.0:
             scaled = float(f'{gain.default * ratio:.{DIGITS}g}')
-            found[name] = min(max(scaled, gain.low), gain.high)
-    return Gains()._replace(**found)
+            result[name] = min(max(scaled, gain.low), gain.high)
+    return Gains()._replace(**result)
 
 
 def dimensionless(gains: Gains, length: float) -> dict[str, float]:
@@ -199,12 +199,12 @@ def robot_gains(robot: Robot) -> Gains:
     gains, own = scaled_gains(length), robot.feedback
     if own is None:
         return gains
-    for part, names, known in (('laws', own.laws, [law.name for law in LAWS]),
+    for part, names, allowed in (('laws', own.laws, [law.name for law in LAWS]),
                                ('gains', own.gains, list(GAINS))):
         for name in names:
-            if name not in known:
+            if name not in allowed:
                 raise InputError(f"robot file '{robot.name}': feedback.{part} has '{name}', which "
-                                 f'is not one of {", ".join(known)}')
+                                 f'is not one of {", ".join(allowed)}')
     gains = gains._replace(**own.laws, **{
         name: value * scale_of(GAINS[name].unit, length) for name, value in own.gains.items()})
     try:

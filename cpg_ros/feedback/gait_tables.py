@@ -56,21 +56,21 @@ class Timetable:
             for readout in (plan.readout, plan.in_place))
         feet = forward(geometry, robot.column('offset') + self.angles)
         columns = [_swing(x) for x in feet[:, :, 0].T]
-        self.swinging = np.stack([one for one, _ in columns], axis=1)
-        self.progress = np.stack([one for _, one in columns], axis=1)
+        self.swinging = np.stack([column for column, _ in columns], axis=1)
+        self.progress = np.stack([column for _, column in columns], axis=1)
         self.hops = _hops(robot, self.swinging)
 
 
 def _hops(robot: Robot, swinging: np.ndarray) -> bool:
     pairs = [pair for pair in itertools.combinations(range(len(robot.legs)), 2)
              if _paired(robot, *(list(robot.legs)[leg] for leg in pair))]
-    return bool(pairs) and all((swinging[:, one] != swinging[:, other]).mean() < TOGETHER
-                               for one, other in pairs)
+    return bool(pairs) and all((swinging[:, first] != swinging[:, other]).mean() < TOGETHER
+                               for first, other in pairs)
 
 
-def _paired(robot: Robot, one: str, other: str) -> bool:
-    return (robot.girdles.get(one) == robot.girdles.get(other)
-            and {robot.sides.get(one), robot.sides.get(other)} == {'left', 'right'})
+def _paired(robot: Robot, leg: str, other: str) -> bool:
+    return (robot.girdles.get(leg) == robot.girdles.get(other)
+            and {robot.sides.get(leg), robot.sides.get(other)} == {'left', 'right'})
 
 
 def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -249,19 +249,19 @@ def _contradicts(up, turning, memory):
     # A vector that is constant in the world turns the opposite way in the base's frame.
     turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
               up[0] * turning[1] - up[1] * turning[0])
-    known, parted, moved, leap = memory[17] > 0.0 and dt < GAP, 0.0, 0.0, 0.0
+    comparable, parted, moved, leap = memory[17] > 0.0 and dt < GAP, 0.0, 0.0, 0.0
     for k in range(3):
         leap += (up[k] - memory[3 + k] - dt * turned[k])**2
     # A base that is put elsewhere says nothing about the IMU: compare anew from here on.
-    leaps = known and leap > LEAP**2
+    leaps = comparable and leap > LEAP**2
     if leaps:
-        known, memory[12], memory[13], memory[19] = False, 0.0, 0.0, 0.0
+        comparable, memory[12], memory[13], memory[19] = False, 0.0, 0.0, 0.0
     stays = 1.0 - min(dt / FORGET, 1.0)
     for k in range(3):
         stated = stays * memory[6 + k] + up[k] - memory[3 + k]
         measured = stays * memory[9 + k] + dt * turned[k]
         memory[3 + k] = up[k]
-        memory[6 + k], memory[9 + k] = (stated, measured) if known else (0.0, 0.0)
+        memory[6 + k], memory[9 + k] = (stated, measured) if comparable else (0.0, 0.0)
         parted += (memory[6 + k] - memory[9 + k])**2
         moved += memory[6 + k]**2 + memory[9 + k]**2
     fraction = min(dt / COMPARED, 1.0)

@@ -89,9 +89,9 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
     for leg in range(rows.shape[0]):
         if forces[leg] < load or rows[leg, 1] == 0.0:
             continue
-        one, two, three = columns[leg, 0], columns[leg, 1], columns[leg, 2]
-        now[0], now[1], now[2] = angles[one], angles[two], angles[three]
-        velocity_by_leg(rows[leg], now, (rates[one], rates[two], rates[three]), slopes,
+        first, second, third = columns[leg, 0], columns[leg, 1], columns[leg, 2]
+        now[0], now[1], now[2] = angles[first], angles[second], angles[third]
+        velocity_by_leg(rows[leg], now, (rates[first], rates[second], rates[third]), slopes,
                         (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), legs.radius, seen[leg])
         seen[leg, 3], seen[leg, 4], seen[leg, 5] = foot_of(rows[leg], now[0], now[1], now[2])
         for other in range(leg):

@@ -155,10 +155,10 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory.previous_contact[:] = memory.contact[run]
         update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run], memory.doubt,
                memory.leg_velocities, memory.scratch)
-        wanted, velocity = memory.wanted_velocity[run], planned.velocity[run]
-        _approach(velocity, dt, wanted[0], wanted[1])
+        target, velocity = memory.wanted_velocity[run], planned.velocity[run]
+        _approach(velocity, dt, target[0], target[1])
         old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
-        slot, phase, left = new if mix > 0.5 else old, planned.phase[run], wanted[0, 1]
+        slot, phase, left = new if mix > 0.5 else old, planned.phase[run], target[0, 1]
         off = _deviation(tables, memory, sensors, planned, run, level)
 
         # Feet that land together pitch and roll the body wherever they are put: of the laws

@@ -301,10 +301,10 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain],
     legs = {}
     for leg, chain in chains.items():
         for moved in (*combinations(chain.joints, 3), *combinations(chain.joints, 2)):
-            found = _leg_geometry(chain.holding({name: stand[name] for name in chain.joints
+            geometry = _leg_geometry(chain.holding({name: stand[name] for name in chain.joints
                                                  if name not in moved}))
-            if found is not None:
-                legs[leg] = found
+            if geometry is not None:
+                legs[leg] = geometry
                 break
     radius = float(np.mean([chains[leg].radius for leg in legs] or 0.0))
     return BodyGeometry(round(mass, 6), round(radius, 6), legs)
@@ -325,8 +325,8 @@ def _leg_geometry(chain: LegChain) -> LegGeometry | None:
         return None
     hip, thigh, calf = anchors[[0, 0, 1] if len(axes) == 2 else [0, 1, 2]]
 
-    def rounded(place: np.ndarray) -> tuple[float, ...]:
-        return tuple((np.round(place, 6) + 0.0).tolist())
+    def rounded(point: np.ndarray) -> tuple[float, ...]:
+        return tuple((np.round(point, 6) + 0.0).tolist())
 
     return LegGeometry(chain.joints, tuple(turns.tolist()), rounded(hip), rounded(thigh - hip),
                        rounded(calf - thigh), rounded(chain.foot - calf), yaw, roll)

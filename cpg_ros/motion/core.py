@@ -127,7 +127,7 @@ def precompile(name: str) -> None:
         solver()
 
 
-def confine(wanted: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt: float,
+def confine(target: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt: float,
             position: np.ndarray, velocity: np.ndarray, behind: np.ndarray) -> int:
     """Move joints to the wanted positions within their limits; count those held back.
 
@@ -135,7 +135,7 @@ def confine(wanted: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt:
     it stays the derivative of what is published.
 
     Args:
-        wanted: positions, rad, shape (joints,).
+        target: positions, rad, shape (joints,).
         wanted_rate: their velocities, rad/s.
         limits: lowest and highest angle, rad, and largest speed, rad/s, shape (3, joints).
         dt: since the last tick, s.
@@ -144,8 +144,8 @@ def confine(wanted: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt:
         behind: whether a limit held each joint back in the last tick; overwritten.
 
     """
-    given = [np.ascontiguousarray(one, dtype=float) for one in (wanted, wanted_rate, limits)]
-    held: int = core().cpg_confine(position.size, *(one.ctypes.data for one in given), dt,
+    given = [np.ascontiguousarray(array, dtype=float) for array in (target, wanted_rate, limits)]
+    held: int = core().cpg_confine(position.size, *(array.ctypes.data for array in given), dt,
                                    position.ctypes.data, velocity.ctypes.data, behind.ctypes.data)
     return held
 
@@ -208,7 +208,7 @@ class CTrack:
         lane = stepper.lane
         self._kept[which] = stepper, lane
         arrays = stepper.clock, stepper.now, *stepper.ring[1:]
-        setattr(self.struct, which, Net(lane.address, *(one.ctypes.data for one in arrays),
+        setattr(self.struct, which, Net(lane.address, *(array.ctypes.data for array in arrays),
                                         stepper.ring.x.size))
         self.struct.advance = ctypes.cast(
             library_of(type(stepper.network)).advance, _POINTER).value

@@ -154,11 +154,11 @@ class RobotDescription:
 
         """
         moved = {joint.child for joint in self.joints.values()}
-        found = sorted({joint.parent for joint in self.joints.values()} - moved)
-        if len(found) != 1:
-            raise DescriptionError(f'the {self.format} has {len(found)} root links '
-                                   f'({", ".join(found)}), it must have one')
-        return found[0]
+        roots = sorted({joint.parent for joint in self.joints.values()} - moved)
+        if len(roots) != 1:
+            raise DescriptionError(f'the {self.format} has {len(roots)} root links '
+                                   f'({", ".join(roots)}), it must have one')
+        return roots[0]
 
     def chain(self, name: str) -> list[JointDescription]:
         """Return the joints from the root to one joint, which is the last.
@@ -168,12 +168,12 @@ class RobotDescription:
 
         """
         above = {joint.child: joint for joint in self.joints.values()}
-        found = [self.joints[name]]
-        while found[0].parent in above:
-            found.insert(0, above[found[0].parent])
-            if len(found) > len(self.joints):
+        joints = [self.joints[name]]
+        while joints[0].parent in above:
+            joints.insert(0, above[joints[0].parent])
+            if len(joints) > len(self.joints):
                 raise DescriptionError(f"the links above the joint '{name}' form a loop")
-        return found
+        return joints
 
     def frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return where a joint is in the frame of the root with all joints at 0.
@@ -181,10 +181,10 @@ class RobotDescription:
         Its place is in m, shape (3,); its frame's axes are columns, shape (3, 3). Errors as of
         ``chain``.
         """
-        place, axes = np.zeros(3), np.eye(3)
+        position, axes = np.zeros(3), np.eye(3)
         for joint in self.chain(name):
-            place, axes = place + axes @ joint.xyz, axes @ rotation(joint.rpy)
-        return place, axes
+            position, axes = position + axes @ joint.xyz, axes @ rotation(joint.rpy)
+        return position, axes
 
     def direction(self, name: str) -> np.ndarray:
         """Return the axis of a joint in the frame of the root with all joints at 0, a unit vector.
@@ -214,11 +214,12 @@ class RobotDescription:
         """
         begin = self.frame(last)[0]
         below = self._below(last)
-        balls = [(place + turned @ link.centre, link.radius) for place, turned, link in below
+        balls = [(position + turned @ link.centre, link.radius) for position, turned, link in below
                  if link.radius]
         if balls:
             return max(balls, key=lambda ball: float(np.linalg.norm(ball[0] - begin)))
-        points = np.concatenate([np.array([place for place, _, _ in below]), self.shapes(last)])
+        points = np.concatenate([np.array([position for position, _, _ in below]),
+                                 self.shapes(last)])
         reach = points - begin
         furthest = reach[np.linalg.norm(reach, axis=1).argmax()]
         along = reach @ furthest
@@ -407,8 +408,8 @@ def numbers(text: str, count: int, finite: bool = True) -> tuple[float, ...]:
         values = tuple(float(word) for word in text.split())
     except ValueError:
         return ()
-    known = not any(value != value or (finite and math.isinf(value)) for value in values)
-    return values if known and len(values) == count else ()
+    valid = not any(value != value or (finite and math.isinf(value)) for value in values)
+    return values if valid and len(values) == count else ()
 
 
 def _error(source: str, why: str) -> DescriptionError:
@@ -458,12 +459,12 @@ def _link(element: Element, path: Path | None, folder: str) -> LinkDescription:
     # Without collision shapes, visual ones show where a link ends.
     for collision in element.findall('collision') or element.findall('visual'):
         origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
-        place = {} if origin is None else origin.attrib
+        attributes = {} if origin is None else origin.attrib
         if sphere is not None and not radius:
             radius = sum(numbers(sphere.get('radius', ''), 1))
-            centre = numbers(place.get('xyz', ''), 3)
+            centre = numbers(attributes.get('xyz', ''), 3)
         shapes += _shapes(collision, path, folder, *(
-            numbers(place.get(key, ''), 3) or (0.0, 0.0, 0.0) for key in ('xyz', 'rpy')))
+            numbers(attributes.get(key, ''), 3) or (0.0, 0.0, 0.0) for key in ('xyz', 'rpy')))
     return LinkDescription(mass, radius, centre or (0.0, 0.0, 0.0), tuple(shapes))
 
 

@@ -151,9 +151,9 @@ def _geometry(geometry: Element) -> Mesh:
             width = 1 + max((int(use.get('offset', 0)) for use in element.findall('input')),
                             default=0)
             use = places['VERTEX']
-            first, place = firsts[use.get('source', '').removeprefix('#')], use.get('offset', 0)
-            rows = [first + _numbers(one.text, int).reshape(-1, width)[:, int(place)]
-                    for one in element.findall('p')]
+            first, offset = firsts[use.get('source', '').removeprefix('#')], use.get('offset', 0)
+            rows = [first + _numbers(element_of.text, int).reshape(-1, width)[:, int(offset)]
+                    for element_of in element.findall('p')]
             if kind == 'triangles':
                 triangles += [row.reshape(-1, 3) for row in rows]
                 continue
@@ -184,19 +184,21 @@ def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[
         left: one number, how many points and triangles there may still be.
 
     """
-    place = above.copy()
+    transform = above.copy()
     for step in node:
         if step.tag in ('matrix', 'translate', 'rotate', 'scale'):
-            place = place @ _transform(step.tag, np.array((step.text or '').split(), dtype=float))
+            transform = transform @ _transform(step.tag,
+                                               np.array((step.text or '').split(), dtype=float))
     for use in node.findall('instance_geometry'):
         mesh = meshes.get(use.get('url', '').removeprefix('#'))
         if mesh is not None:
             left[0] -= len(mesh.points) + len(mesh.triangles) + 1
             if left[0] < 0:
                 raise ValueError(f'its meshes have more than {MOST} points and triangles')
-            parts.append(Mesh(mesh.points @ place[:3, :3].T + place[:3, 3], mesh.triangles))
+            parts.append(Mesh(mesh.points @ transform[:3, :3].T + transform[:3, 3],
+                              mesh.triangles))
     for below in node.findall('node'):
-        _add(below, place, meshes, parts, left)
+        _add(below, transform, meshes, parts, left)
 
 
 def _transform(kind: str, numbers: np.ndarray) -> np.ndarray:
@@ -243,16 +245,16 @@ def find_mesh(reference: str, urdf: Path | None, folder: str = '') -> Path:
         return _installed(reference, package, rest)
     places = _packaged(package, rest, urdf) if package else iter(
         [urdf.parent / rest, urdf.parent / folder / rest, urdf.parent / folder / Path(rest).name])
-    for place in places:
-        if place.is_file():
-            return place
+    for directory in places:
+        if directory.is_file():
+            return directory
     raise MeshError(one_line(f'{reference[:200]}: ' + (
         'neither an installed package nor a folder above the URDF has such a file' if package
         else f'no such file, from {urdf.parent}')))
 
 
 def _folders(variable: str) -> list[Path]:
-    return [Path(one) for one in os.environ.get(variable, '').split(os.pathsep) if one]
+    return [Path(folder) for folder in os.environ.get(variable, '').split(os.pathsep) if folder]
 
 
 def _packaged(package: str, rest: str, urdf: Path) -> Iterator[Path]:
@@ -303,6 +305,6 @@ def _package_name(folder: Path) -> str:
     manifest = folder / 'package.xml'
     if not manifest.is_file():
         return ''
-    found = re.search(r'<name>\s*([^<\s]+)\s*</name>',
+    match = re.search(r'<name>\s*([^<\s]+)\s*</name>',
                       read_bytes(manifest, MeshError).decode(errors='replace'))
-    return found[1] if found else ''
+    return match[1] if match else ''

@@ -97,9 +97,9 @@ def smooth_terms(values: np.ndarray, harmonics: int) -> np.ndarray:
                                                           / (harmonics + 1))
     smooth = np.fft.irfft(terms, values.size)
     middle, half = 0.5 * (smooth.max() + smooth.min()), 0.5 * np.ptp(smooth)
-    found = np.stack([terms.real, -terms.imag], axis=1) * (2.0 / values.size / half)
-    found[0] = found[0, 0] / 2.0 - middle / half, 0.0
-    return found
+    terms_found = np.stack([terms.real, -terms.imag], axis=1) * (2.0 / values.size / half)
+    terms_found[0] = terms_found[0, 0] / 2.0 - middle / half, 0.0
+    return terms_found
 
 
 def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray:
@@ -118,7 +118,7 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
 
     """
     count, theta = int(orbit.waves.max()) + 1, np.arange(POINTS) / POINTS
-    known = PhaseMap(np.empty((count, 4)), np.empty((count, 4)), np.empty((count, POINTS, 4)),
+    maps = PhaseMap(np.empty((count, 4)), np.empty((count, 4)), np.empty((count, POINTS, 4)),
                      np.empty((count, 1 + harmonics, 2)), np.empty(count))
     for wave, levels in enumerate(orbit.levels):
         half = levels[:2, 1]
@@ -131,12 +131,12 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
         if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
             raise NoPhase('its waveform repeats within a cycle: the first harmonic, by which its '
                           f'phase is followed, has less than {LEAST_SHARE:.0%} of it')
-        known.shape[wave] = *mean, *half
-        known.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
-        known.tables[wave] = np.hstack([states, slopes / half / POINTS])
-        known.terms[wave] = smooth_terms(states[:, 0], harmonics)
-        known.crests[wave] = _crest(known.terms[wave])
-    return known
+        maps.shape[wave] = *mean, *half
+        maps.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
+        maps.tables[wave] = np.hstack([states, slopes / half / POINTS])
+        maps.terms[wave] = smooth_terms(states[:, 0], harmonics)
+        maps.crests[wave] = _crest(maps.terms[wave])
+    return maps
 
 
 class PhaseReadout:
@@ -160,38 +160,39 @@ class PhaseReadout:
             NoPhase: a waveform has hardly any first harmonic.
 
         """
-        known = phase_map(orbit, harmonics)
+        gait_maps = phase_map(orbit, harmonics)
         of_cells = np.tile([1.0, 0.0, 0.0], (len(orbit.phases), 1))
         if maps is not None:
             of_cells[cells] = maps
-        self.gait = GaitCells(orbit.waves, orbit.phases, of_cells, known)
+        self.gait = GaitCells(orbit.waves, orbit.phases, of_cells, gait_maps)
         self.joints = DrivenJoints(cells, weights, leg_cells)
         self.start = float((orbit.phases[leg_cells[0]]
-                            - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
+                            - gait_maps.crests[orbit.waves[leg_cells[0]]]) % 1.0)
         self.angles, self.rises = over_cycle(weights, lambda joint, phase: tuple(
-            evaluate(known.terms[orbit.waves[cells[joint]]], phase, order)
+            evaluate(gait_maps.terms[orbit.waves[cells[joint]]], phase, order)
             for order in range(3)), maps, 512)
 
     def fields(self) -> dict[str, Any]:
         """Return the fields by which the core reads joints and legs, see core.CGait."""
-        waves, phases, maps, known = self.gait
-        mean, half = known.shape[:, None, :2], known.shape[:, None, 2:]
-        values = mean + half * known.tables[:, :, :2], half * known.tables[:, :, 2:]
+        waves, phases, maps, phase_maps = self.gait
+        mean, half = phase_maps.shape[:, None, :2], phase_maps.shape[:, None, 2:]
+        values = mean + half * phase_maps.tables[:, :, :2], half * phase_maps.tables[:, :, 2:]
         return {'by_phase': 1, 'phase': phases, 'cells': phases.size, 'wave': waves,
                 'points': POINTS, 'waves': np.stack(values, axis=3).transpose(0, 2, 1, 3),
-                'shapes': known.shape, 'circles': known.circles, 'terms': known.terms,
-                'harmonics': known.terms.shape[1] - 1, 'crests': known.crests,
+                'shapes': phase_maps.shape, 'circles': phase_maps.circles,
+                'terms': phase_maps.terms,
+                'harmonics': phase_maps.terms.shape[1] - 1, 'crests': phase_maps.crests,
                 'maps': maps[self.joints.cells], **self.joints.fields()}
 
 
 def _crest(terms: np.ndarray) -> float:
     """Return the phase at which x is largest, cycles, [0, 1)."""
     grid = np.arange(512) / 512
-    place = float(grid[evaluate(terms, grid).argmax()])
+    crest = float(grid[evaluate(terms, grid).argmax()])
     for _ in range(4):
-        slope, bend = (float(evaluate(terms, np.array(place), order)) for order in (1, 2))
-        place -= float(np.clip(slope / bend / TURN, -1 / 512, 1 / 512)) if bend else 0.0
-    return place % 1.0
+        slope, bend = (float(evaluate(terms, np.array(crest), order)) for order in (1, 2))
+        crest -= float(np.clip(slope / bend / TURN, -1 / 512, 1 / 512)) if bend else 0.0
+    return crest % 1.0
 
 
 # The readout of a network's joints: of the waveform or of the phase, as the network states.
@@ -233,7 +234,7 @@ def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
         if orbit.network.readout == 'waveform':
             begin[leg], fraction[leg] = 0.0, stance(orbit.waveform(GRID), 0.0)
             continue
-        known, wave = phase_map(orbit, harmonics), orbit.waves[cell]
-        begin[leg] = known.crests[wave]
-        fraction[leg] = stance(evaluate(known.terms[wave], GRID), float(begin[leg]))
+        maps, wave = phase_map(orbit, harmonics), orbit.waves[cell]
+        begin[leg] = maps.crests[wave]
+        fraction[leg] = stance(evaluate(maps.terms[wave], GRID), float(begin[leg]))
     return begin, fraction

@@ -252,14 +252,14 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
         CpgError: bad parameters, or no such orbit (NoOrbit).
 
     """
-    known = None if preset.start is None else solve_preset(preset)
-    found = coexisting_orbits(network, preset.gait, known, starts=False, everything=False)
-    orbit = found.orbits[0]
+    start = None if preset.start is None else solve_preset(preset)
+    orbits = coexisting_orbits(network, preset.gait, start, starts=False, everything=False)
+    orbit = orbits.orbits[0]
     judged = stability(orbit)
-    if judged.reason and found.searched:
-        count = len(found.orbits)
+    if judged.reason and orbits.searched:
+        count = len(orbits.orbits)
         whole = 'this is the only orbit' if count == 1 else f'none of {count} orbits attracts'
-        judged = replace(judged, reason=f'{judged.reason}; {whole}, {found.searched}')
+        judged = replace(judged, reason=f'{judged.reason}; {whole}, {orbits.searched}')
     return orbit, judged
 
 
@@ -281,8 +281,8 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
     if abs(reached.period / orbit.period - 1.0) > SAME:
         return (f'from its preset another one is found, of a period of {reached.period:.6g} '
                 f'instead of {orbit.period:.6g}')
-    found = obstacle(reached, judged, harmonics)
-    return '' if found is None else found.aside
+    reason = obstacle(reached, judged, harmonics)
+    return '' if reason is None else reason.aside
 
 
 def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,
@@ -314,8 +314,8 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         orbit, judged = gait_of(preset, network)
     except CpgError as error:
         raise PlanError(str(error)) from error
-    if (found := obstacle(orbit, judged, robot.harmonics)) is not None:
-        raise PlanError(f'the {gait} {found.message}')
+    if (reason := obstacle(orbit, judged, robot.harmonics)) is not None:
+        raise PlanError(f'the {gait} {reason.message}')
 
     motion = robot.motion(name, gait)
     shift = robot.shift(motion)
@@ -333,9 +333,9 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     lows, highs = zip(*(extremes(angles) for angles, _ in swings), strict=True)
     span = shift + np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
     speed = strides * np.max([np.abs(extremes(rises)) for _, rises in swings], axis=(0, 1))
-    beyond = [one for joint, *reach in zip(robot.joints, *span, speed, strict=True)
-              for one in _beyond(joint, *reach)]
-    excess, key, message = max(beyond, key=lambda one: round(one[0], 9))
+    beyond = [excess_of for joint, *reach in zip(robot.joints, *span, speed, strict=True)
+              for excess_of in _beyond(joint, *reach)]
+    excess, key, message = max(beyond, key=lambda excess_of: round(excess_of[0], 9))
     if excess > 1e-9:
         cause = f'amplitude {amplitude:g} takes'
         if key == 'velocity':
@@ -363,10 +363,10 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
     begin, own = standing(orbit, robot.leg_cells, robot.harmonics)
     if motion.stance is not None:
         begin, own = begin + motion.stance[0], np.full(own.size, motion.stance[1])
-    wanted = duty or motion.duty
+    target = duty or motion.duty
     try:
         return Duty(orbit, robot.leg_cells, begin, own,
-                    np.full(own.size, wanted) if wanted else own)
+                    np.full(own.size, target) if target else own)
     except InputError as error:
         raise PlanError(str(error)) from error
 

@@ -45,9 +45,9 @@ def retimed_phase(phase, k, centre, own):
             2.0 * math.pi * k * (1.0 - k * k) * s * c / (size * size))
 
 
-def at_even_phases(one: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+def at_even_phases(wave: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the image of even phases of a cycle under a map (k, centre, own), and its slope."""
-    rows = [retimed_phase(n / points, *one)[:2] for n in range(points)]
+    rows = [retimed_phase(n / points, *wave)[:2] for n in range(points)]
     phase, steep = np.array(rows).T
     return phase, steep
 
@@ -107,9 +107,9 @@ class Duty:
             cells: from 0, shape (n,).
 
         """
-        found = self._maps[legs].copy()
-        found[:, 1:] += (self._phases[cells] - self._phases[self._leg_cells[legs]])[:, None]
-        return found
+        maps = self._maps[legs].copy()
+        maps[:, 1:] += (self._phases[cells] - self._phases[self._leg_cells[legs]])[:, None]
+        return maps
 
 
 # The polynomial by which a joint follows its cell: its weights, its value and its rate.

@@ -258,15 +258,15 @@ READOUT = 'readout.'
 
 def gait_readouts(robot: Robot, motion: Motion) -> dict[str, tuple[float, ...]]:
     """Return offset and weights of every joint in one of the robot's motions, rad, by name."""
-    found = {}
+    readouts = {}
     for joint in robot.joints:
         moved = motion.joints.get(joint.name, joint)
-        found[joint.name] = (moved.offset, *moved.weights)
-    return found
+        readouts[joint.name] = (moved.offset, *moved.weights)
+    return readouts
 
 
 def with_readouts(robot: Robot, preset: str, gait: str,
-                  wanted: Mapping[str, Sequence[float]]) -> Robot:
+                  readouts: Mapping[str, Sequence[float]]) -> Robot:
     """Return a robot whose joints are read off a gait in another way.
 
     Weights at a stride of 0, steering and duty stay those of the file.
@@ -275,21 +275,21 @@ def with_readouts(robot: Robot, preset: str, gait: str,
         robot: it is returned as it is if that is how it moves already.
         preset: whose motion is changed, or that of its gait if it has none of its own.
         gait: of the preset.
-        wanted: of every joint its offset, then 1, 2, 4 or 6 weights, rad.
+        readouts: of every joint its offset, then 1, 2, 4 or 6 weights, rad.
 
     Raises:
         InputError: of a joint there are fewer or more numbers, or one is not finite.
 
     """
     motion = robot.motion(preset, gait)
-    if wanted == gait_readouts(robot, motion):
+    if readouts == gait_readouts(robot, motion):
         return robot
     joints = {}
     for name, (offset, *weights) in ((name, [*row] or [math.nan])
-                                     for name, row in wanted.items()):
+                                     for name, row in readouts.items()):
         if len(weights) not in WEIGHTS or not all(map(math.isfinite, (offset, *weights))):
             raise InputError(f'{READOUT}{name} must be an offset and 1, 2, 4 or 6 weights in rad, '
-                             f'not {list(wanted[name])}')
+                             f'not {list(readouts[name])}')
         own = motion.joints.get(name)
         joints[name] = JointMotion(offset, tuple(weights), own.in_place if own else ())
     return replace(robot, motions={**robot.motions, preset: replace(motion, joints=joints)})

@@ -62,14 +62,14 @@ class _Reader(YamlReader):
     """Reads networks and joints, too."""
 
     def networks(self, value: Any) -> tuple[str, ...]:
-        names, found = value if isinstance(value, list) else [value], []
+        names, networks = value if isinstance(value, list) else [value], []
         for k, name in enumerate(self.items(names, 'network')):
             where = f'network[{k}]' if isinstance(value, list) else 'network'
             try:
-                found.append(find_network(self.text(name, where), self.path.parent).name)
+                networks.append(find_network(self.text(name, where), self.path.parent).name)
             except NetworkError as error:
                 raise self.fail(where, str(error)) from error
-        return tuple(found)
+        return tuple(networks)
 
     def side(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, ...],
              stated: str | None) -> dict[str, str]:
@@ -89,8 +89,9 @@ class _Reader(YamlReader):
         joint = Joint(leg=leg, **self.values(
             Joint, {'weights': None, **tree}, where, cell=lambda value, _: value,
             weights=lambda *_: self.readout(tree, where),
-            invented=lambda value, place: tuple(
-                self.name_of(key, place, LIMITS) for key in self.items(value, place))))
+            invented=lambda value, where_in_file: tuple(
+                self.name_of(key, where_in_file, LIMITS)
+                for key in self.items(value, where_in_file))))
         if type(joint.cell) is not int or joint.cell not in cells:
             raise self.fail(f'{where}.cell', f"leg '{leg}' has the cells "
                             f'{" and ".join(map(str, cells))}, not {quoted(joint.cell)}')
@@ -203,12 +204,12 @@ def read_robot(path: str | Path) -> Robot:
         girdles |= reader.side(entry, where, 'girdle', GIRDLES, first.girdles.get(leg))
         joints = []
         for k, item in enumerate(reader.items(entry['joints'], f'{where}.joints')):
-            place = f'{where}.joints[{k}]'
-            joints.append(joint := reader.joint(item, place, leg, cells[leg]))
+            where_in_file = f'{where}.joints[{k}]'
+            joints.append(joint := reader.joint(item, where_in_file, leg, cells[leg]))
             if joint.name in seen:
-                raise reader.fail(f'{place}.name', f"'{joint.name}' is also the name of "
+                raise reader.fail(f'{where_in_file}.name', f"'{joint.name}' is also the name of "
                                   f'{seen[joint.name]}')
-            seen[joint.name] = place
+            seen[joint.name] = where_in_file
         legs[leg] = tuple(joints)
 
     order = reader.texts(tree.get('joint_order', list(seen)), 'joint_order')
@@ -217,19 +218,19 @@ def read_robot(path: str | Path) -> Robot:
             raise reader.fail(f'joint_order[{k}]', f"joint '{name}' is missing from the legs")
         if name in order[:k]:
             raise reader.fail(f'joint_order[{k}]', f"'{name}' appears twice")
-    for name, place in seen.items():
+    for name, where_in_file in seen.items():
         if name not in order:
-            raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
+            raise reader.fail('joint_order', f"joint '{name}' of {where_in_file} is missing")
     names = {leg: [joint.name for joint in joints] for leg, joints in legs.items()}
     geometry = (read_geometry(reader, tree['geometry'], names) if 'geometry' in tree else None)
     biped = read_biped(reader, tree['biped'], names) if 'biped' in tree else None
     feedback = read_feedback(reader, tree['feedback']) if 'feedback' in tree else None
     motions = {}
     if 'gaits' in tree:
-        known = {name for network in networks for name in NETWORKS[network].presets()}
+        gaits_of_networks = {name for network in networks for name in NETWORKS[network].presets()}
         joints_by_name = {joint.name: joint for leg in legs.values() for joint in leg}
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
-                   in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
+                   in reader.keys(tree['gaits'], 'gaits', set(), gaits_of_networks).items()}
     robot = Robot(path.stem, networks, assignment, harmonics, legs, order, motions, sides,
                   girdles, geometry, biped, feedback)
     if any(motion.steering for motion in motions.values()):

@@ -69,10 +69,12 @@ class BagRecorder:
             return False
         # Request what every publisher offers: best-effort publishers match no reliable
         # subscription.
-        offered = [one.qos_profile for one in self._node.get_publishers_info_by_topic(topic)]
-        latched = offered and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL
-                                  for one in offered)
-        reliable = all(one.reliability == ReliabilityPolicy.RELIABLE for one in offered)
+        offered = [publisher.qos_profile
+                   for publisher in self._node.get_publishers_info_by_topic(topic)]
+        latched = offered and all(publisher.durability == DurabilityPolicy.TRANSIENT_LOCAL
+                                  for publisher in offered)
+        reliable = all(publisher.reliability == ReliabilityPolicy.RELIABLE
+                       for publisher in offered)
         quality = QoSProfile(
             depth=DEPTH,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
@@ -91,7 +93,7 @@ class BagRecorder:
         """
         arrived = [(when, connection, data) for source, connection in self._sources
                    for data, when in source.receive()]
-        for when, connection, data in sorted(arrived, key=lambda one: one[0]):
+        for when, connection, data in sorted(arrived, key=lambda arrival: arrival[0]):
             self._writer.write(connection, when, data)
             self.counts[connection.topic] += 1
 

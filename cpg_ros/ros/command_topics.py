@@ -172,16 +172,17 @@ class Commands:
         if kind == 'joint_states':
             for leg, joints in robot.legs.items():
                 topic = f'{leg}/joint_states'
-                self._listen(JointState, topic, self._states, tuple(one.name for one in joints))
+                self._listen(JointState, topic, self._states,
+                             tuple(joint.name for joint in joints))
         elif kind == 'joint_trajectory':
             self._listen(JointTrajectory, COMMAND_TOPICS[kind], self._trajectory)
         else:
             self._listen(Float64MultiArray, COMMAND_TOPICS[kind], self._array)
         self.topics = [subscription.topic for subscription, _ in self._sources]
 
-    def _listen(self, kind: type, topic: str, read: Any, *known: Any) -> None:
+    def _listen(self, kind: type, topic: str, read: Any, *arguments: Any) -> None:
         subscription = PolledSubscription(self._node, kind, topic, QoSProfile(depth=10))
-        self._sources.append((subscription, partial(read, topic, *known)))
+        self._sources.append((subscription, partial(read, topic, *arguments)))
         self._fresh.append(False)
 
     @property
@@ -208,8 +209,8 @@ class Commands:
                                                     throttle_duration_sec=QUIET)
         return all(self._fresh)
 
-    def _states(self, topic: str, wanted: tuple[str, ...], message: JointState) -> bool:
-        self._apply(topic, wanted, message.name, message.position)
+    def _states(self, topic: str, joints: tuple[str, ...], message: JointState) -> bool:
+        self._apply(topic, joints, message.name, message.position)
         stamp = message.header.stamp
         nanoseconds = 1_000_000_000 * stamp.sec + stamp.nanosec
         return not nanoseconds or nanoseconds >= self._since
@@ -233,21 +234,21 @@ class Commands:
         self._write(topic, self._robot.order, slice(None), message.data)
         return True
 
-    def _apply(self, topic: str, wanted: tuple[str, ...], names: list[str],
+    def _apply(self, topic: str, joints: tuple[str, ...], names: list[str],
                positions: Sequence[float]) -> None:
-        known = self._known.get(topic)
-        if known is None or known[0] != names:
-            known = list(names), self._places(topic, wanted, names)
-            self._known[topic] = known
+        layout = self._known.get(topic)
+        if layout is None or layout[0] != names:
+            layout = list(names), self._places(topic, joints, names)
+            self._known[topic] = layout
         if len(positions) != len(names):
             raise _Bad(f'{topic}: {len(positions)} positions for {len(names)} joints')
-        self._write(topic, names, known[1], positions)
+        self._write(topic, names, layout[1], positions)
 
-    def _places(self, topic: str, wanted: tuple[str, ...], names: list[str]) -> np.ndarray:
+    def _places(self, topic: str, joints: tuple[str, ...], names: list[str]) -> np.ndarray:
         for name in names:
-            if name not in wanted:
-                raise _Bad(f"{topic}: joint '{name}' is not one of {', '.join(wanted)}")
-        for name in wanted:
+            if name not in joints:
+                raise _Bad(f"{topic}: joint '{name}' is not one of {', '.join(joints)}")
+        for name in joints:
             if names.count(name) != 1:
                 raise _Bad(f"{topic}: joint '{name}' is "
                            f"{'there twice' if name in names else 'missing'}")

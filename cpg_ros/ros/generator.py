@@ -201,7 +201,7 @@ class Generator(StartedNode):
         """
         super().__init__(NAME)
         joined = time.monotonic()
-        given = {name: one.value for name, one in self._parameter_overrides.items()}
+        given = {name: override.value for name, override in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
             given.get('network', NETWORK.default), given.get('robot')))
         self._declare({'network': NETWORK})
@@ -277,7 +277,7 @@ class Generator(StartedNode):
             raise StartError(f'{self._others.text}: stop that publisher, rename the topic, '
                              'or set exclusive to false')
         self._lifecycle = Lifecycle(self, {
-            'configure': lambda: self._begin_at_the_stand()[0],
+            'configure': lambda: self._start_publishing()[0],
             'activate': lambda: self._walk(True), 'deactivate': lambda: self._walk(False),
             'cleanup': self._fall_silent, 'shutdown': self._shut_down}) if managed else None
 
@@ -345,7 +345,7 @@ class Generator(StartedNode):
         topic = self._value('measured_topic')
         if topic and self.resolve_topic_name(topic) not in self._outputs.topics:
             return MeasuredPose(self, robot, topic)
-        if self._leads:
+        if self._needs_pose:
             raise StartError(
                 f"command '{self._value('command')}' begins at the measured pose, but "
                 + (f"measured_topic '{topic}' is the generator's own: set combined_topic to ''"
@@ -354,7 +354,7 @@ class Generator(StartedNode):
         return None
 
     @property
-    def _leads(self) -> bool:
+    def _needs_pose(self) -> bool:
         """Whether the joints' present angles must be known before the first motion."""
         return self._value('command') != 'none' and not self._value('assume_stand')
 
@@ -366,13 +366,13 @@ class Generator(StartedNode):
         lacking = self._measured.lacks(angles)
         if not lacking:
             return '', angles
-        if self._leads:
+        if self._needs_pose:
             return f'the pose is not known, and the joints must not jump: {lacking}', None
         if np.isfinite(angles).any():
             self.get_logger().warning(f'the pose is not known, starting at the stand: {lacking}')
         return '', None
 
-    def _begin_at_the_stand(self) -> tuple[str, str]:
+    def _start_publishing(self) -> tuple[str, str]:
         """Start publishing; return why not, or '', and the name of the pose to start from."""
         if self._value('exclusive') and self._others.check():
             return self._others.text, ''
@@ -393,7 +393,7 @@ class Generator(StartedNode):
 
     def _look_for_pose(self) -> None:
         """Start publishing as soon as the pose is measured; log news of why it is not."""
-        refusal, pose = self._begin_at_the_stand()
+        refusal, pose = self._start_publishing()
         if not refusal:
             self.get_logger().info(f'beginning from {pose}')
         elif refusal != self._unmeasured:
@@ -413,15 +413,15 @@ class Generator(StartedNode):
             return f'the measured pose on {self._measured.topic}'
         return '~/enable' if self._lifecycle is None else 'configure'
 
-    def _walk(self, wanted: bool) -> str:
+    def _walk(self, walking: bool) -> str:
         """Ramp into the gait, or down to the stand; return ''."""
-        if wanted:
+        if walking:
             self.ticker.stopping = False
         if self._cmd_vel:
-            self._cmd_vel.enable(wanted)
+            self._cmd_vel.enable(walking)
         else:
-            self.pattern.enable(wanted, self._value('ramp'))
-        if not wanted:
+            self.pattern.enable(walking, self._value('ramp'))
+        if not walking:
             self.ticker.stop_moving()
         return ''
 
@@ -454,7 +454,7 @@ class Generator(StartedNode):
                 self._end_search()
                 response.message = 'nothing is published yet'
                 return response
-            refusal, pose = self._begin_at_the_stand()
+            refusal, pose = self._start_publishing()
             if refusal:
                 response.success, response.message = False, refusal
                 return response
@@ -534,7 +534,7 @@ class Generator(StartedNode):
         at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
         if self._lifecycle is not None:
             self.get_logger().info(f'publishing nothing until it is configured, then {at}')
-        elif self._value('autostart') and self._leads and self._measured is not None:
+        elif self._value('autostart') and self._needs_pose and self._measured is not None:
             self.get_logger().info('publishing nothing until the pose is measured on '
                                    f'{self._measured.topic}, then {at}')
             self._search = self.create_timer(SEARCH, self._look_for_pose, clock=STEADY)
@@ -581,10 +581,11 @@ class Generator(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
+    specs_known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
              ENABLED: switch.SWITCH, **switch.TOPICS}
     return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
-               "networks and the feedback's gains are listed by ros2 param describe.", known, args,
+               "networks and the feedback's gains are listed by ros2 param describe.", specs_known,
+               args,
                'generator')
 
 

@@ -272,8 +272,9 @@ class CmdVel:
         """Return who publishes commands of the other type, which do not arrive; log news."""
         own, other = ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist')[
             ::1 if self._stamped else -1]
-        names = sorted({node_of(one) for one in self._node.get_publishers_info_by_topic(
-            self._node.resolve_topic_name('cmd_vel')) if one.topic_type == other})
+        names = sorted({node_of(publisher)
+                        for publisher in self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name('cmd_vel')) if publisher.topic_type == other})
         text = '' if not names else (
             f'cmd_vel is published as {other} by {", ".join(names)}, but this generator takes '
             f'{own}: set stamped_cmd_vel to {str(not self._stamped).lower()}')

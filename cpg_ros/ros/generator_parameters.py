@@ -103,9 +103,9 @@ def network_for(network: Any, robot: Any) -> Any:
     if not (isinstance(network, str) and isinstance(robot, str)):
         return network
     with contextlib.suppress(CpgError):
-        kind, found = find_network(network), load_robot(robot)
-        like = with_legs_of(kind, found.legs).name
-        if kind.name not in found.networks and like in found.networks:
+        kind, robot_of_file = find_network(network), load_robot(robot)
+        like = with_legs_of(kind, robot_of_file.legs).name
+        if kind.name not in robot_of_file.networks and like in robot_of_file.networks:
             return like
     return network
 
@@ -187,28 +187,29 @@ class Planner:
         """Return ``frequency``, the network's and the joints' own, a preset's as defaults."""
         network, values = self.network, self._values(self.presets[preset].network)
         frequency = self._frequency(preset)
-        found = {'frequency': Spec(1.0 if frequency is None else frequency,
+        specs = {'frequency': Spec(1.0 if frequency is None else frequency,
                                    "strides per second [Hz]; 0 runs in the model's own time, one "
                                    'unit per second', 0.0, 10.0)}
-        found |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
+        specs |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
                                                 allowed.high)
                   for key, allowed in network.ranges.items()}
         for group, members in network.groups.items():
             allowed = network.ranges[members[0]]
-            found[f'{network.name}.{group}'] = Spec(
+            specs[f'{network.name}.{group}'] = Spec(
                 values[group], f'mean of {", ".join(members)}; setting it sets all of them',
                 allowed.low, allowed.high)
         for name, readout in self._readouts(preset).items():
-            found[name] = Spec(readout, "offset of the joint in this gait, and 1, 2, 4 or 6 "
+            specs[name] = Spec(readout, "offset of the joint in this gait, and 1, 2, 4 or 6 "
                                "weights of its cell's signals [rad]; setting the gait loads "
                                'those of the robot file')
-        return found
+        return specs
 
     def given(self, gait: str, overrides: Mapping[str, Parameter]) -> list[Parameter]:
         """Return the overrides of a gait's parameters, completed as by ``complete``."""
         names, network = set(self.specs(gait)), self.presets[gait].network
         current = {f'{network.name}.{key}': value for key, value in network.as_dict().items()}
-        return self.complete(as_doubles([one for one in overrides.values() if one.name in names],
+        return self.complete(as_doubles([override for override in overrides.values()
+                                         if override.name in names],
                                         names), current)
 
     def _frequency(self, preset: str) -> float | None:
@@ -291,23 +292,23 @@ class Planner:
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}
         gait = given.get('gait')
-        wanted: dict[str, Any] = {}
+        values_wanted: dict[str, Any] = {}
         if isinstance(gait, str) and gait in self.presets:
             loaded = self.presets[gait].network.as_dict()
-            wanted = {prefix + key: value for key, value in loaded.items()}
-            wanted |= self._readouts(gait)
+            values_wanted = {prefix + key: value for key, value in loaded.items()}
+            values_wanted |= self._readouts(gait)
             if (frequency := self._frequency(gait)) is not None:
-                wanted['frequency'] = frequency
-            wanted['duty'] = 0.0
+                values_wanted['frequency'] = frequency
+            values_wanted['duty'] = 0.0
         for group, members in self.network.groups.items():
             if isinstance(given.get(prefix + group), float):
-                wanted.update({prefix + key: given[prefix + group] for key in members})
-        wanted = {name: value for name, value in wanted.items() if name not in given}
-        values = {**current, **wanted, **given}
+                values_wanted.update({prefix + key: given[prefix + group] for key in members})
+        values_wanted = {name: value for name, value in values_wanted.items() if name not in given}
+        values = {**current, **values_wanted, **given}
         for group, members in self.network.groups.items():
             parts = [values[prefix + key] for key in members]
-            if (any(prefix + key in wanted or prefix + key in given for key in members)
+            if (any(prefix + key in values_wanted or prefix + key in given for key in members)
                     and all(isinstance(part, float) for part in parts)):
                 parameters = [p for p in parameters if p.name != prefix + group]
-                wanted[prefix + group] = math.fsum(parts) / len(parts)
-        return [Parameter(name, value=value) for name, value in wanted.items()] + parameters
+                values_wanted[prefix + group] = math.fsum(parts) / len(parts)
+        return [Parameter(name, value=value) for name, value in values_wanted.items()] + parameters

@@ -115,8 +115,9 @@ class Inversion(StartedNode):
 
     def _allowed(self, parameters: list[Parameter]) -> SetParametersResult:
         """Reject a Python file named over the graph; only the user may name one, at the start."""
-        refused = any(one.name == 'network' and isinstance(one.value, str) and is_path(one.value)
-                      and one.value != self._network for one in parameters)
+        refused = any(parameter.name == 'network' and isinstance(parameter.value, str)
+                      and is_path(parameter.value)
+                      and parameter.value != self._network for parameter in parameters)
         return SetParametersResult(successful=not refused, reason=(
             'network: the path of a Python file can be given at the start only'
             if refused else ''))
@@ -174,12 +175,12 @@ class Inversion(StartedNode):
             names = () if robot is None else [joint.name for joint in robot.joints]
             kp, kd = self._value('kp'), self._value('kd')
             recording = live.recording(names, True, Servo(kp, kd) if kp else None)
-            found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
+            result = fit_recording(recording, robot, self._value('network'), self._value('gait'),
                                   free=free, order=self._value('order'),
                                   preset=self._value('preset'))
-            message = '; '.join([_summary(found), *self._written(found)])
-            self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
-            well, applied = self._applied(self._value('apply_to'), found)
+            message = '; '.join([_summary(result), *self._written(result)])
+            self._result.publish(String(data=json.dumps(finite(result.as_dict()))))
+            well, applied = self._applied(self._value('apply_to'), result)
             work.set_result((well, message + applied))
         except (CpgError, OSError) as error:
             work.set_result((False, str(error)))
@@ -188,25 +189,25 @@ class Inversion(StartedNode):
             self.get_logger().error('a fit failed:\n' + traceback.format_exc())
             work.set_result((False, f'{type(error).__name__}: {error}'))
 
-    def _written(self, found: RecordingFit) -> list[str]:
+    def _written(self, result: RecordingFit) -> list[str]:
         written = []
         if self._value('out'):
-            written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
+            written += write_fitted(Path(self._value('out')).expanduser(), result, self._robot)
         if self._value('report'):
             # matplotlib takes half a second, and only pages need it.
             from cpg_ros.fitting.inversion.fit_report import as_html
             path = Path(self._value('report')).expanduser()
-            write_atomically(path, as_html(found))
+            write_atomically(path, as_html(result))
             written.append(path)
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
-    def _applied(self, target: str, found: RecordingFit) -> tuple[bool, str]:
+    def _applied(self, target: str, result: RecordingFit) -> tuple[bool, str]:
         """Set the parameters of the target, if there is one; return success and what to add."""
         if not target:
             return True, ''
         services = ServiceClients(self)
         try:
-            whole = asyncio.run(self._set(NodeClient(services, target), found))
+            whole = asyncio.run(self._set(NodeClient(services, target), result))
         except (CallError, NameValidationException) as error:
             return False, f'; not applied to {target}: {" ".join(str(error).split())}'
         finally:
@@ -230,12 +231,12 @@ class Inversion(StartedNode):
         return whole
 
 
-def _summary(found: RecordingFit) -> str:
-    fit = found.fit
-    values = ', '.join(f'{name} {one.value:.4g} +- {one.stderr:.2g}'
-                       for name, one in fit.parameters.items())
-    named = found.stride.verdict if len(found.stride.alike) > 1 else fit.gait
-    return (f'{named} at {found.stride.frequency:.4f} Hz, {values}, mean RMS error '
+def _summary(result: RecordingFit) -> str:
+    fit = result.fit
+    values = ', '.join(f'{name} {estimate.value:.4g} +- {estimate.stderr:.2g}'
+                       for name, estimate in fit.parameters.items())
+    named = result.stride.verdict if len(result.stride.alike) > 1 else fit.gait
+    return (f'{named} at {result.stride.frequency:.4f} Hz, {values}, mean RMS error '
             f'{100 * fit.mean_rms_share:.1f} % of range')
 
 

@@ -44,13 +44,13 @@ RENAMED = {'feedback': 'feedback.enabled'}
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
     """Return the actions that declare the arguments, and those that every launch file has."""
-    known = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
+    declarations = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
              'panel': ('false', bool, 'serve a browser page at http://127.0.0.1:8080/'),
              'params_file': ('', str, 'parameter file, such as one written by inversion; '
                              'arguments that differ from their defaults override it; empty for '
                              'none')}
     return [DeclareLaunchArgument(name, default_value=default, description=text)
-            for name, (default, _, text) in known.items()]
+            for name, (default, _, text) in declarations.items()]
 
 
 def value(context: LaunchContext, name: str, kind: type) -> Any:
@@ -63,13 +63,13 @@ def value(context: LaunchContext, name: str, kind: type) -> Any:
     text = LaunchConfiguration(name).perform(context)
     try:
         # As launch itself will read it.
-        found = kind(text) if kind in (int, float, str) else yaml.safe_load(text)
+        parsed = kind(text) if kind in (int, float, str) else yaml.safe_load(text)
     except (ValueError, yaml.YAMLError):
-        found = None
+        parsed = None
     origin = get_origin(kind) or kind
-    if not isinstance(found, origin):
+    if not isinstance(parsed, origin):
         raise RuntimeError(f'{name}:={text} is not {WHAT[origin]}')
-    return found
+    return parsed
 
 
 def page(context: LaunchContext) -> list[Node]:
@@ -117,7 +117,7 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         if not file.is_file():
             raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
         # Later values take precedence: defaults give way to the file.
-        asked = {key: one for key, one in parameters.items()
+        asked = {key: parameter for key, parameter in parameters.items()
                  if LaunchConfiguration(key).perform(context) != arguments[key][0]}
         layers = [parameters, str(file), {**asked, **(fixed or {})}]
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',

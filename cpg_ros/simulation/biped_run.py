@@ -113,8 +113,8 @@ class BipedRun:
                          self._velocity)
         return senses
 
-    def _command(self, wanted: np.ndarray) -> None:
-        confine(wanted, (wanted - self._target) / self.dt, self._limits, self.dt, self._target,
+    def _command(self, target: np.ndarray) -> None:
+        confine(target, (target - self._target) / self.dt, self._limits, self.dt, self._target,
                 self._rate, self._behind)
         self.body.command(self._target)
 

@@ -89,32 +89,32 @@ class BatchPhysics:
             return self._pool.rollout(models, self._data, state, control, control_spec=self._spec,
                                       initial_warmstart=warmstart)
         nq, nv = self.body.model.nq, self.body.model.nv
-        moving, found = slice(1 + nq, 1 + nq + nv), []
+        moving, results = slice(1 + nq, 1 + nq + nv), []
         for k in range(control.shape[1]):
             step = control[:, k:k + 1].copy()
             joints = step[:, 0, :len(self.no_load)]
             joints[:] = self._within_curve(models, joints, state[:, 1 + self.parts.angles],
                                            state[:, moving][:, self.parts.speeds], self.no_load)
-            found.append(self._pool.rollout(models, self._data, state, step,
+            results.append(self._pool.rollout(models, self._data, state, step,
                                             control_spec=self._spec, initial_warmstart=warmstart))
-            before, state = state, found[-1][0][:, 0]
+            before, state = state, results[-1][0][:, 0]
             warmstart = (state[:, moving] - before[:, moving]) / self.timestep
-        states, sensors = zip(*found, strict=True)
+        states, sensors = zip(*results, strict=True)
         return np.concatenate(states, axis=1), np.concatenate(sensors, axis=1)
 
-    def _within_curve(self, models: Sequence[Any], wanted: np.ndarray, angles: np.ndarray,
+    def _within_curve(self, models: Sequence[Any], target: np.ndarray, angles: np.ndarray,
                       speeds: np.ndarray, no_load: np.ndarray) -> np.ndarray:
         """Return the targets, rad, (runs, joints), that ask motors for no more than they have."""
-        count = wanted.shape[1]
-        kp = np.array([one.actuator_gainprm[:count, 0] for one in models])
+        count = target.shape[1]
+        kp = np.array([model.actuator_gainprm[:count, 0] for model in models])
         kd = -self.body.model.actuator_biasprm[:count, 2]
         most = self.body.model.actuator_forcerange[:count, 1]
         left = most * np.clip(1.0 - np.abs(speeds) / no_load, 0.0, 1.0)
-        torque = kp * (wanted - angles) - kd * speeds
+        torque = kp * (target - angles) - kd * speeds
         # Voltage limits torques that drive the motion; at standstill the model's limit holds.
         short = ((torque * speeds > 0.0) & (np.abs(torque) > left)
                  & (np.abs(speeds) > SLOW * no_load))
-        return np.where(short, angles + (np.sign(torque) * left + kd * speeds) / kp, wanted)
+        return np.where(short, angles + (np.sign(torque) * left + kd * speeds) / kp, target)
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
         """Return the model of a body that meets a scenario, its servos' kp scaled."""
@@ -165,11 +165,11 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
         drive, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
         drive.set_target(stride, pace, at_once=True)
     pattern = Pattern(plan, ramp, drive=drive)
-    found = np.empty((round(duration / timestep), len(robot.order)))
-    for row in found:
+    table = np.empty((round(duration / timestep), len(robot.order)))
+    for row in table:
         pattern.advance(timestep)
         row[:] = pattern.position
-    return found[:, robot.places]
+    return table[:, robot.places]
 
 
 class OpenLoopBatch(BatchPhysics):
@@ -193,7 +193,7 @@ class OpenLoopBatch(BatchPhysics):
             runs: targets of the joints, rad, shape (steps, joints), and what is met; all as long.
 
         """
-        found = []
+        outcomes = []
         for first in range(0, len(runs), TOGETHER):
             part = runs[first:first + TOGETHER]
             control, joints, force = self.controls(len(part), len(part[0][0]))
@@ -201,7 +201,7 @@ class OpenLoopBatch(BatchPhysics):
                 joints[k], force[k] = angles, scenario.forces(len(angles), self.timestep)
             state, sensors = self.rollout([self.model(scenario) for _, scenario in part],
                                           np.tile(self.start, (len(part), 1)), control)
-            found += [judge(self.body, self.parts, angles, scenario.mass, one, sensed)
-                      for (angles, scenario), one, sensed
+            outcomes += [judge(self.body, self.parts, angles, scenario.mass, run, sensed)
+                      for (angles, scenario), run, sensed
                       in zip(part, state, sensors, strict=True)]
-        return found
+        return outcomes

@@ -302,7 +302,7 @@ class Anatomy:
 
 
 def _ancestors(model: object, body: int) -> list[int]:
-    found = [body]
-    while found[-1]:
-        found.append(model.body_parentid[found[-1]])  # type: ignore[attr-defined]
-    return found
+    bodies = [body]
+    while bodies[-1]:
+        bodies.append(model.body_parentid[bodies[-1]])  # type: ignore[attr-defined]
+    return bodies

@@ -185,11 +185,11 @@ class ClosedLoopBatch(BatchPhysics):
         estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = Patterns(self.plans, feedback, scenarios, dt, gains is not None)
         limits = self._robot.column('lower'), self._robot.column('upper')
-        models = [self.model(one) for one in scenarios]
+        models = [self.model(item) for item in scenarios]
         stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
-            self.model(one, gains.stiffen_kp) for one in scenarios]
+            self.model(item, gains.stiffen_kp) for item in scenarios]
         control, joints, force = self.controls(runs, 1)
-        forces = np.stack([one.forces(steps, dt) for one in scenarios], axis=1)
+        forces = np.stack([item.forces(steps, dt) for item in scenarios], axis=1)
         order, places = np.argsort(self._robot.places), self._robot.places
         state, sensors = np.tile(self.start, (runs, 1)), np.zeros((runs, model.nsensordata))
         moving = slice(1 + model.nq, 1 + model.nq + model.nv)
@@ -199,7 +199,7 @@ class ClosedLoopBatch(BatchPhysics):
         earlier = state[:, base].copy()
         angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
         senses = SensorData.zeros(runs, legs, len(order))
-        kept = SensorData(*(np.zeros((steps, *one.shape)) for one in senses
+        sensor_log = SensorData(*(np.zeros((steps, *item.shape)) for item in senses
                                 )) if keep_senses else None
         efforts = np.zeros((steps, runs, len(order))) if keep_senses else None
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
@@ -218,7 +218,7 @@ class ClosedLoopBatch(BatchPhysics):
             fill_sensor_data(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt,
                              velocity)
             noticed = senses if noisy is None else noisy(senses)
-            for rows, value in zip(kept or (), noticed, strict=kept is not None):
+            for rows, value in zip(sensor_log or (), noticed, strict=sensor_log is not None):
                 rows[k] = value
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
@@ -266,10 +266,11 @@ class ClosedLoopBatch(BatchPhysics):
         late = slice(min(round(BEGINNING / dt), steps // 2), None)
         cost = cost_of_transport(work[late].sum(axis=0) * dt, self.geometry.weight,
                                  record['velocity'][late, :, 0].sum(axis=0) * dt)
-        found = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
+        rows_of = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
         for key in ('phase', 'kp_scale', 'stiff'):
-            found[key] = found[key][:, :, 0]
-        return Outcome(fell=fell, arrived=arrived, senses=None if kept is None else SensorData(
-            *(rows.swapaxes(0, 1) for rows in kept)),
+            rows_of[key] = rows_of[key][:, :, 0]
+        return Outcome(fell=fell, arrived=arrived, senses=None if sensor_log is None
+                       else SensorData(
+            *(rows.swapaxes(0, 1) for rows in sensor_log)),
                        efforts=None if efforts is None else efforts.swapaxes(0, 1),
-                       cost=cost, **found)
+                       cost=cost, **rows_of)

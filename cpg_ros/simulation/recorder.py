@@ -124,8 +124,8 @@ class RunLog:
 class _Every:
     """Selects from the periods of one rate those that are due at a lower one."""
 
-    def __init__(self, rate: float, wanted: float) -> None:
-        self._share, self._sum = min(1.0, wanted / rate), 1.0
+    def __init__(self, rate: float, target: float) -> None:
+        self._share, self._sum = min(1.0, target / rate), 1.0
 
     def due(self) -> bool:
         due = self._sum >= 1.0 - 1e-9

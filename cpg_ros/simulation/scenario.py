@@ -55,11 +55,11 @@ class Scenario:
 
     def forces(self, steps: int, timestep: float) -> np.ndarray:
         """Return the forces of the pushes in each step of some s, N, shape (steps, 2)."""
-        found = np.zeros((steps, 2))
+        forces = np.zeros((steps, 2))
         for when, *force in self.pushes:
             begin = round(when / timestep)
-            found[begin:begin + round(PUSH / timestep)] += force
-        return found
+            forces[begin:begin + round(PUSH / timestep)] += force
+        return forces
 
 
 def impulse(when: float, forward: float, left: float) -> tuple[float, float, float]:

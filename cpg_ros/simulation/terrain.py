@@ -96,11 +96,11 @@ def heights(terrain: Terrain) -> np.ndarray:
     """
     y, x = grid()
     rng = np.random.default_rng(terrain.seed)
-    found = {'height_field': _rough, 'boxes': _boxes, 'waves': _waves,
+    surface = {'height_field': _rough, 'boxes': _boxes, 'waves': _waves,
              'course': _course}[terrain.kind](terrain, x, y, rng)
     # Keep the ground flat where the robot starts.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
-    return found * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
+    return surface * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
 
 
 def _rough(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
@@ -166,16 +166,16 @@ def lay(model: Any, terrain: Terrain) -> None:
     # Geoms have moved: the tree of bounding boxes and the flags of fixed geoms no longer hold.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    place, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    positions, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     if terrain.kind == 'stairs':
         for step in range(STEPS):
             geom = model.geom(f'step_{step}').id
             model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-            place[geom] = (PLACE + (STEPS - 1) * TREAD + 0.5 * LANDING, 0.0,
+            positions[geom] = (PLACE + (STEPS - 1) * TREAD + 0.5 * LANDING, 0.0,
                            (step + 1) * terrain.size - 0.5 * THICK)
         return
     model.geom_sameframe[floor] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    place[floor, 2] = AWAY
+    positions[floor, 2] = AWAY
     if terrain.kind == 'ramp':
         half = 0.5 * math.radians(terrain.size)
         ramp = model.geom('ramp').id
@@ -185,15 +185,15 @@ def lay(model: Any, terrain: Terrain) -> None:
         edge = np.zeros(3)
         corner = np.array([-SLAB[0], 0.0, SLAB[2]])
         mujoco.mju_rotVecQuat(edge, corner, model.geom_quat[ramp])
-        place[ramp] = np.array([PLACE, 0.0, 0.0]) - edge
-        place[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
+        positions[ramp] = np.array([PLACE, 0.0, 0.0]) - edge
+        positions[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
         return
-    place[floor, 2] = UNDER
+    positions[floor, 2] = UNDER
     # At edges between prisms, MuJoCo's own collision of convex shapes pushes feet sideways: on a
     # field 1 mm high robots fell that walk on a plane. With libccd's they walk as on the plane.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
     model.hfield_data[:] = heights(terrain).ravel() / HIGHEST
-    place[model.geom('ground').id, 2] = 0.0
+    positions[model.geom('ground').id, 2] = 0.0
 
 
 def set_friction(model: Any, friction: float) -> None:

@@ -63,17 +63,17 @@ def hull(path: Path) -> bytes:
     if len(points) < 4 or np.ptp(points, axis=0).min() < FLAT:
         raise MeshError(f'{path}: {len(points)} points that enclose no volume')
     try:
-        found = ConvexHull(points)
+        convex = ConvexHull(points)
     except QhullError as error:
         raise MeshError(f'{path}: its points enclose no volume') from error
-    corners = points[found.vertices]
-    place = {int(vertex): k + 1 for k, vertex in enumerate(found.vertices)}
-    outward = found.equations[:, :3]
+    corners = points[convex.vertices]
+    index = {int(vertex): k + 1 for k, vertex in enumerate(convex.vertices)}
+    outward = convex.equations[:, :3]
     lines = [f'v {x:.9g} {y:.9g} {z:.9g}' for x, y, z in corners]
-    for (a, b, c), normal in zip(found.simplices, outward, strict=True):
+    for (a, b, c), normal in zip(convex.simplices, outward, strict=True):
         if np.cross(points[b] - points[a], points[c] - points[a]) @ normal < 0.0:
             b, c = c, b
-        lines.append(f'f {place[int(a)]} {place[int(b)]} {place[int(c)]}')
+        lines.append(f'f {index[int(a)]} {index[int(b)]} {index[int(c)]}')
     return ('\n'.join(lines) + '\n').encode()
 
 
@@ -320,7 +320,7 @@ def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) ->
     below = [child.get('link', '') for joint in robot.findall('joint')
              if joint.get('type') == HELD and (parent := joint.find('parent')) is not None
              and parent.get('link') == name and (child := joint.find('child')) is not None]
-    return any(masses.get(one, 0.0) > 0.0 or _carries(robot, one, masses) for one in below)
+    return any(masses.get(link, 0.0) > 0.0 or _carries(robot, link, masses) for link in below)
 
 
 def _mass(link: ElementTree.Element) -> float:

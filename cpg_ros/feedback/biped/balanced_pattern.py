@@ -247,13 +247,13 @@ class BalancedPattern(Pattern):
                 self._lowers or ((self.failed or self.doubts) and measured)):
             self._braces = self._braces and self.crouching
             self.crouching = True
-        wanted = None
+        target = None
         if self.balancing and sensors is not None:
-            wanted = self._balanced(balance, sensors, dt)
-        if wanted is None:
-            wanted = self._hold(balance, dt)
-        rate = (wanted - self.position) / dt if dt > 0.0 else self._still
-        self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
+            target = self._balanced(balance, sensors, dt)
+        if target is None:
+            target = self._hold(balance, dt)
+        rate = (target - self.position) / dt if dt > 0.0 else self._still
+        self.held += confine(target, rate, self._limits, dt, self.position, self.velocity,
                              self._behind) > 0
         if self.balancing:
             self._stride.record(balance, self._unseen, self.position[self._places])
@@ -311,14 +311,14 @@ class BalancedPattern(Pattern):
         if self._held:
             self._held = False
             self._start[:] = self.position
-        wanted = self._stride.replay(balance, self._unseen, balance.advance(sensors, dt))
-        if not np.isfinite(wanted).all():
+        target = self._stride.replay(balance, self._unseen, balance.advance(sensors, dt))
+        if not np.isfinite(target).all():
             self._fall()
             return None
         self.faults = balance.faults
         self._share = min(1.0, self._share + dt / TAKEOVER)
         start = self._start[self._places]
-        self._wanted[self._places] = start + self._share * (wanted - start)
+        self._wanted[self._places] = start + self._share * (target - start)
         height = balance.memory.center[0, 2] - balance.memory.pose.soles[:, 2].min()
         if height < LOW * (balance.gains.height - balance.memory.crouch[0]):
             self._fall()

@@ -248,8 +248,8 @@ class BipedFeedback:
     @property
     def _stops(self) -> bool:
         """Whether it has to come to a stand, at a request or to change the gait."""
-        wanted = KINDS[self._goal.plan.gait]
-        return not self._walks or (self.changing and HOPS in (wanted, self.kind))
+        target = KINDS[self._goal.plan.gait]
+        return not self._walks or (self.changing and HOPS in (target, self.kind))
 
     def _choose(self, dt: float) -> None:
         """Change mode and gait when it is time, and read the clock."""
@@ -288,15 +288,15 @@ class BipedFeedback:
 
     def _change(self, half: float) -> None:
         """Change between walk and run where a leg is in the middle of its swing."""
-        memory, wanted = self.memory, self._goal
+        memory, target = self.memory, self._goal
         if self._stops:
-            wanted = self._walk if self.kind == RUNS else self.track
-        if wanted is self.track or KINDS[wanted.plan.gait] == HOPS:
+            target = self._walk if self.kind == RUNS else self.track
+        if target is self.track or KINDS[target.plan.gait] == HOPS:
             return
         if self.kind == RUNS:
             velocity, heading = memory.center[1], memory.heading[0]
             forward = velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading)
-            if forward > SLOWED * wanted.plan.speeds[1]:
+            if forward > SLOWED * target.plan.speeds[1]:
                 return
         for leg in range(2):
             if memory.swinging[leg] and self._before[leg] < half <= memory.phases[leg]:
@@ -304,10 +304,10 @@ class BipedFeedback:
                 sign = 1.0 if self.kind == WALKS else -1.0
                 memory.lift_off[leg] += sign * memory.pose.soles[1 - leg]
                 memory.ground[0] = memory.pose.soles[1 - leg, 2]
-                wanted.reseed(0.5 * leg)
-                self._adopt(wanted)
+                target.reseed(0.5 * leg)
+                self._adopt(target)
                 half = 0.5 * (1.0 - self.gains.duty)
-                np.mod(wanted.legs + half, 1.0, out=memory.phases)
+                np.mod(target.legs + half, 1.0, out=memory.phases)
                 memory.clock[:] = 1.0, 0.0
                 return
 

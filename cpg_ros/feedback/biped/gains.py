@@ -142,8 +142,8 @@ class BipedGains(_Fields):  # type: ignore[misc]
             InputError: as of `of`.
 
         """
-        for known, changes in body.gait_gains.items():
-            _check(changes, f'biped.gains.{known}', SHORTEST if known in OF_GAIT else {})
+        for gait_name, changes in body.gait_gains.items():
+            _check(changes, f'biped.gains.{gait_name}', SHORTEST if gait_name in OF_GAIT else {})
         return cls.of(body.gains, gait, body.scale)._replace(**body.gait_gains.get(gait, {}))
 
     @classmethod

@@ -72,14 +72,14 @@ def path(fraction, duration, lift_off, target, gains, out):
 
 
 @jit
-def foot_force(wanted, place, velocity, gains):
+def foot_force(target, position, velocity, gains):
     """Return the force on a foot that follows its path, N; wanted as path fills it."""
-    return (gains.swing_kp * (wanted[0, 0] - place[0]) + gains.swing_kd * (
-                wanted[1, 0] - velocity[0]) + gains.swing_mass * wanted[2, 0],
-            gains.swing_kp * (wanted[0, 1] - place[1]) + gains.swing_kd * (
-                wanted[1, 1] - velocity[1]) + gains.swing_mass * wanted[2, 1],
-            gains.swing_kp * (wanted[0, 2] - place[2]) + gains.swing_kd * (
-                wanted[1, 2] - velocity[2]) + gains.swing_mass * wanted[2, 2])
+    return (gains.swing_kp * (target[0, 0] - position[0]) + gains.swing_kd * (
+                target[1, 0] - velocity[0]) + gains.swing_mass * target[2, 0],
+            gains.swing_kp * (target[0, 1] - position[1]) + gains.swing_kd * (
+                target[1, 1] - velocity[1]) + gains.swing_mass * target[2, 1],
+            gains.swing_kp * (target[0, 2] - position[2]) + gains.swing_kd * (
+                target[1, 2] - velocity[2]) + gains.swing_mass * target[2, 2])
 
 
 @jit
@@ -213,12 +213,12 @@ def upward_force(fraction, kind, height, rise, mass, gains):
 
 
 @jit
-def foothold(speed, wanted, side, remaining, gains):
+def foothold(speed, target, side, remaining, gains):
     """Return the foothold relative to the centre of mass, forward and left, m.
 
     Args:
         speed: forward and left, m/s.
-        wanted: the same.
+        target: the same.
         side: of the foot, 1 left and -1 right.
         remaining: time to its touchdown, s.
         gains: BipedGains.
@@ -226,9 +226,9 @@ def foothold(speed, wanted, side, remaining, gains):
     """
     stance = gains.duty / gains.frequency
     ahead = (speed[0] * (remaining + gains.flight_ahead * stance)
-             + gains.flight_x * (speed[0] - wanted[0]) + gains.place_offset)
+             + gains.flight_x * (speed[0] - target[0]) + gains.place_offset)
     left = (0.5 * side * gains.flight_width * gains.step_width
-            + speed[1] * (remaining + 0.5 * stance) + gains.flight_y * (speed[1] - wanted[1]))
+            + speed[1] * (remaining + 0.5 * stance) + gains.flight_y * (speed[1] - target[1]))
     return (min(max(ahead, -REACH), REACH), side * min(max(side * left, ASIDE), REACH))
 
 
@@ -286,7 +286,7 @@ def offsets(speed, sideways, rate, gains):
 
 
 @jit
-def capture_error(xi, side, time, rate, wanted, gains):
+def capture_error(xi, side, time, rate, target, gains):
     """Return the error of the capture point, forward and left, m.
 
     Args:
@@ -294,17 +294,17 @@ def capture_error(xi, side, time, rate, wanted, gains):
         side: of the foot that swings, 1 left and -1 right.
         time: since the foot that stands took over, s.
         rate: see growth_rate.
-        wanted: speed forward and to the left, m/s.
+        target: speed forward and to the left, m/s.
         gains: BipedGains.
 
     """
-    forward, inward, left = offsets(wanted[0], wanted[1], rate, gains)
+    forward, inward, left = offsets(target[0], target[1], rate, gains)
     grown = math.exp(rate * time)
     return xi[0] - forward * grown, xi[1] - (side * inward + left) * grown
 
 
 @jit
-def step(error, side, remaining, rate, wanted, gains):
+def step(error, side, remaining, rate, target, gains):
     """Return the foothold relative to the foot that stands, forward and left, m.
 
     Args:
@@ -312,13 +312,13 @@ def step(error, side, remaining, rate, wanted, gains):
         side: of the foot that swings, 1 left and -1 right.
         remaining: time to its touchdown, s.
         rate: see growth_rate.
-        wanted: speed forward and to the left, m/s.
+        target: speed forward and to the left, m/s.
         gains: BipedGains.
 
     """
     time, grown = 0.5 / gains.frequency, math.exp(rate * max(remaining, SOONEST))
-    forward = wanted[0] * time + gains.place_x * grown * error[0] + gains.place_offset
-    outward = gains.step_width + side * (wanted[1] * time + gains.place_y * grown * error[1])
+    forward = target[0] * time + gains.place_x * grown * error[0] + gains.place_offset
+    outward = gains.step_width + side * (target[1] * time + gains.place_y * grown * error[1])
     return (min(max(forward, -gains.reach_x), gains.reach_x),
             side * min(max(outward, gains.narrowest), gains.reach_y))
 

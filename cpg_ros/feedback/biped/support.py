@@ -150,8 +150,8 @@ class Arms:
         self._level = min(max(self._level + (dt if moving else -dt) / RISE, 0.0), 1.0)
         if state is not None:
             self._waves = (state[self._places] - self._middle) / self._half
-        wanted = self.rest + self._level * self._swings * self._waves
-        self.positions += np.clip(wanted - self.positions, -FASTEST * dt, FASTEST * dt)
+        target = self.rest + self._level * self._swings * self._waves
+        self.positions += np.clip(target - self.positions, -FASTEST * dt, FASTEST * dt)
 
 
 STANCE_GAINS = {
@@ -197,11 +197,11 @@ def pressure_shift(error, half, gains):
 
 
 @jit
-def upward_force(wanted, height, rise, mass, gains):
+def upward_force(target, height, rise, mass, gains):
     """Return the upward force that holds the body at a height, N.
 
     Args:
-        wanted: height of the centre of mass over the soles that bear, m.
+        target: height of the centre of mass over the soles that bear, m.
         height: that it has, m.
         rise: its upward speed, m/s.
         mass: of the robot, kg.
@@ -209,7 +209,7 @@ def upward_force(wanted, height, rise, mass, gains):
 
     """
     weight = mass * GRAVITY
-    up = weight + gains.height_kp * (wanted - height) - gains.height_kd * rise
+    up = weight + gains.height_kp * (target - height) - gains.height_kd * rise
     return min(max(up, LEAST * weight), MOST * weight)
 
 

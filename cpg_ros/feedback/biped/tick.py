@@ -55,9 +55,9 @@ def _sense(links, gains, memory, sensors, dt):
 @jit
 def _approach(gains, memory, command, dt):
     """Approach the wanted velocity and heading; command as of tick."""
-    wanted, most = memory.wanted, gains.acceleration * dt
+    target, most = memory.wanted, gains.acceleration * dt
     for k in range(2):
-        wanted[k] += min(max(command[k] - wanted[k], -most), most)
+        target[k] += min(max(command[k] - target[k], -most), most)
     memory.heading[0] += command[2] * dt
 
 
@@ -89,10 +89,10 @@ def _step(links, gains, memory, xi, axes, rate):
     stands = 0 if memory.fractions[0] > memory.fractions[1] else 1
     swings = 1 - stands
     x, y = xi[0] - soles[stands, 0], xi[1] - soles[stands, 1]
-    wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
+    target = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
     error = stepping.capture_error(
         (c * x + s * y, c * y - s * x), links.sides[swings],
-        stepping.time_in_step(phases[swings], gains), rate, wanted, gains)
+        stepping.time_in_step(phases[swings], gains), rate, target, gains)
     memory.error[0], memory.error[1] = error
     for leg in range(2):
         if memory.swinging[leg]:
@@ -101,7 +101,7 @@ def _step(links, gains, memory, xi, axes, rate):
             memory.clock[0] = stepping.speed_up(error, gains)
             forward, left = stepping.step(
                 error, links.sides[leg], stepping.time_to_touchdown(phases[leg], gains), rate,
-                wanted, gains)
+                target, gains)
             memory.target[leg, 0] = c * forward - s * left
             memory.target[leg, 1] = s * forward + c * left
             memory.target[leg, 2] = 0.0
@@ -140,13 +140,13 @@ def _fly(links, gains, memory, axes, kind, dt):
     memory.error[:] = 0.0
     memory.clock[0] = 1.0
     speed = c * velocity[0] + s * velocity[1], c * velocity[1] - s * velocity[0]
-    wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
+    target = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
     for leg in range(2):
         if memory.swinging[leg]:
             for k in range(3):
                 memory.lift_off[leg, k] -= dt * base[k]
             remaining = (stepping.swing_share(gains) - phases[leg]) / gains.frequency
-            ahead, left = stepping.foothold(speed, wanted, links.sides[leg], remaining,
+            ahead, left = stepping.foothold(speed, target, links.sides[leg], remaining,
                                             gains)
             memory.target[leg, 0] = center[0] + c * ahead - s * left
             memory.target[leg, 1] = center[1] + s * ahead + c * left
@@ -158,11 +158,11 @@ def _upward(gains, memory, mass, mode, kind, level):
     """Return the upward force on all legs, N; level of the soles that bear."""
     center, rise, fractions = memory.center[0, 2], memory.center[1, 2], memory.fractions
     if kind == stepping.WALKS or mode != WALK:
-        wanted = gains.height - memory.crouch[0]
+        target = gains.height - memory.crouch[0]
         if mode == SHIFT and kind != stepping.WALKS:
             # The body begins in the middle of a stance.
-            wanted = stepping.course(0.5, kind, gains)[0]
-        return support.upward_force(wanted, center - level, rise, mass, gains)
+            target = stepping.course(0.5, kind, gains)[0]
+        return support.upward_force(target, center - level, rise, mass, gains)
     if fractions[0] + fractions[1] < 0.5:
         return 0.0
     leads = 0 if fractions[0] >= fractions[1] else 1

@@ -27,9 +27,9 @@ LAW = Law(
 
 
 @jit
-def yaw_rate(wanted, yaw, gains):
+def yaw_rate(target, yaw, gains):
     """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
-    return limited(gains.turn * wrapped(wanted - yaw), gains.turn_most)
+    return limited(gains.turn * wrapped(target - yaw), gains.turn_most)
 
 
 @jit

@@ -92,13 +92,13 @@ def yielding(vx, vy, recovering, gains):
 
 
 @jit
-def advance(displacement, swinging, wanted, yielded, gains, dt):
+def advance(displacement, swinging, target, yielded, gains, dt):
     """Advance a foot's displacement forward and to the left, m, shape (2,), in place.
 
     Args:
         displacement: of the foot.
         swinging: whether it is meant to be in the air.
-        wanted: how much further forward and to the left to put it down, m.
+        target: how much further forward and to the left to put it down, m.
         yielded: speeds to which it yields in stance, m/s, see yielding.
         gains: of the law.
         dt: s.
@@ -106,5 +106,5 @@ def advance(displacement, swinging, wanted, yielded, gains, dt):
     """
     for k in range(2):
         displacement[k] = (
-            low_passed(displacement[k], wanted[k], gains.step_filter, dt) if swinging else
+            low_passed(displacement[k], target[k], gains.step_filter, dt) if swinging else
             in_stance(displacement[k], yielded[k], gains, dt))

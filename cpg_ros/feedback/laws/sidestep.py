@@ -44,46 +44,46 @@ LAW = Law(
 
 
 @jit
-def landing(wanted, stance, gains):
+def landing(target, stance, gains):
     """Return the touchdown target of a foot, m to the left of the gait's own.
 
     That is half of the distance that the body moves over the foot.
 
     Args:
-        wanted: speed to the left, m/s.
+        target: speed to the left, m/s.
         stance: how long the foot will stand, s.
         gains: of the law.
 
     """
-    return limited(0.5 * stance * gains.sidestep_share * wanted, gains.sidestep_most)
+    return limited(0.5 * stance * gains.sidestep_share * target, gains.sidestep_most)
 
 
 @jit
-def carry(displacement, wanted, gains, dt):
+def carry(displacement, target, gains, dt):
     """Return the displacement to the left of a foot on the ground, m, dt in s later."""
-    return limited(displacement - dt * gains.sidestep_share * wanted, gains.sidestep_most)
+    return limited(displacement - dt * gains.sidestep_share * target, gains.sidestep_most)
 
 
 @jit
-def advance(displacement, swinging, wanted, stance, gains, dt):
+def advance(displacement, swinging, target, stance, gains, dt):
     """Return the displacement of a foot to the left, m, dt in s later.
 
     Args:
         displacement: now, m.
         swinging: whether the foot is meant to be in the air.
-        wanted: speed to the left, m/s.
+        target: speed to the left, m/s.
         stance: how long the foot will stand, s.
         gains: of the law.
         dt: s.
 
     """
     if swinging:
-        return low_passed(displacement, landing(wanted, stance, gains), gains.step_filter, dt)
-    return carry(displacement, wanted, gains, dt)
+        return low_passed(displacement, landing(target, stance, gains), gains.step_filter, dt)
+    return carry(displacement, target, gains, dt)
 
 
 @jit
-def correct_speed(correction, missing, wanted, turn, gains, dt):
+def correct_speed(correction, missing, target, turn, gains, dt):
     """Return the correction of the commanded speed to the left, m/s, dt in s later.
 
     0 where none is commanded, and no turn.
@@ -91,11 +91,11 @@ def correct_speed(correction, missing, wanted, turn, gains, dt):
     Args:
         correction: so far, m/s.
         missing: speed to the left, m/s.
-        wanted: commanded speed to the left, m/s.
+        target: commanded speed to the left, m/s.
         turn: commanded, low-passed, rad/s.
         gains: of the law.
         dt: s.
 
     """
-    most = gains.sidestep_more * abs(wanted) + gains.sidestep_turning * abs(turn)
+    most = gains.sidestep_more * abs(target) + gains.sidestep_turning * abs(turn)
     return limited(correction + dt * gains.sidestep_rate * missing, most)

@@ -74,19 +74,19 @@ def spend(spent, acting, gains, dt):
     return spent + dt if spent + dt < gains.stiffen_longest else -gains.stiffen_rest
 
 
-def targets(wanted: np.ndarray, measured: np.ndarray, acting: np.ndarray, gains: Any,
+def targets(target: np.ndarray, measured: np.ndarray, acting: np.ndarray, gains: Any,
             limits: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
     """Return the targets of the joints, rad, which go further than wanted where the law acts.
 
     Speed limits do not apply to these targets, as joints are not meant to reach them.
 
     Args:
-        wanted: angles within all limits, rad, shape (runs, joints).
+        target: angles within all limits, rad, shape (runs, joints).
         measured: angles, rad, shape (runs, joints).
         acting: whether the law acts, shape (runs,).
         gains: of the law.
         limits: lowest and highest angles, rad, shape (joints,) each.
 
     """
-    far = np.clip(measured + gains.stiffen_distance * (wanted - measured), *limits)
-    return np.where(acting[:, None], far, wanted)
+    far = np.clip(measured + gains.stiffen_distance * (target - measured), *limits)
+    return np.where(acting[:, None], far, target)

@@ -114,7 +114,7 @@ class FootContacts(ShortRepr):
                 down[leg] = at
         if len(down) < len(legs):
             return None
-        return {leg: (down[legs[0]] - one) % 1.0 for leg, one in down.items()}
+        return {leg: (down[legs[0]] - touchdown) % 1.0 for leg, touchdown in down.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
@@ -204,12 +204,12 @@ def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] 
     if set(legs) <= set(names):
         return tuple(names)
     try:
-        found = legs_of(names)
+        by_leg = legs_of(names)
     except LegsError:
         return None
-    if set(found) != set(legs) or any(len(found[leg]) != 1 for leg in legs) or found.unassigned:
+    if set(by_leg) != set(legs) or any(len(by_leg[leg]) != 1 for leg in legs) or by_leg.unassigned:
         return None
-    return tuple(next(leg for leg in legs if name in found[leg]) for name in names)
+    return tuple(next(leg for leg in legs if name in by_leg[leg]) for name in names)
 
 
 def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:

@@ -165,21 +165,21 @@ def legs_of(joints: Sequence[str]) -> Legs:
     read = {name: _read(words[name]) for name in joints}
     # A code is a name's own, an L a hint: first four legs are looked for, or six.
     more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
-    for known, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
-        found = {leg: tuple(name for name in joints if read[name][column] == leg
-                            and not others & set(_moved(words[name]))) for leg in known}
-        there = [leg for leg in known if found[leg]]
-        if len(there) == len(known):
+    for labels, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
+        legs = {leg: tuple(name for name in joints if read[name][column] == leg
+                            and not others & set(_moved(words[name]))) for leg in labels}
+        there = [leg for leg in labels if legs[leg]]
+        if len(there) == len(labels):
             break
         # Two codes may be left and right of a biped by chance, three are a quadruped's.
         if column == 0 and len(there) >= 2 and not _directions(there, read, joints):
-            raise LegsError(_missing(there, known, read, joints))
+            raise LegsError(_missing(there, labels, read, joints))
     else:
         if there:
-            raise LegsError(_missing(there, known, read, joints))
+            raise LegsError(_missing(there, labels, read, joints))
         raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
                         'usually contain LF, RF, LH, RH, front_left ... or left, right')
-    return Legs(found, _explanation(found, read, joints), _rest(found, joints))
+    return Legs(legs, _explanation(legs, read, joints), _rest(legs, joints))
 
 
 def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -187,18 +187,19 @@ def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
     Of joints that are counted each number is there once; of legs it has the same joints as others.
     """
-    found: dict[tuple[str, int], list[str]] = {}
+    by_leg: dict[tuple[str, int], list[str]] = {}
     for name in joints:
         words_used = _COUNTED.findall(name)
         if len(words_used) == 1:
-            found.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
-    pairs = len(found) // 2
-    roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in found.values()}
-    wanted = {(side, k + 1) for side in 'lr' for k in range(pairs)}
-    if pairs < 3 or set(found) != wanted or len(roles) > 1 or len(next(iter(roles))) < 2:
+            by_leg.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
+    pairs = len(by_leg) // 2
+    roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in by_leg.values()}
+    expected = {(side, k + 1) for side in 'lr' for k in range(pairs)}
+    if pairs < 3 or set(by_leg) != expected or len(roles) > 1 or len(next(iter(roles))) < 2:
         return {}
     order = [(side, k) for k in range(pairs, 0, -1) for side in 'lr']
-    return {leg: tuple(found[one]) for leg, one in zip(leg_names(2 * pairs), order, strict=True)}
+    return {leg: tuple(by_leg[leg_key]) for leg,
+            leg_key in zip(leg_names(2 * pairs), order, strict=True)}
 
 
 def _refuse_two(joints: Sequence[str]) -> None:
@@ -207,14 +208,14 @@ def _refuse_two(joints: Sequence[str]) -> None:
     for name in joints:
         words = words_of(name)
         words_used = _read(words)[2]
-        place = next((k for k, word in enumerate(words) if word in words_used), 0)
-        if place and not set(words[:place]) & set(JOINTS):
-            robots.setdefault(tuple(words[:place]), {})[tuple(words[place:])] = name
+        index = next((k for k, word in enumerate(words) if word in words_used), 0)
+        if index and not set(words[:index]) & set(JOINTS):
+            robots.setdefault(tuple(words[:index]), {})[tuple(words[index:])] = name
     for first, own in robots.items():
         # With a single joint a leg, the word before may name the joint.
         roles = {tuple(word for word in rest if word not in _read(rest)[2]) for rest in own}
-        other = next((one for key, one in robots.items() if key != first
-                      and set(one) == set(own)), None)
+        other = next((robot_name for key, robot_name in robots.items() if key != first
+                      and set(robot_name) == set(own)), None)
         if other is not None and len(roles) > 1:
             raise LegsError('joints of two robots are there, such as '
                             f"'{next(iter(own.values()))}' and '{next(iter(other.values()))}'; "
@@ -233,8 +234,8 @@ def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
             and bool(plain) and plain.isdisjoint(map(role_of, ended)))
 
 
-def _rest(found: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in joints if not any(name in listed for listed in found.values()))
+def _rest(legs: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in joints if not any(name in listed for listed in legs.values()))
 
 
 def _listed(names: list[str]) -> str:
@@ -242,24 +243,24 @@ def _listed(names: list[str]) -> str:
     return f'{shown} and {len(names) - 6} more' if len(names) > 6 else shown or '(none)'
 
 
-def _missing(there: list[str], known: tuple[str, ...], read: Mapping, joints: Sequence[str]
+def _missing(there: list[str], labels: tuple[str, ...], read: Mapping, joints: Sequence[str]
              ) -> str:
-    lacking = ', '.join(leg for leg in known if leg not in there)
-    column = 1 if known == BIPED else 0
+    lacking = ', '.join(leg for leg in labels if leg not in there)
+    column = 1 if labels == BIPED else 0
     example = next(name for name in joints if read[name][column] in there)
     return (f"joints of the legs {', '.join(there)} are there (such as '{example}'), but none of "
             f'{lacking}')
 
 
-def _explanation(found: Mapping[str, tuple[str, ...]], read: Mapping,
+def _explanation(legs: Mapping[str, tuple[str, ...]], read: Mapping,
                  joints: Sequence[str]) -> str:
     parts = []
-    for leg, names in found.items():
+    for leg, names in legs.items():
         words_used = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
                              for name in names})
         shown = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
         parts.append(f"{leg} by '{' or '.join(words_used)}' ({len(names)} joint"
                      f"{'s' if len(names) > 1 else ''}: {shown})")
-    rest = _rest(found, joints)
+    rest = _rest(legs, joints)
     return ('legs read from the names: ' + '; '.join(parts)
             + (f'; of no leg: {_listed(list(rest))}' if rest else ''))

@@ -62,7 +62,7 @@ class PhaseScatter:
     strides: int
 
 
-def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
+def phase_scatter(phases: np.ndarray, x: np.ndarray, average: PhaseAverage,
                   legs: Mapping[str, Sequence[str]], names: Sequence[str]
                   ) -> dict[str, PhaseScatter]:
     """Find how the phases of the legs against the first one scatter from stride to stride.
@@ -70,7 +70,7 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
     Args:
         phases: of the samples, cycles, rising, shape (n,).
         x: rad, nan where missing, shape (n, joints).
-        found: the mean cycles of these samples.
+        average: the mean cycles of these samples.
         legs: leg -> its joints, the first leg first.
         names: of the joints, in the order of x.
 
@@ -78,21 +78,21 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
         Leg -> scatter; zeros for the first leg, the reference of all.
 
     """
-    theta = phases - found.zero
+    theta = phases - average.zero
     stride = np.floor(theta - theta[0]).astype(int)
     count = int(stride[-1]) + 1
-    order = np.arange(len(found.coefficients))[:, None]
-    turned = replace(found, coefficients=2j * np.pi * order * found.coefficients)
+    order = np.arange(len(average.coefficients))[:, None]
+    turned = replace(average, coefficients=2j * np.pi * order * average.coefficients)
     along, power = np.zeros((2, len(legs), count))
     for part in blocks(phases):
         there = np.isfinite(x[part])
         slopes = np.where(there, turned.mean(theta[part]).T, 0.0)
-        left = np.where(there, x[part] - found.mean(theta[part]).T, 0.0)
+        left = np.where(there, x[part] - average.mean(theta[part]).T, 0.0)
         for row, joints in enumerate(legs.values()):
             columns = [names.index(name) for name in joints]
-            for sums, one in ((along, left), (power, slopes)):
+            for sums, values in ((along, left), (power, slopes)):
                 sums[row] += np.bincount(
-                    stride[part], np.sum(one[:, columns] * slopes[:, columns], axis=1), count)
+                    stride[part], np.sum(values[:, columns] * slopes[:, columns], axis=1), count)
     reliable = power > ENOUGH * np.median(power, axis=1, keepdims=True)
     early = np.full_like(along, np.nan)
     early[reliable] = along[reliable] / power[reliable]
@@ -127,18 +127,19 @@ POINTS = 128
 
 def _roles(joints: Sequence[str]) -> list[str]:
     """Return a leg's joints in the order of JOINTS; nothing if one is missing."""
-    known = {role_of(name).replace(' ', '').removeprefix('joint'): name for name in joints}
-    found = [next((known[one] for one in names if one in known), '') for names in JOINTS]
-    return found if all(found) else []
+    by_role = {role_of(name).replace(' ', '').removeprefix('joint'): name for name in joints}
+    joints_of_role = [next((by_role[role] for role in names if role in by_role), '')
+                      for names in JOINTS]
+    return joints_of_role if all(joints_of_role) else []
 
 
 def _turn(axis: str, angle: np.ndarray) -> np.ndarray:
     """Matrices of turns about an axis, shape (n, 3, 3)."""
     i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
-    found = np.tile(np.eye(3), (angle.size, 1, 1))
-    found[:, i, i] = found[:, j, j] = np.cos(angle)
-    found[:, j, i], found[:, i, j] = np.sin(angle), -np.sin(angle)
-    return found
+    matrix = np.tile(np.eye(3), (angle.size, 1, 1))
+    matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
+    matrix[:, j, i], matrix[:, i, j] = np.sin(angle), -np.sin(angle)
+    return matrix
 
 
 def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
@@ -149,12 +150,12 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
         pair: f, m or h.
 
     """
-    turned, place = np.tile(np.eye(3), (angles[0].size, 1, 1)), np.zeros((angles[0].size, 3))
+    turned, position = np.tile(np.eye(3), (angles[0].size, 1, 1)), np.zeros((angles[0].size, 3))
     for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
         turned = turned @ _turn(axis, angle)
         if k in BEGINS:
-            place = place - LENGTHS[pair][BEGINS.index(k)] * turned[:, :, 2]
-    return place
+            position = position - LENGTHS[pair][BEGINS.index(k)] * turned[:, :, 2]
+    return position
 
 
 def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
@@ -179,8 +180,8 @@ def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
     forward = {leg: np.fft.rfft(foot([(turns @ c[name]).real for name in names], leg[1])[:, 0])[1]
                for leg, names in roles.items()}
     first = next(iter(forward.values()))
-    return {leg: round(float(np.angle(one / first)) / (2.0 * np.pi) % 1.0, 9) % 1.0
-            for leg, one in forward.items()}
+    return {leg: round(float(np.angle(position / first)) / (2.0 * np.pi) % 1.0, 9) % 1.0
+            for leg, position in forward.items()}
 
 
 #: SIGNED: ratio of a joint's mean angle to its RMS motion above which the mean has a sign.
@@ -206,7 +207,7 @@ class GaitMatch:
         distance: of that, in cycles: RMS over the legs after the best common shift.
         margin: how much further the next distinct gait is, cycles.
         alike: gaits that cannot be distinguished from the nearest, itself among them.
-        sure: probability that it is the nearest and no other, by the scatter of legs' phases.
+        probability: that it is the nearest and no other, by the scatter of legs' phases.
         notes: one line each.
 
     """
@@ -216,7 +217,7 @@ class GaitMatch:
     distance: float
     margin: float
     alike: tuple[str, ...]
-    sure: float
+    probability: float
     notes: tuple[str, ...]
 
 
@@ -245,12 +246,12 @@ def _sense(a: np.ndarray, b: np.ndarray) -> float:
 def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
     """Pair joints of two legs: by what they are called but for the leg, or by number."""
     roles = {role_of(name): name for name in first}
-    found = [(roles[role_of(name)], name) for name in other if role_of(name) in roles]
+    pairs = [(roles[role_of(name)], name) for name in other if role_of(name) in roles]
     bare = {''.join(sign for sign in role_of(name) if sign.isalpha() or sign == ' ').strip()
             for name in (*first, *other)}
-    if not found and len(bare) == 1 and len(first) == len(other):
+    if not pairs and len(bare) == 1 and len(first) == len(other):
         return list(zip(first, other, strict=True))
-    return found
+    return pairs
 
 
 def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
@@ -280,8 +281,8 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             phases[leg] = 0.0
             continue
         # The first leg that has the same joints; or else the first one.
-        base, pairs = next(((known, found) for known in phases
-                            if (found := _pairs(legs[known], joints))), ('', []))
+        base, pairs = next(((base_leg, base_pairs) for base_leg in phases
+                            if (base_pairs := _pairs(legs[base_leg], joints))), ('', []))
         if pairs:
             ahead, mirrored, sense_known = _shift(pairs, c)
             opposite += mirrored
@@ -347,9 +348,9 @@ def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
                else np.allclose(other.phases, -symmetry.phases % 1.0) for other in others)
 
 
-def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
+def _apart(phases: np.ndarray, target: np.ndarray, waves: np.ndarray) -> float:
     """Return the distance of leg phases; between different waveforms any phase will do."""
-    squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
+    squares = [nearest_gait(phases[waves == wave], {'': target[waves == wave]})[1]**2
                * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
     return float(np.sqrt(sum(squares) / phases.size))
 
@@ -372,17 +373,17 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
     own = np.array(list(phases.values()))
     cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
     apart, size = {}, {}
-    for gait in (one for one in network.gaits() if one != network.unnamed):
+    for gait in (name for name in network.gaits() if name != network.unnamed):
         symmetry = _symmetry(network, gait)
-        wanted, waves = symmetry.phases[cells], symmetry.waves[cells]
+        target, waves = symmetry.phases[cells], symmetry.waves[cells]
         if symmetry.leads:
             # Stated, in either sense, between whatever waveforms.
-            apart[gait], size[gait] = _apart(own, wanted, np.zeros_like(waves)), 0
+            apart[gait], size[gait] = _apart(own, target, np.zeros_like(waves)), 0
             continue
-        apart[gait] = _apart(own, wanted, waves)
+        apart[gait] = _apart(own, target, waves)
         # A wave that runs round may do so in both senses, where these are not two gaits.
         if not _reversed(network, gait, symmetry):
-            apart[gait] = min(apart[gait], _apart(own, -wanted, waves))
+            apart[gait] = min(apart[gait], _apart(own, -target, waves))
         size[gait] = -symmetry.waves.max()
     fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
     nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
@@ -420,11 +421,12 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
     turned = np.exp(2j * np.pi * np.outer(places, np.arange(len(c))))
     turned[:, 1:] *= 2.0
     group = next(iter(table.values())).group
-    found = recognise(places, (turned @ c).real, group, table, 1.0, BY_CELLS)
+    recognised = recognise(places, (turned @ c).real, group, table, 1.0, BY_CELLS)
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
-                        for size in (found.distance, found.distance + found.margin))
-    return GaitMatch(found.name, found.nearest, distance, second - distance, (found.nearest,),
+                        for size in (recognised.distance, recognised.distance + recognised.margin))
+    return GaitMatch(recognised.name, recognised.nearest, distance, second - distance,
+                     (recognised.nearest,),
                      1.0 / (1.0 + _odds(distance, second, network.cells)), ())
 
 
@@ -449,5 +451,5 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
         return match
     # The other one was a rival with even odds.
     return replace(match, gait=match.gait and gait, nearest=gait, alike=(gait,),
-                   sure=1.0 / (1.0 / match.sure - 1.0),
+                   probability=1.0 / (1.0 / match.probability - 1.0),
                    notes=(f'{gait}, {why}',))

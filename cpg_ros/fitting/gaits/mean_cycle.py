@@ -277,7 +277,7 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
     zero = -float(np.angle(lead[np.argmax(np.abs(lead))])) / (2.0 * np.pi)
     turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
-    spread, error = (np.array(one) for one in zip(*scatter, strict=True))
+    spread, error = (np.array(values) for values in zip(*scatter, strict=True))
     return PhaseAverage(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
 
 
@@ -404,14 +404,14 @@ def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
     far = 1.0 - 2.0 * product[lags] / both
     # Up to a lag of one period the mean of this is 1, so the first rise is within it.
     risen = np.argmax(far > REPEATS)
-    found, best = [], 2.0 * REPEATS
+    candidates, best = [], 2.0 * REPEATS
     for low in 1 + np.flatnonzero((far[1:-1] < far[:-2]) & (far[1:-1] < far[2:])):
         if low > risen and far[low] < 0.5 * best:
             before, at, after = far[low - 1:low + 2]
-            found.append((low + 0.5 * (before - after) / (before - 2.0 * at + after))
+            candidates.append((low + 0.5 * (before - after) / (before - 2.0 * at + after))
                          * (t[-1] - t[0]) / (m - 1))
             best = far[low]
-    return found[:CANDIDATES]
+    return candidates[:CANDIDATES]
 
 
 def _span(t: np.ndarray) -> float:

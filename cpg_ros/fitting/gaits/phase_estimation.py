@@ -211,8 +211,8 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     n = rates.size
     off, free = rates - rates.mean(), n - 1
     if n >= DRIFTS:
-        place = np.arange(n) - 0.5 * (n - 1)
-        off, free = off - place * (place @ rates) / (place @ place), n - 2
+        centred = np.arange(n) - 0.5 * (n - 1)
+        off, free = off - centred * (centred @ rates) / (centred @ centred), n - 2
     own = float(off @ off) / max(free, 1)
     next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
     errors = min(max((0.25 * own - next_) / 1.5, 0.0), 0.499 * own)
@@ -315,20 +315,20 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
 
 def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:
     """Fit the phase at the knots and the mean cycle in turn."""
-    place = np.clip(np.searchsorted(knots, grid, side='right') - 1, 0, knots.size - 2)
-    after = (grid - knots[place]) / (knots[place + 1] - knots[place])
+    interval = np.clip(np.searchsorted(knots, grid, side='right') - 1, 0, knots.size - 2)
+    after = (grid - knots[interval]) / (knots[interval + 1] - knots[interval])
     before = 1.0 - after
 
     def gathered(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        return (np.bincount(place, low, knots.size)
-                + np.bincount(place + 1, high, knots.size))
+        return (np.bincount(interval, low, knots.size)
+                + np.bincount(interval + 1, high, knots.size))
 
     for _ in range(STEPS):
         left, slope = _model(x, np.interp(grid, knots, phases))
         stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
         bands = np.zeros((2, knots.size))
         bands[1] = gathered(stiff * before**2, stiff * after**2)
-        bands[0, 1:] = np.bincount(place, stiff * before * after, knots.size)[:-1]
+        bands[0, 1:] = np.bincount(interval, stiff * before * after, knots.size)[:-1]
         tie = STIFFNESS * bands[1].mean() + 1e-300
         bands[1] += 2.0 * tie
         bands[0, 1:] -= tie

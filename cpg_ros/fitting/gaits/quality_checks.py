@@ -59,12 +59,12 @@ class QualityIssue:
 
     Attributes:
         message: one line.
-        left: the factor by which it multiplies the confidence.
+        factor: by which it multiplies the confidence.
 
     """
 
     message: str
-    left: float
+    factor: float
 
 
 def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
@@ -78,25 +78,26 @@ def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndar
         c: coefficients of the mean cycles, shape (harmonics + 1, joints).
 
     """
-    found, samples = [], _samples(phases, x)
+    issues, samples = [], _samples(phases, x)
     power = np.sum(np.abs(c[1:])**2, axis=1)
     order = np.arange(1, len(c))
     for times in (3, 2):
         if power[order % times > 0].sum() < ALIKE * power.sum():
-            found.append(QualityIssue(f'the mean cycle holds {times} that are alike: the gait '
+            issues.append(QualityIssue(f'the mean cycle holds {times} that are alike: the gait '
                                       f'may be '
                                       f'{times} times as fast, {times * frequency:.4g} Hz', 0.2))
             break
     if samples < SAMPLES:
-        found.append(QualityIssue(f'only {samples:.1f} samples a stride: a gait several times as '
+        issues.append(QualityIssue(f'only {samples:.1f} samples a stride: a gait several times as '
                                   f'fast would look the same; record faster', 0.5))
     if frequency < SLOW:
         unit = next((unit for unit, more in UNITS.items()
                      if USUAL[0] <= frequency * more <= USUAL[1]), '')
-        found.append(QualityIssue(f'a stride of {1.0 / frequency:.4g} s is slower than any leg' + (
+        issues.append(QualityIssue(f'a stride of {1.0 / frequency:.4g} s is slower than any leg'
+                                   + (
             f': if the times are in {unit}, it is {frequency * UNITS[unit]:.4g} Hz; declare it '
             f'(--time {unit})' if unit else ''), 0.02))
-    return found
+    return issues
 
 
 def _samples(phases: np.ndarray, x: np.ndarray) -> float:
@@ -129,7 +130,7 @@ def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIss
 
     """
     most = float(np.ptp(mean, axis=1).max())
-    if most >= SWAY or any(abs((one + 0.5) % 1.0 - 0.5) > TOGETHER for one in phases.values()):
+    if most >= SWAY or any(abs((phase + 0.5) % 1.0 - 0.5) > TOGETHER for phase in phases.values()):
         return []
     return [QualityIssue(f'all legs move together, and by no more than {most:.2g} rad: a body '
                          'that stands and sways moves its joints so, too', 0.3)]
@@ -167,7 +168,7 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
         return abs((parts[pair[1]][leg] - parts[pair[0]][leg] + 0.5) % 1.0 - 0.5)
 
     leg, pair = max(product(parts[0], combinations(range(len(parts)), 2)),
-                    key=lambda one: moved(*one))
+                    key=lambda couple: moved(*couple))
     if moved(leg, pair) <= CHANGE:
         return []
     at = [f'at {parts[k][leg]:.2f} {PARTS[k]}' for k in pair]
@@ -178,33 +179,33 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
 def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
               names: Sequence[str]) -> list[dict[str, float]]:
     """Return leg -> phase, cycles, for each part of a stretch; nothing if it is too short."""
-    span, found = phases[-1] - phases[0], []
+    span, averages = phases[-1] - phases[0], []
     edges = np.searchsorted(phases, phases[0] + span * np.arange(1, len(PARTS)) / len(PARTS))
-    for place in map(slice, [0, *edges], [*edges, len(phases)]):
-        if span < len(PARTS) * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
+    for interval in map(slice, [0, *edges], [*edges, len(phases)]):
+        if span < len(PARTS) * STRIDES or (np.isfinite(x[interval]).sum(axis=0) < FEWEST).any():
             return []
         try:
-            part = average_cycles(phases[place], x[place], np.zeros(1), [0])
+            part = average_cycles(phases[interval], x[interval], np.zeros(1), [0])
         except InputError:
             return []
         c = dict(zip(names, part.coefficients.T, strict=True))
-        found.append(leg_phases(legs, c)[0])
-    return found
+        averages.append(leg_phases(legs, c)[0])
+    return averages
 
 
 def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> list[str]:
     """Return a line for each leg that moves by much less than the others."""
     size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in listed)
                                / len(listed))) for leg, listed in legs.items()}
-    found = []
+    limping_legs = []
     for leg, own in size.items():
         usual = float(np.median([other for name, other in size.items() if name != leg]))
         if own < LIMPS * usual:
-            found.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
-    return found
+            limping_legs.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
+    return limping_legs
 
 
-def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
+def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[str]) -> list[str]:
     """Return a line each on few cycles, a drift of the frequency, and samples left out."""
     notes = []
     if warp.cycles < SURE:
@@ -216,7 +217,8 @@ def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]
         ends = np.polyval(slope, warp.knots[[0, -1]])
         if abs(ends[1] - ends[0]) > DRIFT * warp.frequency:
             notes.append(f'the frequency drifts from {ends[0]:.3g} to {ends[1]:.3g} Hz')
-    wild = [f'{name} ({count})' for name, count in zip(names, found.spikes, strict=True) if count]
+    wild = [f'{name} ({count})' for name, count in zip(names, average.spikes, strict=True)
+            if count]
     if wild:
         notes.append(f'samples far off the mean cycle, left out: {", ".join(wild)}')
     return notes

@@ -222,7 +222,7 @@ class _Violations:
         for name, shift in symmetry.shifts:
             if (name, shift) not in self._known:
                 self._known[name, shift] = self.at(self.elements[name], float(shift))
-        return max(self._known[one] for one in symmetry.shifts)
+        return max(self._known[element] for element in symmetry.shifts)
 
 
 def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
@@ -291,24 +291,27 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     alone = tolerance
     tolerance = min(float(np.hypot(alone, LARGER * noise)), max(MOST, alone))
     # Search all homomorphisms, so that the result is a group with consistent shifts.
-    found = max((one for one in symmetries(group) if violations.of(one) <= tolerance),
-                key=lambda one: (len(one.h), -violations.of(one)))
+    symmetry = max((candidate for candidate in symmetries(group)
+                    if violations.of(candidate) <= tolerance),
+                key=lambda candidate: (len(candidate.h), -violations.of(candidate)))
     apart = {name: violations.of(gait) for name, gait in gaits.items()}
     best = min(gaits, key=apart.__getitem__)
-    known = apart[best] <= tolerance
+    recognised = apart[best] <= tolerance
     # A gait that includes another has more constraints and fits no better; that is no demerit.
     fitting = [name for name, gait in gaits.items()
-               if (apart[name] <= tolerance if known else apart[name] <= apart[best] + tolerance
-                   and set(gait.shifts) >= set(gaits[best].shifts))]
+               if (apart[name] <= tolerance if recognised else apart[name] <= apart[best]
+                   + tolerance and set(gait.shifts) >= set(gaits[best].shifts))]
     nearest = min(fitting, key=lambda name: (-len(gaits[name].h), apart[name],
                                              -len(gaits[name].k)))
     others = [name for name, gait in gaits.items()
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
     second = min(others, key=apart.__getitem__, default=None)
-    sure = _sure(apart[nearest], [apart[name] for name in others], float(np.hypot(alone, noise)))
-    return Recognition(nearest if known else None, nearest, apart[nearest],
+    probability = _probability(apart[nearest], [apart[name] for name in others],
+                               float(np.hypot(alone, noise)))
+    return Recognition(nearest if recognised else None, nearest, apart[nearest],
                        apart[second] - apart[nearest] if second is not None else np.inf, second,
-                       noise, sure, period, _phases(cycle, found), found.h, found.k,
+                       noise, probability, period, _phases(cycle, symmetry), symmetry.h,
+                       symmetry.k,
                        {name: violations.best(element)
                         for name, element in group.elements.items()})
 
@@ -333,7 +336,7 @@ def _noise(cycle: HarmonicCycle, samples: int) -> float:
     return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))
 
 
-def _sure(nearest: float, others: Sequence[float], scatter: float) -> float:
+def _probability(nearest: float, others: Sequence[float], scatter: float) -> float:
     """Return the probability of the nearest gait among the others and none, by distances."""
     odds = [np.exp(-0.5 * (other**2 - nearest**2) / scatter**2) for other in others]
     none = np.exp(min(0.5 * ((nearest / scatter)**2 - NONE**2), 30.0))

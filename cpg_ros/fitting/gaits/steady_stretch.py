@@ -160,8 +160,8 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     least = 1e-12 * squares[-1] / n + 1e-300
     lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
     variances: dict[int, np.ndarray] = {}
-    found = np.full((lags.size, n), np.inf)
-    for row, lag in zip(found, lags, strict=True):
+    differences = np.full((lags.size, n), np.inf)
+    for row, lag in zip(differences, lags, strict=True):
         window = min(lag, n - lag)
         width = min(max(k for k in WIDTHS if k <= lag), window)
         if width not in variances:
@@ -180,7 +180,7 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         width = max(variances)
         offset = width // 2
         variance[offset:offset + variances[width].size] = variances[width]
-    return lags, found, variance
+    return lags, differences, variance
 
 
 def true_runs(mask: np.ndarray) -> np.ndarray:
@@ -204,13 +204,13 @@ def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
 
     Between lags, by a parabola; None if a lag that is not near has less still.
     """
-    known = np.isfinite(differences)
-    means = np.where(known, differences, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-    means[~known.any(axis=1)] = np.inf
+    finite = np.isfinite(differences)
+    means = np.where(finite, differences, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
+    means[~finite.any(axis=1)] = np.inf
     k = near[np.argmin(means[near])]
     if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
         return float(lags[k]), float(means[k])
-    both = known[k - 1:k + 2].all(axis=0)
+    both = finite[k - 1:k + 2].all(axis=0)
     before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
         k - 1:k + 2]
     if min(before, after) < here:
@@ -229,7 +229,7 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
 
     """
     step, start = times[1] - times[0], times[0]
-    found = []
+    stretches = []
     while len(y) >= CYCLES * FEWEST:
         lags, differences, variance = _differences(y)
         for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
@@ -239,26 +239,27 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
                 if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
-                    found.append(Stretch(start + begin * step, start + end * step,
+                    stretches.append(Stretch(start + begin * step, start + end * step,
                                          found_lag[0] * step, found_lag[1],
                                          float(np.sqrt(variance[first:last + 1].mean()))))
         half = len(y) // 2
         y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])
         start, step = start + 0.5 * step, 2.0 * step
-    return found
+    return stretches
 
 
-def best_stretch(found: list[Stretch]) -> Stretch:
+def best_stretch(stretches: list[Stretch]) -> Stretch:
     """Choose the stretch with most cycles of most motion, at its true period.
 
     Half a period gives more cycles, which differ from one another: its multiple is then taken.
     """
-    best = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
+    best = max(stretches,
+               key=lambda stretch: stretch.cycles * stretch.size * (1.0 - stretch.difference))
     for times in (2, 3):
-        for one in found:
-            if (abs(one.period / best.period / times - 1.0) < NEAR / 2
-                    and not one.outside(best.begin, best.end)
-                    and one.end - one.begin >= LASTING * (best.end - best.begin)
-                    and one.difference < BETTER * (best.difference - LESS)):
-                return one
+        for stretch in stretches:
+            if (abs(stretch.period / best.period / times - 1.0) < NEAR / 2
+                    and not stretch.outside(best.begin, best.end)
+                    and stretch.end - stretch.begin >= LASTING * (best.end - best.begin)
+                    and stretch.difference < BETTER * (best.difference - LESS)):
+                return stretch
     return best

@@ -98,7 +98,8 @@ def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
         NoSteadyGait: there are too few samples, or a leg has no joint with angles.
 
     """
-    listed = [name for name in recording.joints if any(name in one for one in legs.values())]
+    listed = [name for name in recording.joints
+              if any(name in listed_names for listed_names in legs.values())]
     # Joint by joint in memory, as they are averaged.
     x = np.empty((len(listed), len(recording.times))).T
     for column, name in zip(x.T, listed, strict=True):
@@ -122,11 +123,11 @@ def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
     if len(recording.times) < SAMPLES:
         raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
                            f'for a gait, at least {SAMPLES} are needed')
-    kept = _kept(legs, names, recording.source)
+    usable = _kept(legs, names, recording.source)
     x = x if enough.all() else x[:, enough]
     if spikes:
         notes.append(f'left out, far off both neighbours: {spikes} samples')
-    return kept, x, notes
+    return usable, x, notes
 
 
 def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarray, source: str,
@@ -156,12 +157,13 @@ def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarra
 def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
           ) -> dict[str, tuple[str, ...]]:
     """Keep the legs' joints that are among names, at least one of each leg."""
-    kept = {leg: tuple(name for name in listed if name in names) for leg, listed in legs.items()}
-    for leg, listed in kept.items():
+    names_of_leg = {leg: tuple(name for name in listed if name in names) for leg,
+                    listed in legs.items()}
+    for leg, listed in names_of_leg.items():
         if not listed:
             raise NoSteadyGait(f'{source}: none of the joints of {leg} '
                                f'({", ".join(legs[leg])}) has angles')
-    return kept
+    return names_of_leg
 
 
 #: POINTS: number of points of a mean cycle.
@@ -171,8 +173,8 @@ STILL = 0.01
 #: ALIKE: largest mean square difference, over twice the variance, of stretches with fewer cycles
 #: than SURE.
 ALIKE = 0.1
-#: LEFT: largest share of the joints' variance that the mean cycle may leave unexplained.
-LEFT = 0.5
+#: UNEXPLAINED: largest share of the joints' variance that the mean cycle may leave unexplained.
+UNEXPLAINED = 0.5
 #: SEEDS: most stretches that are followed; OTHERS: cycles of another one from which on it is
 #: noted.
 SEEDS, OTHERS = 4, 3.0
@@ -305,18 +307,18 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     names, usable, full = with_angles(names, usable, x, source, notes)
     x = x[:, full]
     try:
-        found = average_cycles(phases, x, theta,
+        average = average_cycles(phases, x, theta,
                                [names.index(name) for name in usable[next(iter(own))]])
     except InputError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
-    left = float(np.sum(found.left * power) / np.sum(power))
-    if left > LEFT:
+    left = float(np.sum(average.left * power) / np.sum(power))
+    if left > UNEXPLAINED:
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
                            f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
                            'variance')
-    notes += quality_notes(warp, found, names)
-    c = dict(zip(names, found.coefficients.T, strict=True))
+    notes += quality_notes(warp, average, names)
+    c = dict(zip(names, average.coefficients.T, strict=True))
     # A leg's phase is that of its first cell.
     leading = {leg: tuple(name for name in listed
                           if cells is None or cells.get(name) == own[leg][0]) or listed
@@ -329,8 +331,8 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         # Joints of legs that are built alike move alike, others need not.
         ahead, vague = leads, ()
         by_legs = (*by_legs, "the legs' phases are those of touchdown, by the loads on the feet")
-    gait, mean = match_gait(ahead, kind), found.mean(theta)
-    issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
+    gait, mean = match_gait(ahead, kind), average.mean(theta)
+    issues = [*check_rhythm(warp.frequency, phases, x, average.coefficients),
               *check_angles(names, mean), *check_legs(vague),
               *check_sway(ahead, mean),
               *check_change(phases, x, leading, names, lambda part: match_gait(part, kind).gait),
@@ -344,7 +346,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     gait = walk_or_run(gait, contacts, None if body is None else falling_share(
         phases, body[inside][:, 2], warp.frequency))
     if known:
-        gait = replace(gait, sure=1.0)
+        gait = replace(gait, probability=1.0)
         if known in gait.alike:
             gait = replace(gait, gait=known, nearest=known, alike=(known,))
     if len(gait.alike) > 1:
@@ -353,13 +355,13 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                                    'same phases; name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
-                  mean, found.spread, found.error, found.counts, ahead,
-                  phase_scatter(phases, x, found, leading, names), gait.gait,
+                  mean, average.spread, average.error, average.counts, ahead,
+                  phase_scatter(phases, x, average, leading, names), gait.gait,
                   gait.nearest, gait.alike, gait.distance, gait.margin,
-                  gait.sure * float(np.prod([one.left for one in issues])),
+                  gait.probability * float(np.prod([issue.factor for issue in issues])),
                   tuple(one.message for one in issues if one.message),
                   (*notes, *by_legs, *limping(usable, c), *gait.notes),
-                  replace(warp, phases=warp.phases - found.zero), contacts)
+                  replace(warp, phases=warp.phases - average.zero), contacts)
 
 
 def _travel(body: np.ndarray | None, inside: slice, warp: PhaseEstimate) -> float:
@@ -376,36 +378,36 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
         raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '
                            f'{reach.max():.2g} rad')
     rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
-    found = find_stretches(*resample_evenly(times, x, rate))
-    if not found:
+    stretches = find_stretches(*resample_evenly(times, x, rate))
+    if not stretches:
         raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
                            f'{reach.max():.2g} rad, but nowhere do they repeat that over '
                            f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s' + _hint(
                                times, x, reach))
     regions: list[tuple[RoughPhase, float]] = []
-    largest = max(one.size for one in found)
+    largest = max(stretch.size for stretch in stretches)
     for _ in range(SEEDS):
-        if not found:
+        if not stretches:
             break
-        seed = best_stretch(found)
+        seed = best_stretch(stretches)
         # Two strides may be alike by chance, if not in all joints.
         if seed.cycles >= SURE or seed.difference <= ALIKE:
             regions.append((grow_stretch(times, x, seed), seed.period))
-            found = [one for one in found if one.outside(regions[-1][0].begin,
+            stretches = [stretch for stretch in stretches if stretch.outside(regions[-1][0].begin,
                                                          regions[-1][0].end)]
-        found = [one for one in found if one.outside(seed.begin, seed.end)
-                 and one.cycles >= OTHERS and one.size >= 0.5 * largest]
+        stretches = [stretch for stretch in stretches if stretch.outside(seed.begin, seed.end)
+                 and stretch.cycles >= OTHERS and stretch.size >= 0.5 * largest]
     if not regions:
         raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
                            f'only roughly, and for {seed.cycles:.1f} cycles of '
                            f'{seed.period:.3g} s: record {SURE:g} strides or more')
-    regions.sort(key=lambda one: one[0].begin - one[0].end)
+    regions.sort(key=lambda stretch: stretch[0].begin - stretch[0].end)
     rough = regions[0][0]
-    notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {one.begin:.2f} to '
-             f'{one.end:.2f} s, is shorter and left out'
-             for one, period in regions[1:]
-             if min(one.end, rough.end) - max(one.begin, rough.begin) < 0.5 * (one.end - one.begin)
-             and one.end - one.begin >= OTHERS * period]
+    notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {other.begin:.2f} to '
+             f'{other.end:.2f} s, is shorter and left out' for other, period in regions[1:]
+             if (min(other.end, rough.end) - max(other.begin, rough.begin)
+                 < 0.5 * (other.end - other.begin))
+             and other.end - other.begin >= OTHERS * period]
     return rough, notes
 
 
@@ -426,11 +428,11 @@ def _hint(times: np.ndarray, x: np.ndarray, reach: np.ndarray) -> str:
 def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
                   gains: Mapping[str, complex], network: type[Network]) -> np.ndarray | None:
     """Return the coefficients of every cell's signal, None unless every cell has a joint."""
-    known = {name: cell for name, cell in cells.items()
+    cell_of = {name: cell for name, cell in cells.items()
              if name in c and abs(gains.get(name, 0.0)) > 0.0}
     signals = []
     for cell in range(1, network.cells + 1):
-        names = [name for name, one in known.items() if one == cell]
+        names = [name for name, one in cell_of.items() if one == cell]
         if not names:
             return None
         # The joint that moves most stands for the cell.

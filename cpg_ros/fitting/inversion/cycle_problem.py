@@ -99,9 +99,9 @@ class CycleProblem:
         self.coordinates = Coordinates(network, gait, self.free)
         self.order, self.readout = order, readout
         names = network.parameters()
-        self._members = np.array([[float(name in one.members) for one in free]
+        self._members = np.array([[float(name in parameter.members) for parameter in free]
                                   for name in names])
-        self._of_duty = np.array([float(one.name == GAIT_DUTY) for one in free])
+        self._of_duty = np.array([float(parameter.name == GAIT_DUTY) for parameter in free])
         #: Number of values that belong to the network.
         self._own = len(free) - int(self._of_duty.sum())
         leading = np.array([readout.leading.get(int(cell) + 1, int(cell) + 1) - 1
@@ -186,9 +186,9 @@ class CycleProblem:
     def _nearest(self, values: np.ndarray) -> Orbit | None:
         if not self._solved:
             return None
-        known = np.array([np.frombuffer(key) for key in self._solved])
-        size = np.abs(known).max(axis=0) + 1e-12
-        gaps = np.sum(((known - values[:self._own]) / size)**2, axis=1)
+        solved = np.array([np.frombuffer(key) for key in self._solved])
+        size = np.abs(solved).max(axis=0) + 1e-12
+        gaps = np.sum(((solved - values[:self._own]) / size)**2, axis=1)
         return list(self._solved.values())[int(gaps.argmin())][0]
 
     def best_readouts(self, values: np.ndarray) -> ReadoutFit:
@@ -269,9 +269,9 @@ class CycleProblem:
 
     def at_order(self, order: int) -> 'CycleProblem':
         """Return the same problem with readouts of another order."""
-        found = copy(self)
-        found.order, found._placed = order, None
-        return found
+        other = copy(self)
+        other.order, other._placed = order, None
+        return other
 
     def weighted(self, columns: np.ndarray) -> np.ndarray:
         """Divide what is given for each instant and joint by the sizes.

@@ -129,10 +129,10 @@ class Spread(ShortRepr):
         """Correlations, shape (n, n); NaN for numbers that are not determined."""
         errors = self.errors
         with np.errstate(invalid='ignore', divide='ignore'):
-            found = self.covariance / np.outer(errors, errors)
-        found[~np.isfinite(errors)] = found[:, ~np.isfinite(errors)] = np.nan
-        np.fill_diagonal(found, 1.0)
-        return found
+            correlation = self.covariance / np.outer(errors, errors)
+        correlation[~np.isfinite(errors)] = correlation[:, ~np.isfinite(errors)] = np.nan
+        np.fill_diagonal(correlation, 1.0)
+        return correlation
 
 
 def spread(jacobian: np.ndarray, inflation: float) -> Spread:
@@ -377,7 +377,7 @@ class Fit(ShortRepr):
     def _summary(self) -> str:
         return (f'{self.gait} of {self.network.name} to {len(self.joints)} joints: RMS error '
                 f'{100.0 * self.mean_rms_share:.3g} % of range, '
-                f'{short({name: one.value for name, one in self.parameters.items()})}')
+                f'{short({name: estimate.value for name, estimate in self.parameters.items()})}')
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -397,12 +397,12 @@ class Fit(ShortRepr):
     @property
     def minima(self) -> list[Minimisation]:
         """Where the starts converged, each place once, the least cost first."""
-        found: list[Minimisation] = []
-        for trial in sorted(self.starts, key=lambda one: one.cost):
-            if not found or (trial.converged and all(
-                    distinct(trial.values[:-1], one.values[:-1]) for one in found)):
-                found.append(trial)
-        return found
+        minima: list[Minimisation] = []
+        for trial in sorted(self.starts, key=lambda minimum: minimum.cost):
+            if not minima or (trial.converged and all(
+                    distinct(trial.values[:-1], minimum.values[:-1]) for minimum in minima)):
+                minima.append(trial)
+        return minima
 
     @property
     def rms(self) -> dict[str, float]:

@@ -62,9 +62,9 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
         slopes: derivatives of x and y by some numbers, shape (2, ..., numbers).
 
     """
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    by_x = np.stack([zero, one, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=-1)
-    by_y = np.stack([zero, zero, one, zero, x, zero, x * x], axis=-1)
+    ones, zero = np.ones_like(x), np.zeros_like(x)
+    by_x = np.stack([zero, ones, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=-1)
+    by_y = np.stack([zero, zero, ones, zero, x, zero, x * x], axis=-1)
     count = 1 + WEIGHTS[order]
     return (by_x[..., :count, None] * slopes[0][..., None, :]
             + by_y[..., :count, None] * slopes[1][..., None, :])
@@ -171,8 +171,8 @@ def signals(orbit: Orbit, harmonics: int) -> Signals:
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
 
     """
-    one = _whole if orbit.network.readout == 'waveform' else _smooth
-    waves = [one(orbit, wave, harmonics) for wave in range(int(orbit.waves.max()) + 1)]
+    waveform_of = _whole if orbit.network.readout == 'waveform' else _smooth
+    waves = [waveform_of(orbit, wave, harmonics) for wave in range(int(orbit.waves.max()) + 1)]
     return Signals(*(np.array(parts) for parts in zip(*waves, strict=True)))
 
 

@@ -65,9 +65,9 @@ def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
     return figure, grid.flat[:count]
 
 
-def joint_figure(found: RecordingFit) -> Figure:
+def joint_figure(result: RecordingFit) -> Figure:
     """Draw the recorded mean cycle with its spread, and the fitted one, joint by joint."""
-    fit, stride = found.fit, found.stride
+    fit, stride = result.fit, result.stride
     figure, grid = _grid(len(fit.joints), 1.9)
     fraction = fit.rms_share
     for axes, name, recorded, fitted in zip(grid, fit.joints, fit.recorded, fit.fitted,
@@ -85,25 +85,25 @@ def joint_figure(found: RecordingFit) -> Figure:
     strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
     figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
-                    f'{fit.order}{": a poor fit" if found.poor else ""}', fontsize=10,
-                    color=FITTED if found.poor else _text())
+                    f'{fit.order}{": a poor fit" if result.poor else ""}', fontsize=10,
+                    color=FITTED if result.poor else _text())
     return figure
 
 
-def stride_curves(found: RecordingFit) -> Figure:
+def stride_curves(result: RecordingFit) -> Figure:
     """Draw the joints' angles over 0 to 100 % of the stride, legs side by side."""
-    curves = stride_report.normalised(found, stride_report.strides_of(found))
+    curves = stride_report.normalised(result, stride_report.strides_of(result))
     panels: dict[str, list[tuple[str, np.ndarray, np.ndarray]]] = {}
     for leg, name, mean, spread in curves:
         panels.setdefault(role_of(name) or name, []).append((leg, mean, spread))
     figure, grid = _grid(max(1, len(panels)), 2.2)
-    legs, share = list(found.stride.phases), np.linspace(0.0, 100.0, len(found.stride.theta) + 1)
+    legs, share = list(result.stride.phases), np.linspace(0.0, 100.0, len(result.stride.theta) + 1)
     for axes, (role, own) in zip(grid, panels.items(), strict=False):
         for leg, *rows in own:
             # The end of the stride is its begin.
             mean, spread = (np.append(row, row[0]) for row in rows)
             color = LINES[legs.index(leg) % len(LINES)]
-            if found.stride.cycles > 1:
+            if result.stride.cycles > 1:
                 axes.fill_between(share, mean - spread, mean + spread, color=color, alpha=0.2,
                                   linewidth=0.0)
             axes.plot(share, mean, color=color, linewidth=1.4, label=leg)
@@ -112,18 +112,18 @@ def stride_curves(found: RecordingFit) -> Figure:
         axes.set_xlabel('stride [%]', fontsize=8)
         axes.set_xlim(0.0, 100.0)
         axes.legend(fontsize=7, frameon=False)
-    band = ', bands: standard deviation of strides' if found.stride.cycles > 1 else ''
-    begin = ('touchdown' if found.stride.contacts is not None
+    band = ', bands: standard deviation of strides' if result.stride.cycles > 1 else ''
+    begin = ('touchdown' if result.stride.contacts is not None
              else 'the foremost or largest angle of each leg')
     figure.suptitle(f'Angles over the stride, 0 % is {begin}{band}', fontsize=10)
     return figure
 
 
-def errors(found: RecordingFit) -> Figure:
+def errors(result: RecordingFit) -> Figure:
     """Fitted minus recorded at even instants of the cycle, joint by joint."""
-    theta, values = found.fit.synchronisation(POINTS)
-    figure, grid = _grid(len(found.fit.joints), 1.5)
-    for axes, name, row in zip(grid, found.fit.joints, values, strict=True):
+    theta, values = result.fit.synchronisation(POINTS)
+    figure, grid = _grid(len(result.fit.joints), 1.5)
+    for axes, name, row in zip(grid, result.fit.joints, values, strict=True):
         axes.axhline(0.0, color=BAND, linewidth=1.0)
         axes.plot(theta, row, 'o-', color=FITTED, markersize=3, linewidth=0.9)
         axes.set_title(f'{name}: {row.min():.3f} to {row.max():.3f} rad', fontsize=8, loc='left')
@@ -132,19 +132,19 @@ def errors(found: RecordingFit) -> Figure:
     return figure
 
 
-def phases(found: RecordingFit) -> Figure:
+def phases(result: RecordingFit) -> Figure:
     """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
-    figure = Figure((6.0, 0.9 + 0.45 * len(found.stride.phases)), layout='constrained')
+    figure = Figure((6.0, 0.9 + 0.45 * len(result.stride.phases)), layout='constrained')
     axes = figure.subplots()
-    orbit = found.fit.orbit
+    orbit = result.fit.orbit
     cells = next(iter(orbit.network.legs.values()))
-    wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
-    for row, (leg, phase) in enumerate(found.stride.phases.items()):
-        height = len(found.stride.phases) - 1 - row
+    network_phases = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
+    for row, (leg, phase) in enumerate(result.stride.phases.items()):
+        height = len(result.stride.phases) - 1 - row
         marks: list[tuple[float | None, dict[str, Any]]] = [
             (phase, {'marker': 'o', 'markersize': 8, 'color': _text(), 'label': 'recorded'}),
-            (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
-                               'markerfacecolor': 'none', 'label': found.fit.gait})]
+            (network_phases.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
+                               'markerfacecolor': 'none', 'label': result.fit.gait})]
         for value, style in marks:
             # Draw a phase near the seam on both sides of it.
             places = [] if value is None else [
@@ -154,21 +154,21 @@ def phases(found: RecordingFit) -> Figure:
                 axes.plot(at, height, linestyle='none', **style)
     for seam in (0.0, 1.0):
         axes.axvline(seam, color=BAND, linewidth=1.0)
-    axes.set_yticks(range(len(found.stride.phases)), list(found.stride.phases)[::-1])
-    axes.set_ylim(-0.6, len(found.stride.phases) - 0.4)
+    axes.set_yticks(range(len(result.stride.phases)), list(result.stride.phases)[::-1])
+    axes.set_ylim(-0.6, len(result.stride.phases) - 0.4)
     axes.set_xlim(-SEAM, 1.0 + SEAM)
     axes.set_xticks(np.arange(5) / 4)
     axes.set_xlabel('phase [cycles], 1 is 0 again')
     axes.grid(axis='y', color=BAND)
-    known = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
-    axes.legend(known.values(), known.keys(), fontsize=8, frameon=False, loc='lower center',
+    handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    axes.legend(handles.values(), handles.keys(), fontsize=8, frameon=False, loc='lower center',
                 ncols=2, bbox_to_anchor=(0.5, 1.0))
     return figure
 
 
-def stretch(found: RecordingFit) -> Figure:
+def stretch(result: RecordingFit) -> Figure:
     """Draw the whole recording of the joint that moves most, and the stretch in it."""
-    recording, stride = found.recording, found.stride
+    recording, stride = result.recording, result.stride
     name = stride.joints[int(np.argmax(np.ptp(stride.mean, axis=1)))]
     angles = recording.positions[:, recording.joints.index(name)]
     figure = Figure((10.5, 2.4), layout='constrained')
@@ -190,10 +190,10 @@ def stretch(found: RecordingFit) -> Figure:
     return figure
 
 
-def convergence(found: RecordingFit) -> Figure:
+def convergence(result: RecordingFit) -> Figure:
     """Objective and parameters over the iterations of each start."""
-    names = found.fit.free
-    trials = [trial for trial in found.fit.starts if len(trial.path)]
+    names = result.fit.free
+    trials = [trial for trial in result.fit.starts if len(trial.path)]
     figure = Figure((3.4 * (1 + len(names)), 2.6), layout='constrained')
     grid = figure.subplots(1, 1 + len(names), squeeze=False)
     for number, trial in enumerate(trials):
@@ -216,37 +216,37 @@ FIGURES = (('The recording', stretch),
            ('Convergence', convergence))
 
 
-def _stride(found: RecordingFit) -> list[str]:
-    stride, fit = found.stride, found.fit
+def _stride(result: RecordingFit) -> list[str]:
+    stride, fit = result.stride, result.fit
     return [
-        f'{found.recording.source}: {len(found.recording.times)} samples, '
-        f'{found.recording.times[-1]:.2f} s; {found.read}.',
+        f'{result.recording.source}: {len(result.recording.times)} samples, '
+        f'{result.recording.times[-1]:.2f} s; {result.read}.',
         f'Steady from {stride.begin:.2f} to {stride.end:.2f} s, whole strides: {stride.cycles}, '
         f'at {stride.frequency:.4f} +- {stride.frequency_error:.1g} Hz.',
         'Phases [cycles]: ' + ', '.join(f'{leg} {phase:.3f}'
                                         for leg, phase in stride.phases.items())
         + f': {stride.verdict} ({stride.distance:.3f} of a cycle off, the next one '
         f'{stride.margin:.3f} further).',
-        f'Confidence in {stride.nearest} and this frequency: {found.confidence:.0%}.',
+        f'Confidence in {stride.nearest} and this frequency: {result.confidence:.0%}.',
         f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}, '
         f'{100.0 * fit.mean_rms_share:.1f} % of the range left on average'
-        f'{": a poor fit" if found.poor else ""}.']
+        f'{": a poor fit" if result.poor else ""}.']
 
 
-def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
+def parameters(result: RecordingFit) -> list[tuple[str, ...]]:
     """Return rows of the fitted parameters, with a head."""
     rows: list[tuple[str, ...]] = [('parameter', 'value', 'standard error', '95 % interval')]
-    for name, one in found.fit.parameters.items():
-        rows.append((name, f'{one.value:.6g}', f'{one.stderr:.2g}',
-                     f'{one.low:.6g} to {one.high:.6g}'
-                     + ('' if one.bounded else ': cannot tell' if found.fit.model_error else
+    for name, estimate in result.fit.parameters.items():
+        rows.append((name, f'{estimate.value:.6g}', f'{estimate.stderr:.2g}',
+                     f'{estimate.low:.6g} to {estimate.high:.6g}'
+                     + ('' if estimate.bounded else ': cannot tell' if result.fit.model_error else
                         ' (not bounded by the data)')))
     return rows
 
 
-def joints(found: RecordingFit) -> list[tuple[str, ...]]:
+def joints(result: RecordingFit) -> list[tuple[str, ...]]:
     """Return rows of the joints' errors, with a head."""
-    fit = found.fit
+    fit = result.fit
     rms, fraction = fit.rms, fit.rms_share
     rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'share of range')]
     return rows + [(name, str(fit.cells[name]), f'{rms[name]:.4f}',
@@ -254,11 +254,11 @@ def joints(found: RecordingFit) -> list[tuple[str, ...]]:
                    for name in fit.joints]
 
 
-def starts(found: RecordingFit) -> list[tuple[str, ...]]:
+def starts(result: RecordingFit) -> list[tuple[str, ...]]:
     """Return rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
-    names = found.fit.free
+    names = result.fit.free
     rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
-    for trial in found.fit.starts:
+    for trial in result.fit.starts:
         begin, end = (', '.join(f'{name} {value:.4f}' for name, value
                                 in zip(names, values, strict=False))
                       for values in (trial.start, trial.values))
@@ -266,16 +266,16 @@ def starts(found: RecordingFit) -> list[tuple[str, ...]]:
     return rows
 
 
-def _minima(found: RecordingFit) -> str:
-    fit = found.fit
+def _minima(result: RecordingFit) -> str:
+    fit = result.fit
     return 'Distinct minima of the starts: ' + '; '.join(
         ', '.join(f'{name} {value:.4g}' for name, value in
                   zip(fit.free, trial.values, strict=False)) + f' ({trial.cost:.6g})'
         for trial in fit.minima) + '.'
 
 
-def _judged(found: RecordingFit) -> list[str]:
-    fit = found.fit
+def _judged(result: RecordingFit) -> list[str]:
+    fit = result.fit
     lines = []
     if fit.hopf is not None:
         lines.append(f'The {fit.gait} is born at the critical delay {fit.hopf.value:.4f}; '
@@ -291,23 +291,23 @@ def _judged(found: RecordingFit) -> list[str]:
     return lines
 
 
-def _shares(found: RecordingFit) -> str:
+def _shares(result: RecordingFit) -> str:
     return 'Mean RMS error over range by order of the readout: ' + ', '.join(
-        f'{order}: {100 * fraction:.2f} %' for order, fraction in found.fractions.items()) + '.'
+        f'{order}: {100 * fraction:.2f} %' for order, fraction in result.fractions.items()) + '.'
 
 
-def as_text(found: RecordingFit) -> str:
+def as_text(result: RecordingFit) -> str:
     """Return the report for a terminal."""
-    notes = [*found.recording.notes, *found.stride.notes]
-    legs = stride_report.strides_of(found)
-    lines = [*_stride(found), '', *table(stride_report.gait_summary(found, legs), '<>'), '',
-             *table(stride_report.ranges(found), '<>>>>'), '',
-             *table(parameters(found), '<>>'), '',
-             *table(joints(found), '<>>>'), _shares(found), '']
-    if len(found.fit.starts) > 1:
-        lines += [*table(starts(found), '<>>'), _minima(found), '']
-    lines += [*_judged(found), *(f'note: {note}' for note in notes),
-              *(f'warning: {warning}' for warning in found.warnings)]
+    notes = [*result.recording.notes, *result.stride.notes]
+    legs = stride_report.strides_of(result)
+    lines = [*_stride(result), '', *table(stride_report.gait_summary(result, legs), '<>'), '',
+             *table(stride_report.ranges(result), '<>>>>'), '',
+             *table(parameters(result), '<>>'), '',
+             *table(joints(result), '<>>>'), _shares(result), '']
+    if len(result.fit.starts) > 1:
+        lines += [*table(starts(result), '<>>'), _minima(result), '']
+    lines += [*_judged(result), *(f'note: {note}' for note in notes),
+              *(f'warning: {warning}' for warning in result.warnings)]
     return '\n'.join(lines)
 
 
@@ -321,9 +321,9 @@ def as_table(fits: list[PaperFit]) -> list[str]:
 
     rows: list[tuple[str, ...]] = [('initial value', 'iterations', 'error f [rad^2]',
                                     'numerical solution')]
-    rows += [(values(one.start), str(one.fit.trial.iterations), f'{one.fit.cost:.4f}',
-              values(one.end)) for one in fits]
-    best = min(fits, key=lambda one: one.fit.cost)
+    rows += [(values(fit.start), str(fit.fit.trial.iterations), f'{fit.fit.cost:.4f}',
+              values(fit.end)) for fit in fits]
+    best = min(fits, key=lambda fit: fit.fit.cost)
     ranges = ', '.join(f'{name} [{low:.3f}, {high:.3f}]'
                        for name, (low, high) in best.errors.items())
     return ['', 'As Liu & Zhang (2024) fit, eight joints taken for the eight cells:',
@@ -341,21 +341,21 @@ def _image(figure: Figure, name: str) -> str:
     return image(out.getvalue(), name)
 
 
-def _warned(found: RecordingFit) -> str:
+def _warned(result: RecordingFit) -> str:
     """Return the warnings, before anything else; red where the fit is poor."""
-    if not found.warnings:
+    if not result.warnings:
         return ''
     return html_table(['Warnings'], [
-        f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}</td></tr>'
-        for text in found.warnings])
+        f'<tr class="{"fails" if result.poor else "erratum"}"><td>{escape(text)}</td></tr>'
+        for text in result.warnings])
 
 
-def _strides(found: RecordingFit) -> list[str]:
+def _strides(result: RecordingFit) -> list[str]:
     """Return the sections on the gait and its strides; the table of single strides is folded."""
-    legs = stride_report.strides_of(found)
-    parts = ['<h2>Gait</h2>', _html_table(stride_report.gait_summary(found, legs)),
-             _image(stride_curves(found), 'Angles over the stride'),
-             _html_table(stride_report.ranges(found)),
+    legs = stride_report.strides_of(result)
+    parts = ['<h2>Gait</h2>', _html_table(stride_report.gait_summary(result, legs)),
+             _image(stride_curves(result), 'Angles over the stride'),
+             _html_table(stride_report.ranges(result)),
              '<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
              _html_table(stride_report.by_leg(legs))]
     if len(pairs := stride_report.symmetry(legs)) > 1:
@@ -364,19 +364,20 @@ def _strides(found: RecordingFit) -> list[str]:
             _html_table(stride_report.every_stride(legs)), '</details>']
 
 
-def as_html(found: RecordingFit) -> str:
+def as_html(result: RecordingFit) -> str:
     """Return the report as one page with its figures in it."""
     def paragraphs(lines: list[str]) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
 
-    title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
-    parts = [_warned(found), paragraphs(_stride(found)), *_strides(found), '<h2>Parameters</h2>',
-             _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
-             paragraphs([_shares(found)]), _html_table(joints(found))]
+    title = f'{result.fit.gait} at {result.stride.frequency:.3f} Hz: {result.recording.source}'
+    parts = [_warned(result), paragraphs(_stride(result)), *_strides(result),
+             '<h2>Parameters</h2>',
+             _html_table(parameters(result)), paragraphs(_judged(result)), '<h2>Joints</h2>',
+             paragraphs([_shares(result)]), _html_table(joints(result))]
     for name, draw in FIGURES:
-        parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
-    parts += ['<h2>Starts</h2>', _html_table(starts(found)), paragraphs([_minima(found)])]
-    notes = [*found.recording.notes, *found.stride.notes]
+        parts += [f'<h2>{escape(name)}</h2>', _image(draw(result), name)]
+    parts += ['<h2>Starts</h2>', _html_table(starts(result)), paragraphs([_minima(result)])]
+    notes = [*result.recording.notes, *result.stride.notes]
     if notes:
         parts += ['<h2>Notes</h2>', paragraphs(notes)]
     return page(title, parts)

@@ -39,15 +39,15 @@ LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.
 LEAST, MOST = 2, 3
 
 
-def _tried(problem: CycleProblem, k: int, one: Free, here: float) -> tuple[float, ...]:
+def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple[float, ...]:
     """Return the coordinates of a free number that are tried besides its own."""
-    if one.name == GAIT_DUTY:
+    if parameter.name == GAIT_DUTY:
         return DUTIES
     if k == problem.coordinates.delay:
         return LATE
-    low, high = one.low, one.high
+    low, high = parameter.low, parameter.high
     if 0.0 < low < high <= NARROW * low:
-        return tuple(low + place * (high - low) for place in PLACES)
+        return tuple(low + fraction * (high - low) for fraction in PLACES)
     return tuple(factor * here for factor in FACTORS)
 
 
@@ -67,31 +67,31 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
         here = problem.coordinates.of(begin)[:-1]
     except NoOrbit:
         return [begin]
-    axes = [np.unique([value, *_tried(problem, k, one, float(value))])
-            for k, (one, value) in enumerate(zip(problem.free, here, strict=True))]
+    axes = [np.unique([value, *_tried(problem, k, parameter, float(value))])
+            for k, (parameter, value) in enumerate(zip(problem.free, here, strict=True))]
     grid = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1)
     explained, starts = np.full(grid.shape[:-1], -np.inf), {}
     own = [int(np.abs(axis - value).argmin()) for axis, value in zip(axes, here, strict=True)]
     # The nearest ones first, an orbit leads to the next; one of the network's numbers is moved at
     # a time, as an orbit takes far longer than a readout.
     far = np.sum(np.abs(grid - here) / (np.abs(here) + TINY), axis=-1)
-    for place in sorted(np.ndindex(far.shape), key=lambda one: float(far[one])):
-        if sum(k != at for k, at, one in zip(place, own, problem.free, strict=True)
-               if one.members) > 1:
+    for index in sorted(np.ndindex(far.shape), key=lambda parameter: float(far[parameter])):
+        if sum(k != at for k, at, parameter in zip(index, own, problem.free, strict=True)
+               if parameter.members) > 1:
             continue
         with suppress(NoOrbit):
-            values = problem.coordinates.values(np.append(grid[place], 0.0))
-            if all(one.low <= value <= one.high
-                   for one, value in zip(problem.free, values, strict=False)):
-                values[-1], explained[place] = problem.explained(values)
+            values = problem.coordinates.values(np.append(grid[index], 0.0))
+            if all(parameter.low <= value <= parameter.high
+                   for parameter, value in zip(problem.free, values, strict=False)):
+                values[-1], explained[index] = problem.explained(values)
                 problem.hold(values)
-                starts[place] = values
+                starts[index] = values
     if not starts:
         return [begin]
-    ranked = sorted(starts, key=lambda place: -explained[place])
-    best = [place for place in ranked if _highest(explained, place)][:MOST]
-    best += [place for place in ranked if place not in best][:max(LEAST - len(best), 0)]
-    return [starts[place] for place in ranked if place in (tuple(own), *best)]
+    ranked = sorted(starts, key=lambda index: -explained[index])
+    best = [index for index in ranked if _highest(explained, index)][:MOST]
+    best += [index for index in ranked if index not in best][:max(LEAST - len(best), 0)]
+    return [starts[index] for index in ranked if index in (tuple(own), *best)]
 
 
 def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
@@ -99,7 +99,7 @@ def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
 
     A free readout makes the same motion of it: stance takes the part of swing.
     """
-    fractions = [k for k, one in enumerate(problem.free) if one.name in SHARES]
+    fractions = [k for k, parameter in enumerate(problem.free) if parameter.name in SHARES]
     if not fractions:
         return None
     there = values.copy()
@@ -109,7 +109,7 @@ def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
     return there
 
 
-def _highest(explained: np.ndarray, place: tuple[int, ...]) -> bool:
+def _highest(explained: np.ndarray, index: tuple[int, ...]) -> bool:
     """Return whether no neighbour on the grid explains more."""
-    near = explained[tuple(slice(max(k - 1, 0), k + 2) for k in place)]
-    return bool(explained[place] >= near.max())
+    near = explained[tuple(slice(max(k - 1, 0), k + 2) for k in index)]
+    return bool(explained[index] >= near.max())

@@ -84,20 +84,20 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
     """
     bounds = dict(bounds or {})
     families = network.families(network.symmetry(gait))
-    known = (*network.parameters(), *network.groups)
-    found: list[Free] = []
+    valid = (*network.parameters(), *network.groups)
+    free: list[Free] = []
     if not names or isinstance(names, str):
-        raise InputError(f'no names of parameters to fit; there are {", ".join(known)}')
+        raise InputError(f'no names of parameters to fit; there are {", ".join(valid)}')
     if len(set(names)) < len(names):
         raise InputError(f"names are '{', '.join(names)}'; they must be different ones")
     for name in names:
-        if name not in known:
+        if name not in valid:
             raise InputError(f"'{name}' is not one of the parameters of {network.name}: "
-                             f'{", ".join(known)}')
+                             f'{", ".join(valid)}')
         members = network.groups.get(name, (name,))
         members = tuple(dict.fromkeys(
             member for family in families if set(family) & set(members) for member in family))
-        taken = [other.name for other in found if set(other.members) & set(members)]
+        taken = [other.name for other in free if set(other.members) & set(members)]
         if taken:
             raise InputError(f'{name} is the same as {taken[0]}, which is free already')
         low = max(network.ranges[member].low for member in members)
@@ -108,36 +108,36 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
                 raise InputError(f'{name}: bounds {least:g} to {most:g} are not in order within '
                                  f'{low:g} to {high:g}')
             low, high = least, most
-        found.append(Free(name, members, low, high))
+        free.append(Free(name, members, low, high))
     if bounds:
         raise InputError(f"'{next(iter(bounds))}' has bounds but is not free")
-    return tuple(found)
+    return tuple(free)
 
 
 def with_values(network: N, free: Sequence[Free], values: Sequence[float] | np.ndarray) -> N:
     """Return the network with values for its free numbers, in their order."""
     return replace(network, **{  # type: ignore[type-var]
-        member: float(value) for one, value in zip(free, values, strict=True)
-        for member in one.members})
+        member: float(value) for parameter, value in zip(free, values, strict=True)
+        for member in parameter.members})
 
 
-def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
+def within_hopf_set(network: Network, gait: str, parameter: Free) -> Free:
     """Narrow the bounds of a single free number to where its gait is born before the delay.
 
     The bounds of networks without a delay stay.
     """
     if not network.delay_parameter:
-        return one
+        return parameter
 
     def excess(value: float) -> float:
-        there = with_values(network, (one,), (value,))
+        there = with_values(network, (parameter,), (value,))
         if there.delay <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
             return -1.0
         point = first_hopf(there, gait)
         return -1.0 if point is None or point.drifts else there.delay - point.value
 
-    here, ends = one.value(network), []
-    for end in (one.low, one.high):
+    here, ends = parameter.value(network), []
+    for end in (parameter.low, parameter.high):
         inside = here
         for outside in np.linspace(here, end, PLACES)[1:]:
             if excess(float(outside)) <= 0.0:
@@ -148,7 +148,7 @@ def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
                 break
             inside = float(outside)
         ends.append(inside)
-    return Free(one.name, one.members, *ends)
+    return Free(parameter.name, parameter.members, *ends)
 
 
 # A trust region from one start, with a record of its path.
@@ -227,10 +227,10 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
         path.append(np.append(0.5 * left @ left, values))
         return slopes
 
-    found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
+    result = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
                           ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
-    return Minimisation(start, found.x, float(found.cost), np.array(path), evaluations,
-                        found.status > 0)
+    return Minimisation(start, result.x, float(result.cost), np.array(path), evaluations,
+                        result.status > 0)
 
 
 #: ABOVE: least relative distance of the delay above the critical one.
@@ -252,9 +252,9 @@ class Coordinates:
     def __init__(self, network: Network, gait: str, free: Sequence[Free]) -> None:
         self._network, self._gait, self.free = network, gait, tuple(free)
         whole = network.ranges.get(network.delay_parameter)
-        self.delay = next((k for k, one in enumerate(free) if whole
-                            and one.name == network.delay_parameter
-                            and (one.low, one.high) == (whole.low, whole.high)), -1)
+        self.delay = next((k for k, parameter in enumerate(free) if whole
+                            and parameter.name == network.delay_parameter
+                            and (parameter.low, parameter.high) == (whole.low, whole.high)), -1)
 
     @property
     def straight(self) -> bool:
@@ -265,39 +265,39 @@ class Coordinates:
         there = with_values(self._network, self.free, values[:len(self.free)])
         point = first_hopf(there, self._gait) if np.isfinite(values).all() else None
         if point is None:
-            known = there.as_dict()
-            values_text = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
+            start = there.as_dict()
+            values_text = ', '.join(f'{name} {start[name]:g}' for name in there.needed)
             raise NoOrbit(f'{values_text} gives no {self._gait} at any delay')
         return point
 
     def of(self, values: np.ndarray) -> np.ndarray:
         """Coordinates of values; NoOrbit where the gait is born at no delay."""
-        found = np.array(values, dtype=float)
+        coordinates = np.array(values, dtype=float)
         if not self.straight:
-            found[self.delay] /= self._onset(found).value
-        return found
+            coordinates[self.delay] /= self._onset(coordinates).value
+        return coordinates
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
         """Return values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
-        found = np.array(coordinates, dtype=float)
+        values = np.array(coordinates, dtype=float)
         if not self.straight:
-            found[self.delay] *= self._onset(found).value
-            one = self.free[self.delay]
-            if not one.low <= found[self.delay] <= one.high:
-                raise NoOrbit(f'{one.name} {found[self.delay]:g} is not within {one.low:g} to '
-                              f'{one.high:g}')
-        return found
+            values[self.delay] *= self._onset(values).value
+            delay = self.free[self.delay]
+            if not delay.low <= values[self.delay] <= delay.high:
+                raise NoOrbit(f'{delay.name} {values[self.delay]:g} is not within {delay.low:g} '
+                              f'to {delay.high:g}')
+        return values
 
     def slopes(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the derivatives of the values by the coordinates, shape (n, n)."""
-        found = np.eye(coordinates.size)
+        matrix = np.eye(coordinates.size)
         if not self.straight:
             point, k = self._onset(coordinates), self.delay
             slopes = point.slopes
-            for j, one in enumerate(self.free):
-                found[k, j] = coordinates[k] * slopes.get(one.name, 0.0)
-            found[k, k] = point.value
-        return found
+            for j, parameter in enumerate(self.free):
+                matrix[k, j] = coordinates[k] * slopes.get(parameter.name, 0.0)
+            matrix[k, k] = point.value
+        return matrix
 
     def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Move values by a step along straight lines of the coordinates, within the bounds."""

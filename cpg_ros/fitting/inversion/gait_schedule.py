@@ -97,8 +97,8 @@ def _points(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride:
     turn = np.exp(-2j * np.pi * phases[whole])
     sums = []
     for leg in stride.phases:
-        name = max((one for one in legs[leg] if one in stride.joints),
-                   key=lambda one: float(np.ptp(stride.mean[stride.joints.index(one)])))
+        name = max((joint for joint in legs[leg] if joint in stride.joints),
+                   key=lambda joint: float(np.ptp(stride.mean[stride.joints.index(joint)])))
         x = recording.positions[inside, joints.index(name)][whole]
         x = np.where(np.isfinite(x), x - np.nanmean(x), 0.0) * turn
         sums.append(np.bincount(number[whole], x.real, last - first)
@@ -166,7 +166,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
         kind = with_legs_of(find_network(_network(recording, robot, network)), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    found: list[tuple[float, float, Stride]] = []
+    strides: list[tuple[float, float, Stride]] = []
     remains = [(0.0, float(recording.times[-1]))]
     why: NoSteadyGait | None = None
     longest: Stride | None = None
@@ -191,15 +191,15 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
         first, last = origin + stride.begin, origin + stride.end
         longest = longest or stride
         if stride.cycles >= SURE:
-            found.append((first, last, stride))
+            strides.append((first, last, stride))
         remains += _longer((begin, first), (last, end))
-    if not found:
+    if not strides:
         raise why or NoSteadyGait(f'{recording.source}: no steady gait of {SURE:g} strides'
                                   + (f', only of {longest.cycles}, of '
                                      f'{1.0 / longest.frequency:.3g} s each: record '
                                      f'{SURE / longest.frequency:.2g} s or more'
                                      if longest else ''))
-    return sorted(found, key=lambda one: one[0])
+    return sorted(strides, key=lambda piece: piece[0])
 
 
 def _network(recording: Recording, robot: Robot | None, network: str) -> str:
@@ -228,7 +228,7 @@ def fit_stretches(recording: Recording, robot: Robot | None = None, network: str
         CpgError: as of cut.
 
     """
-    name, found = _network(recording, robot, network), []
+    name, fits = _network(recording, robot, network), []
     stretches = cut(recording, robot, network)
     for k, (begin, end, stride) in enumerate(stretches):
         part = replace(recording.between(begin, end),
@@ -238,20 +238,20 @@ def fit_stretches(recording: Recording, robot: Robot | None = None, network: str
             done((before + fraction) / len(stretches))
         try:
             fit = fit_recording(part, robot, name, order=order, done=so_far)
-            found.append(StretchFit(begin, end, fit.stride, fit))
+            fits.append(StretchFit(begin, end, fit.stride, fit))
         except CpgError as error:
-            found.append(StretchFit(begin, end, stride, None, str(error)))
-    return found
+            fits.append(StretchFit(begin, end, stride, None, str(error)))
+    return fits
 
 
-def stretch_rows(found: Sequence[StretchFit]) -> list[tuple[str, ...]]:
+def stretch_rows(fits: Sequence[StretchFit]) -> list[tuple[str, ...]]:
     """Return stretches as a table, with its head."""
     rows: list[tuple[str, ...]] = [('begin [s]', 'end [s]', 'gait', 'frequency [Hz]', 'strides',
                                     'confidence', 'RMS error')]
-    return rows + [(f'{one.begin:.2f}', f'{one.end:.2f}', one.stride.verdict,
-                    f'{one.stride.frequency:.4f}', str(one.stride.cycles),
-                    f'{one.confidence:.3f}', 'not fitted' if one.fit is None else
-                    f'{100.0 * one.fit.fit.mean_rms_share:.1f} %') for one in found]
+    return rows + [(f'{stretch.begin:.2f}', f'{stretch.end:.2f}', stretch.stride.verdict,
+                    f'{stretch.stride.frequency:.4f}', str(stretch.stride.cycles),
+                    f'{stretch.confidence:.3f}', 'not fitted' if stretch.fit is None else
+                    f'{100.0 * stretch.fit.fit.mean_rms_share:.1f} %') for stretch in fits]
 
 
 #: SAME: relative difference of frequencies up to which two stretches share an entry.
@@ -299,10 +299,10 @@ def schedule_of(stretches: Sequence[StretchFit], robot: str) -> GaitSchedule:
         InputError: no stretch has a fit.
 
     """
-    fitted = [(one, one.fit) for one in stretches if one.fit is not None]
+    fitted = [(stretch, stretch.fit) for stretch in stretches if stretch.fit is not None]
     if not fitted:
         raise InputError('no stretch could be fitted: ' + '; '.join(
-            dict.fromkeys(one.why for one in stretches)))
+            dict.fromkeys(stretch.why for stretch in stretches)))
     entries = [Entry(0.0, running_parameters(fitted[0][1]))]
     for (before, old), (after, new) in itertools.pairwise(fitted):
         same = (old.fit.gait == new.fit.gait
@@ -325,20 +325,20 @@ def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
 
     """
     longest: dict[str, RecordingFit] = {}
-    for one in sorted(stretches, key=lambda one: one.begin - one.end):
-        if one.fit is not None:
-            longest.setdefault(one.fit.fit.gait, one.fit)
+    for stretch in sorted(stretches, key=lambda stretch: stretch.begin - stretch.end):
+        if stretch.fit is not None:
+            longest.setdefault(stretch.fit.fit.gait, stretch.fit)
     made = [fitted_robot(fit, robot) for fit in longest.values()]
     # Without a robot file each stretch gives limits of its own.
     bounds = {joint.name: joint for joint in made[0].joints}
     for joint in itertools.chain.from_iterable(other.joints for other in made[1:]):
-        known = bounds[joint.name]
-        bounds[joint.name] = replace(known, lower=min(known.lower, joint.lower),
-                                     upper=max(known.upper, joint.upper),
-                                     velocity=max(known.velocity, joint.velocity))
+        bound = bounds[joint.name]
+        bounds[joint.name] = replace(bound, lower=min(bound.lower, joint.lower),
+                                     upper=max(bound.upper, joint.upper),
+                                     velocity=max(bound.velocity, joint.velocity))
     motions = made[0].motions | {
-        gait: fitted_motion(fit, None) if robot is None else one.motions[gait]
-        for (gait, fit), one in zip(longest.items(), made, strict=True)}
+        gait: fitted_motion(fit, None) if robot is None else stretch.motions[gait]
+        for (gait, fit), stretch in zip(longest.items(), made, strict=True)}
     legs = {leg: tuple(bounds[joint.name] for joint in joints)
             for leg, joints in made[0].legs.items()}
     return replace(made[0], legs=legs, motions=motions)
@@ -356,10 +356,10 @@ def write_schedule(path: Path, stretches: Sequence[StretchFit], robot: Robot | N
     """
     beside = robot_file_of(path)
     schedule, moved = schedule_of(stretches, str(beside.resolve())), robot_of(stretches, robot)
-    fits = [one.fit for one in stretches if one.fit is not None]
+    fits = [item.fit for item in stretches if item.fit is not None]
     summary = f'gaits of {fits[0].recording.source.rpartition(", ")[0]}'
     tree = {'network': schedule.network, 'robot': schedule.robot, 'schedule': [
-        {'at': one.at, 'parameters': one.parameters} for one in schedule.entries]}
+        {'at': item.at, 'parameters': item.parameters} for item in schedule.entries]}
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         joints = Path(folder, beside.name)
         write_robot(joints, moved, summary)

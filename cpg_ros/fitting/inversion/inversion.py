@@ -91,7 +91,7 @@ exit codes: 0 fitted, 1 no steady gait or none that fits, 2 invalid arguments or
 
 
 def _parser() -> Parser:
-    *contents, last = (one.contents for one in FORMATS.values())
+    *contents, last = (form.contents for form in FORMATS.values())
     parser = Parser(
         prog='inversion', description=fill(DESCRIPTION.format(
             f'{", ".join(contents)}, or {last}'), 98), epilog=EPILOG)
@@ -202,9 +202,9 @@ def _invert_many(args: Namespace, robot: Robot | None, starts: list[dict[str, fl
             summary = work.watch(fleet, report) if args.watch else work.run(fleet)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(KEPT) from None
-    kept = f'; {summary.kept} were done before' if summary.kept else ''
+    resumed = f'; {summary.kept} were done before' if summary.kept else ''
     say(f'{summary.done} recordings, {summary.done - summary.failed} fitted, '
-        f'{summary.failed} not (the table says why){kept}\n'
+        f'{summary.failed} not (the table says why){resumed}\n'
         f'written: {", ".join(map(str, summary.written))}')
     return 0 if summary.failed < summary.done else 1
 
@@ -222,25 +222,28 @@ def _invert(args: Namespace) -> int:
         return _scheduled(args, recording, robot)
     network, compared = _explained(args, recording, robot)
     with progress_bar('fitting', 100) as bar:
-        found = fit_recording(recording, robot, network, args.gait or '',
+        result = fit_recording(recording, robot, network, args.gait or '',
                               free=args.free, order=args.order,
                               preset=args.preset or '', starts=starts,
                               done=lambda fraction: bar(round(100.0 * fraction)))
-    fits = _paper(args, found, starts)
-    written = _written(args, found, robot)
+    fits = _paper(args, result, starts)
+    written = _written(args, result, robot)
     if args.json:
-        say(as_json({**found.as_dict(), **({'networks': [{
-            key: value for key, value in vars(one).items() if value != float('inf')}
-            for one in compared]} if compared else {}), **({'paper': [{
-                'start': one.start, 'end': one.end, 'iterations': one.fit.trial.iterations,
-                'error': one.fit.cost, 'synchronisation_errors': one.errors} for one in fits]}
+        say(as_json({**result.as_dict(), **({'networks': [{
+            key: value for key, value in vars(comparison).items() if value != float('inf')}
+            for comparison in compared]} if compared else {}), **({'paper': [{
+                'start': comparison.start, 'end': comparison.end,
+                'iterations': comparison.fit.trial.iterations,
+                'error': comparison.fit.cost,
+                'synchronisation_errors': comparison.errors} for comparison in fits]}
             if args.paper else {})}))
     else:
         from cpg_ros.fitting.inversion.fit_report import as_table, as_text
         judged = [*table(as_rows(compared), '<<>>>><'), '',
-                  *([one, ''] if (one := indistinguishable(compared, args.order)) else [])
+                  *([comparison, ''] if (comparison := indistinguishable(compared, args.order))
+                    else [])
                   ] if compared else []
-        text = '\n'.join([*judged, as_text(found), *as_table(fits)])
+        text = '\n'.join([*judged, as_text(result), *as_table(fits)])
         say(f'{text}\nwritten: {", ".join(map(str, written))}' if written else text)
     return 0
 
@@ -248,18 +251,18 @@ def _invert(args: Namespace) -> int:
 def _scheduled(args: Namespace, recording: Recording, robot: Robot | None) -> int:
     """Fit every stretch, and write the changes between them."""
     with progress_bar('fitting', 100) as bar:
-        found = fit_stretches(recording, robot, args.network or '', order=args.order,
+        stretches = fit_stretches(recording, robot, args.network or '', order=args.order,
                               done=lambda fraction: bar(round(100.0 * fraction)))
-    written = write_schedule(args.schedule, found, robot)
+    written = write_schedule(args.schedule, stretches, robot)
     if args.json:
-        say(as_json([{'begin': one.begin, 'end': one.end, 'gait': one.gait,
-                      'frequency': one.stride.frequency, 'confidence': one.confidence,
-                      'rms_share': one.fit.fit.mean_rms_share if one.fit else None,
-                      'why': one.why or None} for one in found]))
+        say(as_json([{'begin': stretch.begin, 'end': stretch.end, 'gait': stretch.gait,
+                      'frequency': stretch.stride.frequency, 'confidence': stretch.confidence,
+                      'rms_share': stretch.fit.fit.mean_rms_share if stretch.fit else None,
+                      'why': stretch.why or None} for stretch in stretches]))
         return 0
-    say('\n'.join([*table(stretch_rows(found), '>><>>>>'), *(
-        f'warning: {one.begin:.2f} to {one.end:.2f} s: {line}' for one in found
-        for line in ((one.why,) if one.fit is None else one.fit.warnings)),
+    say('\n'.join([*table(stretch_rows(stretches), '>><>>>>'), *(
+        f'warning: {stretch.begin:.2f} to {stretch.end:.2f} s: {line}' for stretch in stretches
+        for line in ((stretch.why,) if stretch.fit is None else stretch.fit.warnings)),
         f'written: {", ".join(map(str, written))}']))
     return 0
 
@@ -270,34 +273,34 @@ def _explained(args: Namespace, recording: Recording, robot: Robot | None
     if args.network != 'auto':
         return args.network or '', []
     with progress_bar('comparing networks', 100) as bar:
-        found = compare_networks(recording, robot, args.order,
+        comparisons = compare_networks(recording, robot, args.order,
                                  done=lambda fraction: bar(round(100.0 * fraction)))
-    if found[0].why:
+    if comparisons[0].why:
         raise InputError(f'{recording.source}: no network has such a gait: ' + '; '.join(
-            f'{one.network}: {one.why}' for one in found))
-    return found[0].network, found
+            f'{comparison.network}: {comparison.why}' for comparison in comparisons))
+    return comparisons[0].network, comparisons
 
 
-def _paper(args: Namespace, found: RecordingFit, starts: list[dict[str, float]]
+def _paper(args: Namespace, result: RecordingFit, starts: list[dict[str, float]]
            ) -> list[PaperFit]:
     """Fit as the paper does, if --paper is given."""
     if not args.paper:
         return []
-    network = preset_of(found.fit.network.name, args.preset or found.fit.gait).network
-    return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
-                      [name for name in found.fit.parameters if name != GAIT_DUTY],
+    network = preset_of(result.fit.network.name, args.preset or result.fit.gait).network
+    return paper_fits(result.stride, result.fit.cells, network, result.fit.gait,
+                      [name for name in result.fit.parameters if name != GAIT_DUTY],
                       starts or [{}])
 
 
-def _written(args: Namespace, found: RecordingFit, robot: Robot | None) -> list[Path]:
-    written = [] if args.out is None else write_fitted(args.out, found, robot)
+def _written(args: Namespace, result: RecordingFit, robot: Robot | None) -> list[Path]:
+    written = [] if args.out is None else write_fitted(args.out, result, robot)
     if args.report is not None:
         if args.report.suffix == '.csv':
-            text = as_csv(found)
+            text = as_csv(result)
         else:
             # matplotlib takes half a second, and only pages need it.
             from cpg_ros.fitting.inversion.fit_report import as_html
-            text = as_html(found)
+            text = as_html(result)
         write_atomically(args.report, text)
         written.append(args.report)
     return written

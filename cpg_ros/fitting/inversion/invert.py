@@ -71,64 +71,66 @@ WIDE = 0.1
 TOGETHER, AT_BOUND = 0.95, 1e-5
 
 
-def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
+def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Spread,
              model: ModelError, times: float, best: Minimisation) -> list[str]:
     """List the caveats of a fit.
 
     Args:
         free: the free numbers.
         estimates: of them.
-        known: their covariance, and that of the phase.
+        spread: their covariance, and that of the phase.
         model: what errors of the model add to it.
         times: the residual over its standard errors.
         best: the start that led to the fit.
 
     """
-    found = []
+    lines = []
     if model.size > 0.0:
-        bounded = [name for name, one in estimates.items() if one.bounded]
+        bounded = [name for name, estimate in estimates.items() if estimate.bounded]
         unknown = [name for name in estimates if name not in bounded]
         clauses = [f'the intervals of {_listed(bounded)} include that'] if bounded else []
         if unknown:
             clauses.append(f'{_listed(unknown)}: cannot tell')
-        found.append(
+        lines.append(
             f'the model is not what was recorded: it leaves {times:.3g} times the noise, as '
             f'waveforms that are off by {100.0 * model.size:.2g} % would; {"; ".join(clauses)}')
-    for row in known.blind:
-        blind = [one.name for one,
+    for row in spread.blind:
+        blind = [estimate.name for estimate,
                  fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]
         if len(blind) == 1:
-            found.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
+            lines.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
         elif blind:
-            moves = row[:len(free)] * known.scale[:len(free)]
+            moves = row[:len(free)] * spread.scale[:len(free)]
             moves = moves / np.abs(moves).max()
-            ways = ', '.join(f'{one.name} by {move:+.3g}' for one, move
-                             in zip(free, moves, strict=True) if one.name in blind)
-            found.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
+            ways = ', '.join(f'{estimate.name} by {move:+.3g}' for estimate, move
+                             in zip(free, moves, strict=True) if estimate.name in blind)
+            lines.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
                          'changes nothing that was recorded')
-    for k, (name, one) in enumerate(estimates.items()):
+    for k, (name, estimate) in enumerate(estimates.items()):
         room = AT_BOUND * (free[k].high - free[k].low)
         for end, bound in (('lower', free[k].low), ('upper', free[k].high)):
-            if abs(one.value - bound) <= room:
-                found.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
+            if abs(estimate.value - bound) <= room:
+                lines.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
                              'one-sided')
-        if not model.size and np.isfinite(one.stderr) and (not one.bounded or max(
-                one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
-            found.append(
-                f'{name} is poorly identifiable: any value from {one.low:.4g} to {one.high:.4g} '
-                'fits as well' + ('' if one.bounded else ', and the range ends there only because '
+        if not model.size and np.isfinite(estimate.stderr) and (not estimate.bounded or max(
+                estimate.high - estimate.value,
+                estimate.value - estimate.low) > WIDE * abs(estimate.value)):
+            lines.append(
+                f'{name} is poorly identifiable: any value from {estimate.low:.4g} to '
+                f'{estimate.high:.4g} fits as well'
+                + ('' if estimate.bounded else ', and the range ends there only because '
                              'its bound is reached or the gait ceases to exist')
                 + '; with a free readout, it affects only the shape of the waveform')
-    errors = known.correlation
+    errors = spread.correlation
     for k in range(len(free)):
         for other in range(k):
             if abs(errors[k, other]) > TOGETHER:
-                found.append(f'{free[other].name} and {free[k].name} are strongly correlated: '
+                lines.append(f'{free[other].name} and {free[k].name} are strongly correlated: '
                              f'{errors[k, other]:.3f}')
     if not best.converged:
-        found.append(f'the trust region was stopped after {best.evaluations} evaluations, '
+        lines.append(f'the trust region was stopped after {best.evaluations} evaluations, '
                      'before it had converged')
-    return found
+    return lines
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -198,8 +200,9 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     runs, flaw = _that_runs(problem, [values, *others], best.path[:, 1:])
     warnings = [] if problem.readout.weights else [
         'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
-            f'{free.name} {value:.4g}' for free, value in zip(problem.free, one, strict=False))
-        + ' fits as well, all joints reversed' for one in turned]
+            f'{free.name} {value:.4g}' for free,
+            value in zip(problem.free, candidate, strict=False))
+        + ' fits as well, all joints reversed' for candidate in turned]
     if flaw:
         warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
             '' if runs is None else '; using the best fit that the generator can run')]
@@ -259,17 +262,17 @@ def _numbers(network: Network, gait: str, names: Sequence[str],
 def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
     """Return values of a start, checked."""
     duty = problem.readout.duty or EVEN
-    known = {one.name: one.value(problem.network) if one.members else duty
-             for one in problem.free}
+    values = {parameter.name: parameter.value(problem.network) if parameter.members else duty
+             for parameter in problem.free}
     for name, value in start.items():
-        if name not in known:
+        if name not in values:
             raise InputError(f"start: '{name}' is not free")
-        known[name] = float(value)
-    for one in problem.free:
-        if not one.low <= known[one.name] <= one.high:
-            raise InputError(f'{one.name} {known[one.name]:g} to start from is not within '
-                             f'{one.low:g} to {one.high:g}')
-    return np.array(list(known.values()))
+        values[name] = float(value)
+    for parameter in problem.free:
+        if not parameter.low <= values[parameter.name] <= parameter.high:
+            raise InputError(f'{parameter.name} {values[parameter.name]:g} to start from is not '
+                             f'{parameter.low:g} to {parameter.high:g}')
+    return np.array(list(values.values()))
 
 
 def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisation:
@@ -330,33 +333,36 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
         agrees = problem.readout.agreement(problem.joints.names, readouts(there))
         return agrees or problem.stance_share(there)
 
-    found, least = [values], problem.cost(values)
+    candidates, least = [values], problem.cost(values)
     for trial in trials:
-        if not trial.why and all(distinct(trial.values[:-1], one[:-1]) for one in found):
+        if not trial.why and all(distinct(trial.values[:-1], candidate[:-1])
+                                 for candidate in candidates):
             there = trial.values
             if problem.cost(there) <= NEARLY * least:
                 # Joints were weighted otherwise where it was found.
                 there = problem.coordinates.descend(problem, there, TOLERANCE).values
                 problem.hold(there)
-            found.append(there)
-    most = min(problem.cost(one) for one in found) + _as_good(problem, values)
+            candidates.append(there)
+    most = min(problem.cost(candidate) for candidate in candidates) + _as_good(problem, values)
 
-    def reverse(one: np.ndarray) -> bool:
-        return float(np.sum(readouts(one) * readouts(values))) < 0.0
+    def reverse(candidate: np.ndarray) -> bool:
+        return float(np.sum(readouts(candidate) * readouts(values))) < 0.0
 
     # Half a cycle later cells of some gaits are the same upside down: that is no other motion.
-    for k, one in enumerate(found):
-        later = one + np.append(np.zeros(one.size - 1), 0.5)
-        if reverse(one) and problem.cost(later) <= problem.cost(one) + SAME:
-            found[k] = later
-    best = max((one for one in found if problem.cost(one) <= most), key=meant)
-    turned = [one for one in found if reverse(one)]
-    if best is not values and (any(one is best for one in turned) or problem.cost(values) > most):
+    for k, candidate in enumerate(candidates):
+        later = candidate + np.append(np.zeros(candidate.size - 1), 0.5)
+        if reverse(candidate) and problem.cost(later) <= problem.cost(candidate) + SAME:
+            candidates[k] = later
+    best = max((candidate for candidate in candidates if problem.cost(candidate) <= most),
+               key=meant)
+    turned = [candidate for candidate in candidates if reverse(candidate)]
+    if best is not values and (any(candidate is best for candidate in turned)
+                               or problem.cost(values) > most):
         turned, values = [values], _weighed(problem, best)
         problem.hold(values)
-    others = [one for one in found if distinct(one[:-1], values[:-1])
-              and not reverse(one)]
-    return values, others, [one for one in turned if problem.cost(one) <= most]
+    others = [candidate for candidate in candidates if distinct(candidate[:-1], values[:-1])
+              and not reverse(candidate)]
+    return values, others, [candidate for candidate in turned if problem.cost(candidate) <= most]
 
 
 def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
@@ -451,14 +457,14 @@ def _judged(problem: CycleProblem, trials: Sequence[Minimisation], others: Seque
     """Return the fit at values, with its uncertainties."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.best_readouts(values)
-    estimated, known, model = _estimates(problem, values, profiles)
+    estimated, spread, model = _estimates(problem, values, profiles)
     for other in others:
         if problem.cost(other) < problem.cost(values) + _as_good(problem, values):
             # Another minimum explains the recording as well: the intervals hold both.
-            estimated = {name: one.together(_estimates(problem, other, profiles)[0][name])
-                         for name, one in estimated.items()}
+            estimated = {name: parameter.together(_estimates(problem, other, profiles)[0][name])
+                         for name, parameter in estimated.items()}
     if profiles and not model.size:
-        warnings = [*warnings, *_if_joints_lag(problem, values, estimated, known)]
+        warnings = [*warnings, *_if_joints_lag(problem, values, estimated, spread)]
     fractions = {}
     for order in WEIGHTS:
         there = problem.at_order(order)
@@ -471,13 +477,13 @@ def _judged(problem: CycleProblem, trials: Sequence[Minimisation], others: Seque
         network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
         order=problem.order, fractions=fractions, harmonics=problem.readout.harmonics,
         duty=problem.duty(values), stance=problem.readout.stance, parameters=estimated,
-        correlation=known.correlation[:count, :count],
+        correlation=spread.correlation[:count, :count],
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
         recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
         cost=problem.cost(values),
         sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
-        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=known.inflation,
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=spread.inflation,
         model_error=model.size, starts=tuple(trials),
-        warnings=(*findings(problem.free, estimated, known, model,
+        warnings=(*findings(problem.free, estimated, spread, model,
                             float(np.sqrt(np.mean(misfit**2))), best), *warnings))

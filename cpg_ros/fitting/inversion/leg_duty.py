@@ -124,15 +124,15 @@ def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, 
     return OwnStance(crest, (trough - crest) % 1.0, d_crest, d_trough - d_crest)
 
 
-def _extremum(terms: np.ndarray, slopes: np.ndarray, place: float) -> tuple[float, np.ndarray]:
+def _extremum(terms: np.ndarray, slopes: np.ndarray, phase: float) -> tuple[float, np.ndarray]:
     """Return the phase of an extremum near a place, cycles, and its derivatives."""
     k = np.arange(terms.size)
     bend, turns = 0.0, np.ones_like(terms)
     for _ in range(STEPS):
-        turns = np.exp(TURN * 1j * place * k)
+        turns = np.exp(TURN * 1j * phase * k)
         slope, bend = float((1j * k * terms @ turns).real), float((-k * k * terms @ turns).real)
-        place -= float(np.clip(slope / bend / TURN, -1.0 / GRID, 1.0 / GRID)) if bend else 0.0
-    return place % 1.0, -((1j * k * turns) @ slopes).real / (bend * TURN if bend else np.inf)
+        phase -= float(np.clip(slope / bend / TURN, -1.0 / GRID, 1.0 / GRID)) if bend else 0.0
+    return phase % 1.0, -((1j * k * turns) @ slopes).real / (bend * TURN if bend else np.inf)
 
 
 def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,

@@ -108,11 +108,11 @@ def invert_recording(task: Task) -> dict[str, Any]:
         if task.known and row['digest'] == task.known:
             return {'digest': task.known}
         settings = task.settings
-        found = fit_recording(read(task.recording, settings), settings.robot, settings.network,
+        result = fit_recording(read(task.recording, settings), settings.robot, settings.network,
                               settings.gait, free=settings.free, order=settings.order,
                               preset=settings.preset, starts=settings.starts)
-        row |= {**_facts(found), 'picture': picture(found)}
-        row['files'] = _files(task, found)
+        row |= {**_facts(result), 'picture': picture(result)}
+        row['files'] = _files(task, result)
     except (CpgError, OSError) as error:
         row['reason'] = ' '.join(str(error).split())
     # A bug costs one row, too, and is reported with its traceback.
@@ -123,29 +123,29 @@ def invert_recording(task: Task) -> dict[str, Any]:
     return row
 
 
-def _facts(found: RecordingFit) -> dict[str, Any]:
-    results = found.as_dict()
+def _facts(result: RecordingFit) -> dict[str, Any]:
+    results = result.as_dict()
     return {'gait': results['gait'], 'recognised': results['recognised'] or '',
             'frequency': results['frequency'], 'frequency_error': results['frequency_error'],
             'confidence': results['confidence'], 'cycles': results['cycles'],
             'begin': results['begin'], 'end': results['end'], 'network': results['network'],
             'parameters': results['parameters'], 'phases': results['phases'],
             'rms_share': results['rms_share'],
-            'joints': {name: one['rms'] for name, one in results['joints'].items()},
+            'joints': {name: joint['rms'] for name, joint in results['joints'].items()},
             'warnings': results['warnings']}
 
 
-def _files(task: Task, found: RecordingFit) -> dict[str, str]:
+def _files(task: Task, result: RecordingFit) -> dict[str, str]:
     """Return the parameter file and the robot file, as they will be in their folder."""
     with TemporaryDirectory(prefix='cpg_ros_') as folder:
-        written = write_fitted(Path(folder, f'{task.name}.yaml'), found, task.settings.robot,
+        written = write_fitted(Path(folder, f'{task.name}.yaml'), result, task.settings.robot,
                                robot_file_of(task.folder / f'{task.name}.yaml'))
         return {path.name: path.read_text() for path in written}
 
 
-def picture(found: RecordingFit) -> str:
+def picture(result: RecordingFit) -> str:
     """Return the mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
-    recorded, fitted = found.fit.recorded, found.fit.fitted
+    recorded, fitted = result.fit.recorded, result.fit.fitted
     span = recorded.max(axis=1) - recorded.min(axis=1)
     largest = sorted(span.argsort()[::-1][:DRAWN])
     step = max(1, recorded.shape[1] // POINTS)
@@ -207,10 +207,10 @@ class Folders:
 
     def tasks(self, recordings: Iterable[Path]) -> Iterator[Task]:
         """Yield the jobs, each made when it is needed."""
-        for one in recordings:
-            row = self.results.get(one)
-            yield Task(one.absolute(), self.settings, row['digest'] if row else '',
-                       (self.results.folder / FITTED).absolute(), self.results.name(one))
+        for recording in recordings:
+            row = self.results.get(recording)
+            yield Task(recording.absolute(), self.settings, row['digest'] if row else '',
+                       (self.results.folder / FITTED).absolute(), self.results.name(recording))
 
     def keep(self, outcome: JobOutcome[Task], shown: Path, tally: JobProgress) -> None:
         """Store the outcome of a job, unless the recording was done before."""
@@ -247,7 +247,7 @@ class Folders:
         return self.write(tally.kept)
 
     def _through(self, executor: Executor, recordings: Sequence[Path], tally: JobProgress) -> None:
-        shown = {one.absolute(): one for one in recordings}
+        shown = {recording.absolute(): recording for recording in recordings}
         for outcome in outcomes(executor, invert_recording, self.tasks(recordings), tally.tick):
             self.keep(outcome, shown[outcome.job.recording], tally)
 
@@ -269,15 +269,16 @@ class Folders:
         try:
             while goes_on():
                 self.recordings = list(found(self.folders))
-                now = {one: outline(one) for one in self.recordings}
-                ready = [one for one, at in now.items() if at == seen.get(one) != done.get(one)]
+                now = {recording: outline(recording) for recording in self.recordings}
+                ready = [recording for recording, at in now.items()
+                         if at == seen.get(recording) != done.get(recording)]
                 seen = now
                 if ready:
-                    for one in ready:
-                        say(f'new recording: {one}')
+                    for recording in ready:
+                        say(f'new recording: {recording}')
                     with JobProgress('recordings', len(ready), self.progress) as tally:
                         self._through(executor, ready, tally)
-                    done |= {one: now[one] for one in ready}
+                    done |= {recording: now[recording] for recording in ready}
                     waits = True
                 if waits and time.monotonic() - written >= TABLES:
                     self.write()

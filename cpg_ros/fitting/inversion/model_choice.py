@@ -90,14 +90,14 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
 
     """
     legs, _ = leg_joints(recording, robot)
-    kinds, found = list(networks_of(robot, legs)), []
+    kinds, comparisons = list(networks_of(robot, legs)), []
     if not kinds:
         raise InputError(f'{recording.source}: no network has {len(legs)} legs')
     for count, kind in enumerate(kinds):
         cells, stride = stride_of(recording, legs, kind, robot)
         gait = stride.gait or kind.unnamed
         if not gait:
-            found.append(NetworkComparison(kind.name, '', why=(
+            comparisons.append(NetworkComparison(kind.name, '', why=(
                 f'its nearest gait, {stride.nearest}, is {stride.distance:.3f} of a cycle off')))
             continue
         half, others = split_strides(recording, stride)
@@ -107,28 +107,30 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
             fit, _ = fit_with_fallbacks(half, cells, parameters, gait, order=order,
                                         readout=GaitReadout.of(kind, gait, robot=robot))
         except CpgError as error:
-            found.append(NetworkComparison(kind.name, gait, why=str(error)))
+            comparisons.append(NetworkComparison(kind.name, gait, why=str(error)))
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
         fractions = _shares(fit.joints, fit.fitted - others[rows], others[rows])
-        found.append(NetworkComparison(
+        comparisons.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
             free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=fractions))
     done(1.0)
-    least = min(found, key=lambda one: (one.error, one.numbers))
-    found = [replace(one, alike=not one.why and not _distinct(one, least)) for one in found]
-    return sorted(found, key=lambda one: (not one.alike, one.numbers if one.alike else one.error))
+    least = min(comparisons, key=lambda comparison: (comparison.error, comparison.numbers))
+    comparisons = [replace(comparison, alike=not comparison.why
+                           and not _distinct(comparison, least)) for comparison in comparisons]
+    return sorted(comparisons, key=lambda comparison: (not comparison.alike, comparison.numbers
+                                                       if comparison.alike else comparison.error))
 
 
-def _distinct(one: NetworkComparison, least: NetworkComparison) -> bool:
+def _distinct(comparison: NetworkComparison, least: NetworkComparison) -> bool:
     """Return whether a network's errors exceed the least ones by more than their scatter."""
-    if one is least:
+    if comparison is least:
         return False
-    more = np.array([error - least.by_joint[name] for name, error in one.by_joint.items()
+    more = np.array([error - least.by_joint[name] for name, error in comparison.by_joint.items()
                      if name in least.by_joint])
     if more.size < 2:
-        return one.error > least.error
+        return comparison.error > least.error
     return bool(more.mean() > DISTINCT * more.std(ddof=1) / np.sqrt(more.size))
 
 
@@ -163,9 +165,9 @@ def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
             zip(joints, sizes, spans, strict=True) if span > STANDS}
 
 
-def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
+def indistinguishable(comparisons: Sequence[NetworkComparison], order: int) -> str:
     """Name the networks that a recording cannot distinguish by readouts of an order, or ''."""
-    alike = [one.network for one in found if one.alike]
+    alike = [comparison.network for comparison in comparisons if comparison.alike]
     if len(alike) < 2:
         return ''
     text = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
@@ -173,16 +175,18 @@ def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
     return text if order == 1 else f'{text}; readouts of a lower order (--order 1) tell more apart'
 
 
-def as_rows(found: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
+def as_rows(comparisons: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
     """Return rows of a table, with a head."""
     rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
                                     'all numbers', 'told from the least')]
-    least = min((one.error for one in found), default=np.inf)
-    for one in found:
-        if one.why:
-            rows.append((one.network, one.gait or 'none', '-', '-', '-', '-', one.why))
+    least = min((comparison.error for comparison in comparisons), default=np.inf)
+    for comparison in comparisons:
+        if comparison.why:
+            rows.append((comparison.network, comparison.gait or 'none', '-', '-', '-', '-',
+                         comparison.why))
             continue
-        rows.append((one.network, one.gait, f'{100 * one.error:.2f} %',
-                     f'{100 * one.fitted:.2f} %', str(one.parameters), str(one.numbers),
-                     '' if one.error == least else 'no' if one.alike else 'yes'))
+        rows.append((comparison.network, comparison.gait, f'{100 * comparison.error:.2f} %',
+                     f'{100 * comparison.fitted:.2f} %', str(comparison.parameters),
+                     str(comparison.numbers),
+                     '' if comparison.error == least else 'no' if comparison.alike else 'yes'))
     return rows

@@ -118,12 +118,12 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
     free = free_numbers(start, gait, names)
     if samples.size < len(free):
         raise InputError(f'{samples.size} values do not determine {len(free)} parameters')
-    columns = [start.parameters().index(one.name) for one in free]
-    begin = np.array([one.value(start) for one in free])
-    for one, value in zip(free, begin, strict=True):
-        if not one.low < value < one.high:
-            raise InputError(f'{one.name} {value:g} to start from is not between {one.low:g} '
-                             f'and {one.high:g}')
+    columns = [start.parameters().index(parameter.name) for parameter in free]
+    begin = np.array([parameter.value(start) for parameter in free])
+    for parameter, value in zip(free, begin, strict=True):
+        if not parameter.low < value < parameter.high:
+            raise InputError(f'{parameter.name} {value:g} to start from is not between '
+                             f'{parameter.low:g} and {parameter.high:g}')
 
     # The method evaluates residual and derivative at the same values, one after the other.
     @lru_cache(maxsize=1)
@@ -137,8 +137,8 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         states, slopes = cycle_samples(orbit_at(values), theta)
         return (states - samples).ravel(), slopes[..., columns].reshape(-1, len(columns))
 
-    trial = minimise(evaluate, begin, np.array([one.low for one in free]),
-                     np.array([one.high for one in free]), TOLERANCE)
+    trial = minimise(evaluate, begin, np.array([parameter.low for parameter in free]),
+                     np.array([parameter.high for parameter in free]), TOLERANCE)
     if trial.why:
         raise NoOrbit(trial.why)
     left, slopes = evaluate(trial.values)
@@ -227,13 +227,13 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
             raise InputError(f"start: '{name}' is not free")
     begins = [replace(network, **start) for start in starts]
     theta = theta + _shift(solve_orbit(begins[0], gait), theta, samples)
-    found = []
+    fits = []
     for begin in begins:
         values = begin.as_dict()
-        found.append(PaperFit({name: values[name] for name in free},
+        fits.append(PaperFit({name: values[name] for name in free},
                               fit_cycle(samples, theta, begin, gait, free),
                               tuple(by_cell)))
-    return found
+    return fits
 
 
 def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:

@@ -44,11 +44,11 @@ def robot_file_of(path: Path) -> Path:
     return path.with_name(f'{path.stem}_robot.yaml')
 
 
-def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
+def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
     """Return a robot that moves in the fitted gait as the recorded one.
 
     Args:
-        found: the fit, as fit_recording returns it.
+        result: the fit, as fit_recording returns it.
         robot: which is kept but for the motion of this gait; joints that were not recorded move
             as before. Without one, the joints are those recorded, and so are their limits.
 
@@ -57,31 +57,31 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
             angle outside its limits.
 
     """
-    fit = found.fit
+    fit = result.fit
     if robot is not None:
         networks = _networks(robot, fit.network.name)
         presets = {name for network in networks for name in NETWORKS[network].presets()}
-        kept = {gait: motion for gait, motion in robot.motions.items() if gait in presets}
-        robot = replace(robot, networks=networks, harmonics=fit.harmonics, motions=kept)
-        motion = fitted_motion(found, robot)
+        remaining = {gait: motion for gait, motion in robot.motions.items() if gait in presets}
+        robot = replace(robot, networks=networks, harmonics=fit.harmonics, motions=remaining)
+        motion = fitted_motion(result, robot)
         for fraction in IN_PLACE:
-            moved = replace(robot, motions={**kept, fit.gait: _scaled(motion, fraction)})
-            if _within_limits(moved, found):
+            moved = replace(robot, motions={**remaining, fit.gait: _scaled(motion, fraction)})
+            if _within_limits(moved, result):
                 break
         return moved
     network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
-        if leg not in found.legs:
-            raise InputError(f'{found.recording.source}: no joint of {leg} was recorded, and the '
+        if leg not in result.legs:
+            raise InputError(f'{result.recording.source}: no joint of {leg} was recorded, and the '
                              f'network {network.name} drives '
                              f'{", ".join(network.legs[assignment])}: a robot file is needed')
-    legs = {leg: tuple(_guessed(name, leg, found) for name in names)
-            for leg, names in found.legs.items()}
-    order = tuple(name for name in found.recording.joints if name in fit.readouts)
+    legs = {leg: tuple(_guessed(name, leg, result) for name in names)
+            for leg, names in result.legs.items()}
+    order = tuple(name for name in result.recording.joints if name in fit.readouts)
     # Without its frequency the gait would run at the generator's usual one.
     return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order,
-                 {fit.gait: Motion(float(found.stride.frequency), duty=fit.duty,
+                 {fit.gait: Motion(float(result.stride.frequency), duty=fit.duty,
                                    stance=fit.stance)})
 
 
@@ -92,12 +92,12 @@ def _scaled(motion: Motion, fraction: float) -> Motion:
         for name, joint in motion.joints.items()})
 
 
-def _within_limits(robot: Robot, found: RecordingFit) -> bool:
+def _within_limits(robot: Robot, result: RecordingFit) -> bool:
     """Return whether the fitted gait keeps to the limits; check_plan checks all else."""
-    fit = found.fit
+    fit = result.fit
     try:
         plan(robot, fit.gait, type(fit.network).presets()[fit.gait], fit.network,
-             float(found.stride.frequency))
+             float(result.stride.frequency))
     except OutOfLimits:
         return False
     except PlanError:
@@ -114,33 +114,33 @@ def _networks(robot: Robot, fitted: str) -> tuple[str, ...]:
                       if NETWORKS[name].legs.get(robot.assignment) == cells))
 
 
-def fitted_motion(found: RecordingFit, robot: Robot | None) -> Motion:
+def fitted_motion(result: RecordingFit, robot: Robot | None) -> Motion:
     """Return the fitted gait's motion; parts that were not fitted are the robot's.
 
     Args:
-        found: the fit, as fit_recording returns it.
+        result: the fit, as fit_recording returns it.
         robot: whose limits the joints keep to, None for no limits.
 
     Raises:
         InputError: a joint would swing about an angle outside its limits.
 
     """
-    fit, frequency = found.fit, float(found.stride.frequency)
-    known = Motion() if robot is None else robot.motion(fit.gait, fit.gait)
+    fit, frequency = result.fit, float(result.stride.frequency)
+    motion = Motion() if robot is None else robot.motion(fit.gait, fit.gait)
     limits = {} if robot is None else {joint.name: joint for joint in robot.joints}
-    joints = dict(known.joints)
+    joints = dict(motion.joints)
     for name, (offset, weights) in fit.readouts.items():
         joint = limits.get(name)
         if joint is not None and not joint.lower <= offset <= joint.upper:
-            raise InputError(f'{found.recording.source}: joint {name!r} swings about '
+            raise InputError(f'{result.recording.source}: joint {name!r} swings about '
                              f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} "
                              f'to {joint.upper:g}')
         in_place = joints[name].in_place if name in joints else ()
         joints[name] = JointMotion(float(offset), tuple(map(float, weights)), in_place)
     # A fit without a duty is not retimed: its legs stand for as long as they do by themselves.
-    return replace(known, frequency=frequency, joints=joints, duty=fit.duty,
-                   stance=known.stance if fit.duty is None else fit.stance,
-                   steering=_slower(known.steering, frequency))
+    return replace(motion, frequency=frequency, joints=joints, duty=fit.duty,
+                   stance=motion.stance if fit.duty is None else fit.stance,
+                   steering=_slower(motion.steering, frequency))
 
 
 def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | None:
@@ -152,49 +152,49 @@ def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | No
     return SteeringTable(*zip(*rows, strict=True)) if rows else None
 
 
-def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:
-    fit = found.fit
+def _guessed(name: str, leg: str, result: RecordingFit) -> Joint:
+    fit = result.fit
     offset, weights = fit.readouts[name]
     row = fit.joints.index(name)
     angles = np.concatenate([fit.recorded[row], fit.fitted[row], [offset]])
     room = max(ROOM * float(np.ptp(angles)), 0.05)
-    step = 1.0 / (fit.theta.size * found.stride.frequency)
+    step = 1.0 / (fit.theta.size * result.stride.frequency)
     fastest = float(np.abs(np.diff(fit.fitted[row], append=fit.fitted[row, 0])).max()) / step
     return Joint(name, leg, fit.cells[name], offset, weights, float(angles.min()) - room,
                  float(angles.max()) + room, max(FASTER * fastest, 1.0))
 
 
-def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[str, Any]:
+def running_parameters(result: RecordingFit, robot: Robot | None = None) -> dict[str, Any]:
     """Return the values of a running generator's parameters, by name.
 
     Args:
-        found: the fit.
+        result: the fit.
         robot: whose joints the generator moves, and whose cells were fitted; without one, the
             readouts are left out.
 
     """
-    fit, network = found.fit, found.fit.network
-    wanted = {'gait': fit.gait, 'frequency': float(found.stride.frequency),
+    fit, network = result.fit, result.fit.network
+    settings = {'gait': fit.gait, 'frequency': float(result.stride.frequency),
               **{f'{network.name}.{name}': float(value)
                  for name, value in network.as_dict().items()}}
     if robot is None:
-        return wanted
+        return settings
     motion = robot.motion(fit.gait, fit.gait)
     # In a fit without a duty, legs stand for as long as their cells make them.
     own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
            else motion.stance[1])
     duty = fit.duty or (0.0 if motion.duty is None else float(own))
-    return {**wanted, 'amplitude': 1.0, 'duty': duty,
+    return {**settings, 'amplitude': 1.0, 'duty': duty,
             **{READOUT + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
 
 
-def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
+def parameter_tree(result: RecordingFit, robot: Path) -> dict[str, Any]:
     """Return the generator's parameters as ``--params-file`` takes them, for any node name."""
-    fit = found.fit
+    fit = result.fit
     return {'/**': {'ros__parameters': {
         'network': reference(fit.network.name), 'robot': str(robot), 'gait': fit.gait,
-        'frequency': float(found.stride.frequency), 'amplitude': 1.0,
+        'frequency': float(result.stride.frequency), 'amplitude': 1.0,
         fit.network.name: {name: float(value)
                            for name, value in fit.network.as_dict().items()}}}}
 
@@ -221,7 +221,7 @@ def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
         raise InputError(f'{who} cannot do this: {error}') from error
 
 
-def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = None,
+def write_fitted(path: str | Path, result: RecordingFit, robot: Robot | None = None,
                  named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 
@@ -229,7 +229,7 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
 
     Args:
         path: of the parameter file; frequencies in it are in Hz, angles in rad.
-        found: the fit, as fit_recording returns it.
+        result: the fit, as fit_recording returns it.
         robot: as of fitted_robot.
         named: where the robot file will be moved to; it stays beside by default.
 
@@ -244,19 +244,19 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
     """
     path = Path(path)
     beside = robot_file_of(path)
-    summary = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
-               f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % '
-               f'of '
-               f"the joints' range, readout of order {found.fit.order}")
-    moved, tree = fitted_robot(found, robot), parameter_tree(
-        found, (named or beside).resolve())
+    summary = (f'{result.fit.gait} at {result.stride.frequency:.4f} Hz, fitted to '
+               f'{result.recording.source}\nmean RMS error '
+               f'{100 * result.fit.mean_rms_share:.1f} % of '
+               f"the joints' range, readout of order {result.fit.order}")
+    moved, tree = fitted_robot(result, robot), parameter_tree(
+        result, (named or beside).resolve())
     comment = ''.join(f'# {line}\n' for line in summary.splitlines())
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         parameters, joints = Path(folder, path.name), Path(folder, beside.name)
         write_robot(joints, moved, summary)
         write_atomically(parameters, comment + yaml.safe_dump(tree, sort_keys=False))
         check_plan(yaml.safe_load(parameters.read_text()), joints,
-                   f'{found.recording.source}: robot {moved.name}')
+                   f'{result.recording.source}: robot {moved.name}')
         joints.replace(beside)
         parameters.replace(path)
     return [path, beside]

@@ -91,7 +91,7 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
 
     """
     readout = readout or GaitReadout.of(type(network), gait)
-    first, known = '', tuple(free) or network.free
+    first, free_names = '', tuple(free) or network.free
 
     def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]],
                profiles: bool = True) -> tuple[Fit, tuple[str, ...]]:
@@ -101,7 +101,7 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
                       profiles=profiles, done=done), ()
 
-    for names, lower, begins, relaxation in _ways(known, order, starts):
+    for names, lower, begins, relaxation in _ways(free_names, order, starts):
         try:
             if free or begins:
                 fit, notes = fitted(names, lower, begins)
@@ -132,9 +132,10 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
         other, _ = fitted((*names, GAIT_DUTY), order, (), False)
     except NoOrbit:
         return fitted(names, order, ())
-    minima = [dict(zip(other.free, one.values.tolist(), strict=False)) for one in other.minima]
-    own, _ = fitted(names, order, [{}, *({name: one[name] for name in names}
-                                         for one in minima[:2])])
+    minima = [dict(zip(other.free, minimum.values.tolist(), strict=False))
+              for minimum in other.minima]
+    own, _ = fitted(names, order, [{}, *({name: minimum[name] for name in names}
+                                         for minimum in minima[:2])])
     sizes = np.array(list(other.sizes.values()))[:, None]
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
     if rise > 0.5 * ASKED**2 * other.sharing:
@@ -160,8 +161,8 @@ def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait
 
 #: POOR: order of the readout -> mean RMS error, as a share of the range, above which a fit is
 #: poor; fits of real trots and walks have 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04.
-#: LEFT: factor of the confidence of a poor fit.
-POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
+#: POOR_FACTOR: factor of the confidence of a poor fit.
+POOR, POOR_FACTOR = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -196,7 +197,7 @@ class RecordingFit(ShortRepr):
     @property
     def confidence(self) -> float:
         """Probability that gait and frequency are those named; less where the fit is poor."""
-        return self.stride.confidence * (LEFT if self.poor else 1.0)
+        return self.stride.confidence * (POOR_FACTOR if self.poor else 1.0)
 
     @property
     def poor(self) -> bool:
@@ -216,9 +217,9 @@ class RecordingFit(ShortRepr):
             'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,
             'phases': {leg: float(phase) for leg, phase in stride.phases.items()},
             'network': fit.network.name, 'params': fit.network.as_dict(),
-            'parameters': {name: {'value': one.value, 'stderr': one.stderr,
-                                  'low': one.low, 'high': one.high}
-                           for name, one in fit.parameters.items()},
+            'parameters': {name: {'value': estimate.value, 'stderr': estimate.stderr,
+                                  'low': estimate.low, 'high': estimate.high}
+                           for name, estimate in fit.parameters.items()},
             'order': fit.order, 'rms_share': fit.mean_rms_share,
             'rms_share_by_order': {str(order): value for order, value in self.fractions.items()},
             'joints': {name: {'rms': rms[name], 'rms_share': fraction[name],
@@ -256,17 +257,17 @@ def preset_of(network: str, gait: str) -> Preset:
 
 def network_of(legs: Iterable[str]) -> str:
     """Name the first shipped network that has these legs."""
-    wanted = set(legs)
-    return next(kind.name for kind in (*SHIPPED.values(), *numbered(len(wanted)))
-                if wanted <= set(next(iter(kind.legs.values()))))
+    names = set(legs)
+    return next(kind.name for kind in (*SHIPPED.values(), *numbered(len(names)))
+                if names <= set(next(iter(kind.legs.values()))))
 
 
 def leg_joints(recording: Recording, robot: Robot | None
                ) -> tuple[dict[str, tuple[str, ...]], str]:
     """Return which joints each leg has, and how that was read."""
     if robot is None:
-        found = legs_of(recording.joints)
-        return dict(found.joints), found.explanation
+        by_leg = legs_of(recording.joints)
+        return dict(by_leg.joints), by_leg.explanation
     legs = {leg: tuple(joint.name for joint in joints if joint.name in recording.joints)
             for leg, joints in robot.legs.items()}
     missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
@@ -280,10 +281,10 @@ def leg_joints(recording: Recording, robot: Robot | None
 
 def networks_of(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
     """Yield the networks that drive a robot, or else those shipped that have these legs."""
-    wanted = set(legs)
+    names = set(legs)
     yield from ((NETWORKS[name] for name in robot.networks) if robot is not None else
-                (kind for kind in numbered(len(wanted))
-                 if wanted <= set(next(iter(kind.legs.values())))))
+                (kind for kind in numbered(len(names))
+                 if names <= set(next(iter(kind.legs.values())))))
 
 
 def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
@@ -344,15 +345,15 @@ def _none_of(kind: type[Network], stride: Stride) -> str:
 
 def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
     """Return the estimates of the phases that are parameters of the network."""
-    known, found = fit.network.as_dict(), {}
-    for leg, one in list(stride.scatter.items())[1:]:
+    values, estimates = fit.network.as_dict(), {}
+    for leg, scatter in list(stride.scatter.items())[1:]:
         name = fit.network.offsets.get(leg)
         if name is not None and name not in fit.parameters:
-            known_error = one.error == one.error
-            half = one.half_width if known_error else np.inf
-            found[name] = Estimate(known[name], one.error if known_error else np.inf,
-                                   known[name] - half, known[name] + half, known_error)
-    return found
+            known_error = scatter.error == scatter.error
+            half = scatter.half_width if known_error else np.inf
+            estimates[name] = Estimate(values[name], scatter.error if known_error else np.inf,
+                                   values[name] - half, values[name] + half, known_error)
+    return estimates
 
 
 def _kind(network: str, legs: Mapping[str, Sequence[str]], robot: Robot | None) -> type[Network]:
@@ -402,7 +403,8 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     recording, cells, stride, warnings = _steady(recording, legs, kind, robot, gait)
     if not (gait or stride.gait or network or kind.offsets):
         warnings.append(_none_of(kind, stride))
-        as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
+        as_they_are = next((candidate for candidate in networks_of(robot, legs)
+                            if candidate.offsets), None)
         if as_they_are is not None:
             kind = as_they_are
             cells, stride = stride_of(recording, legs, kind, robot, gait)
@@ -428,9 +430,9 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
         read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
                  'which, and parameters and intervals hold for that alone')
-    found = RecordingFit(recording, read, legs, stride, fit, fit.fractions,
+    result = RecordingFit(recording, read, legs, stride, fit, fit.fractions,
                          (*warnings, *fallbacks, *fit.warnings))
-    return found if not found.poor else replace(found, warnings=(
+    return result if not result.poor else replace(result, warnings=(
         f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "
         f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',
-        *found.warnings))
+        *result.warnings))

@@ -51,39 +51,39 @@ def found(folders: Sequence[Path]) -> Iterator[Path]:
     for folder in folders:
         if not folder.exists():
             raise InputError(f'{folder}: there is no such folder')
-        for one in _below(folder):
-            if (place := one.resolve()) not in seen:
-                seen.add(place)
-                yield one
+        for path in _below(folder):
+            if (resolved := path.resolve()) not in seen:
+                seen.add(resolved)
+                yield path
 
 
-def _below(place: Path) -> Iterator[Path]:
-    if place.is_file():
-        if place.name.endswith(tuple(
-                ending for one in FORMATS.values() for ending in one.endings)):
-            yield place
+def _below(folder: Path) -> Iterator[Path]:
+    if folder.is_file():
+        if folder.name.endswith(tuple(
+                ending for entry in FORMATS.values() for ending in entry.endings)):
+            yield folder
         return
-    if (place / RESULTS).exists():
+    if (folder / RESULTS).exists():
         return
     try:
-        inside = sorted(place.iterdir())
-        whole = bool(files_of(place))
+        inside = sorted(folder.iterdir())
+        whole = bool(files_of(folder))
     except PermissionError:
         inside, whole = [], True
     if whole:
-        yield place
+        yield folder
         return
-    for one in inside:
-        if not one.name.startswith('.') and not (one.is_symlink() and one.is_dir()):
-            yield from _below(one)
+    for entry in inside:
+        if not entry.name.startswith('.') and not (entry.is_symlink() and entry.is_dir()):
+            yield from _below(entry)
 
 
 def files_of(recording: Path) -> list[Path]:
     """Return the sorted files of a recording; none for a folder that is not a recording."""
     if not recording.is_dir():
         return [recording]
-    return next((files for one in FORMATS.values()
-                 if one.files_in is not None and (files := one.files_in(recording))), [])
+    return next((files for form in FORMATS.values()
+                 if form.files_in is not None and (files := form.files_in(recording))), [])
 
 
 def digest(recording: Path) -> str:
@@ -94,10 +94,10 @@ def digest(recording: Path) -> str:
 
     """
     total = hashlib.sha256()
-    for one in files_of(recording):
-        size = one.stat().st_size
-        total.update(os.fsencode(f'{one.name if recording.is_dir() else one.suffix}\n{size}\n'))
-        with one.open('rb') as file:
+    for path in files_of(recording):
+        size = path.stat().st_size
+        total.update(os.fsencode(f'{path.name if recording.is_dir() else path.suffix}\n{size}\n'))
+        with path.open('rb') as file:
             while block := file.read(BLOCK):
                 total.update(block)
     return total.hexdigest()
@@ -105,14 +105,14 @@ def digest(recording: Path) -> str:
 
 def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
     """Return names, sizes and times of a recording's files, which change while it is written."""
-    found = []
-    for one in files_of(recording):
+    sizes = []
+    for file in files_of(recording):
         try:
-            status = one.stat()
+            status = file.stat()
         except FileNotFoundError:
             continue
-        found.append((one.name, status.st_size, status.st_mtime_ns))
-    return tuple(found)
+        sizes.append((file.name, status.st_size, status.st_mtime_ns))
+    return tuple(sizes)
 
 
 # A folder of results: a file for every recording that is done, from which the table is made.
@@ -147,8 +147,8 @@ class Results:
         mark = folder / RESULTS
         if folder.exists() and not mark.exists() and any(folder.iterdir()):
             raise InputError(f'{folder} is not a results folder: it contains other files')
-        for one in (ROWS, FITTED):
-            (folder / one).mkdir(parents=True, exist_ok=True)
+        for name in (ROWS, FITTED):
+            (folder / name).mkdir(parents=True, exist_ok=True)
         write_atomically(mark, json.dumps({'made by': 'inversion --bags'}) + '\n')
 
     def _place(self, recording: Path) -> Path:
@@ -173,10 +173,10 @@ class Results:
             # Remove files that the new result no longer has.
             for ending in ('.yaml', '_robot.yaml'):
                 (self.folder / FITTED / f'{self.name(recording)}{ending}').unlink(missing_ok=True)
-        kept = {'file': printable(str(recording)), 'settings': self.settings, **row,
+        stored = {'file': printable(str(recording)), 'settings': self.settings, **row,
                 'reason': printable(row['reason']),
                 'fitted': str(Path(FITTED, next(iter(files)))) if files else ''}
-        write_atomically(self._place(recording), json.dumps(kept))
+        write_atomically(self._place(recording), json.dumps(stored))
 
     def name(self, recording: Path) -> str:
         """Return the name of a recording's fitted file, without its ending."""
@@ -237,8 +237,8 @@ def _row(row: dict[str, Any]) -> str:
             else escape(row['file']))
     error = row.get('frequency_error') or 0.0
     parameters = '<br>'.join(
-        f'{escape(name)} {one["value"]:.5g} ({one["low"]:.5g} to {one["high"]:.5g})'
-        for name, one in row.get('parameters', {}).items())
+        f'{escape(name)} {estimate["value"]:.5g} ({estimate["low"]:.5g} to {estimate["high"]:.5g})'
+        for name, estimate in row.get('parameters', {}).items())
     fraction = row.get('rms_share')
     remarks = '<br>'.join(escape(text) for text in
                           ([row['reason']] if row['reason'] else row.get('warnings', [])))
@@ -309,10 +309,10 @@ def flat(row: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """Return a row with a field for every column."""
     cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
     cells |= dict.fromkeys(columns)
-    for name, one in row.get('parameters', {}).items():
+    for name, estimate in row.get('parameters', {}).items():
         for part in PARTS:
             column = f'{row["network"]}.{name}{"" if part == "value" else f".{part}"}'
-            cells[column] = one[part]
+            cells[column] = estimate[part]
     return cells | {'phases': row.get('phases', {}), 'joints': row.get('joints', {}),
                     'warnings': row.get('warnings', []), 'fitted': row.get('fitted', ''),
                     'seconds': row.get('seconds')}

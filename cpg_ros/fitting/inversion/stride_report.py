@@ -111,7 +111,7 @@ def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], str
     contacts = stride.contacts
     if contacts is not None and not set(stride.phases) <= set(contacts.legs):
         contacts = None
-    found = []
+    strides = []
     for leg in stride.phases:
         names = [name for name in legs[leg] if name in c]
         joint, sense, why = _leading(names, c)
@@ -119,15 +119,15 @@ def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], str
         span = float(np.ptp(evaluate_coefficients(c[joint][:, None], np.arange(POINTS) / POINTS)))
         if contacts is not None:
             begins, periods, stances = contacts.strides(leg).T
-            found.append(LegStrides(leg, joint, begins, periods, stances, span, '', True))
+            strides.append(LegStrides(leg, joint, begins, periods, stances, span, '', True))
             continue
         fore = _extremes(times, phases, x, sense * c[joint], 1.0)
         hind = None if why else _extremes(times, phases, x, sense * c[joint], -1.0)
         rows = _strides(fore, hind)
         # Copies of one stride are one stride.
         begins, periods, back = rows[:1 if stride.cycles == 1 else None].T
-        found.append(LegStrides(leg, joint, begins, periods, back, span, why))
-    return found
+        strides.append(LegStrides(leg, joint, begins, periods, back, span, why))
+    return strides
 
 
 def _words(name: str) -> set[str]:
@@ -169,13 +169,13 @@ def _extremes(times: np.ndarray, phases: np.ndarray, x: np.ndarray, c: np.ndarra
     """Return the times of a joint's maxima (side 1) or minima (-1), and phases, shape (k, 2)."""
     theta = np.arange(POINTS) / POINTS
     peak = float(theta[np.argmax(side * evaluate_coefficients(c[:, None], theta)[0])])
-    found = []
+    extremes = []
     for k in range(int(np.floor(phases[0] - peak)), int(np.ceil(phases[-1] - peak)) + 1):
         near = (np.abs(phases - peak - k) <= SEARCHED + AROUND) & np.isfinite(x)
         at = _summit(phases[near], side * x[near], peak + k)
         if at is not None:
-            found.append((float(np.interp(at, phases, times)), at))
-    return np.array(found).reshape(-1, 2)
+            extremes.append((float(np.interp(at, phases, times)), at))
+    return np.array(extremes).reshape(-1, 2)
 
 
 def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
@@ -235,9 +235,9 @@ QUANTITIES = (('stride [s]', 'stride [s]', 'periods', '.4f'),
 Rows = list[tuple[str, ...]]
 
 
-def strides_of(found: RecordingFit) -> list[LegStrides]:
+def strides_of(result: RecordingFit) -> list[LegStrides]:
     """Return the strides of every leg of an inverted recording."""
-    return leg_strides(found.recording, found.legs, found.stride)
+    return leg_strides(result.recording, result.legs, result.stride)
 
 
 def _names(legs: list[LegStrides]) -> list[str]:
@@ -247,10 +247,10 @@ def _names(legs: list[LegStrides]) -> list[str]:
 def every_stride(legs: list[LegStrides]) -> Rows:
     """Return rows of the strides, leg by leg, with a head; empty cells where nothing tells."""
     rows: Rows = [('leg', 'number', 'begin [s]', *_names(legs))]
-    for one in legs:
-        for k, begin in enumerate(one.begins):
-            values = [(getattr(one, attribute)[k], form) for *_, attribute, form in QUANTITIES]
-            rows.append((one.leg, str(k + 1), f'{begin:.4f}',
+    for leg in legs:
+        for k, begin in enumerate(leg.begins):
+            values = [(getattr(leg, attribute)[k], form) for *_, attribute, form in QUANTITIES]
+            rows.append((leg.leg, str(k + 1), f'{begin:.4f}',
                          *(_shown(value, form) for value, form in values)))
     return rows
 
@@ -259,38 +259,38 @@ def by_leg(legs: list[LegStrides]) -> Rows:
     """Return rows of means and standard deviations, and the period's coefficient of variation."""
     rows: Rows = [('leg', 'strides', *_names(legs), 'variation of strides',
                    'range [rad]', 'by')]
-    for one in legs:
+    for leg in legs:
         cells = []
         for *_, attribute, form in QUANTITIES:
-            values = getattr(one, attribute)
-            known = len(values) > 0 and np.isfinite(values).all()
-            cells.append('cannot tell' if not known else f'{values.mean():{form}}' + (
+            values = getattr(leg, attribute)
+            finite = len(values) > 0 and np.isfinite(values).all()
+            cells.append('cannot tell' if not finite else f'{values.mean():{form}}' + (
                 f' +- {values.std(ddof=1):{form}}' if len(values) >= FEWEST else ''))
-        scatter = (f'{one.periods.std(ddof=1) / one.periods.mean():.1%}'
-                   if len(one.periods) >= FEWEST else f'fewer than {FEWEST}')
-        rows.append((one.leg, str(len(one.begins)), *cells, scatter, f'{one.range:.3f}',
-                     'foot loads' if one.by_contacts else one.joint))
+        scatter = (f'{leg.periods.std(ddof=1) / leg.periods.mean():.1%}'
+                   if len(leg.periods) >= FEWEST else f'fewer than {FEWEST}')
+        rows.append((leg.leg, str(len(leg.begins)), *cells, scatter, f'{leg.range:.3f}',
+                     'foot loads' if leg.by_contacts else leg.joint))
     return rows
 
 
-def gait_summary(found: RecordingFit, legs: list[LegStrides]) -> Rows:
+def gait_summary(result: RecordingFit, legs: list[LegStrides]) -> Rows:
     """Return the rows of a gait laboratory's report: quantity and value, with a head."""
-    periods = np.concatenate([one.periods for one in legs])
-    stride, contacts = found.stride, found.stride.contacts
+    periods = np.concatenate([leg.periods for leg in legs])
+    stride, contacts = result.stride, result.stride.contacts
     scatter = f' +- {periods.std(ddof=1):.3f}' if len(periods) >= FEWEST else ''
     rows: Rows = [
         ('quantity', 'value'),
         ('cadence [steps/min]', f'{120.0 * stride.frequency:.1f}') if len(legs) == 2 else
         ('stride rate [strides/min]', f'{60.0 * stride.frequency:.1f}'),
         ('stride time [s]', f'{1.0 / stride.frequency:.3f}{scatter}')]
-    for one in legs:
-        share = 100.0 * one.fractions
+    for leg in legs:
+        share = 100.0 * leg.fractions
         if len(share) and np.isfinite(share).all():
-            names = ('stance', 'swing') if one.by_contacts else ('retraction', 'protraction')
-            rows += [(f'{name} of {one.leg} [% of stride]', f'{value:.1f}') for name, value in zip(
+            names = ('stance', 'swing') if leg.by_contacts else ('retraction', 'protraction')
+            rows += [(f'{name} of {leg.leg} [% of stride]', f'{value:.1f}') for name, value in zip(
                 names, (share.mean(), 100.0 - share.mean()), strict=True)]
         else:
-            rows.append((f'retraction of {one.leg} [% of stride]', 'cannot tell'))
+            rows.append((f'retraction of {leg.leg} [% of stride]', 'cannot tell'))
     if contacts is None:
         rows.append(('stance, swing, double support', 'not known without loads on the feet'))
     elif len(legs) == 2:
@@ -302,9 +302,9 @@ def gait_summary(found: RecordingFit, legs: list[LegStrides]) -> Rows:
     return rows
 
 
-def ranges(found: RecordingFit) -> Rows:
+def ranges(result: RecordingFit) -> Rows:
     """Return rows of the joints' mean cycles in degrees, with a head."""
-    stride = found.stride
+    stride = result.stride
     rows: Rows = [('joint', 'least [deg]', 'largest [deg]', 'range [deg]',
                    'scatter of strides [deg]')]
     for name, mean, spread in zip(stride.joints, np.degrees(stride.mean),
@@ -315,7 +315,7 @@ def ranges(found: RecordingFit) -> Rows:
     return rows
 
 
-def normalised(found: RecordingFit, legs: list[LegStrides]
+def normalised(result: RecordingFit, legs: list[LegStrides]
                ) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
     """Return the joints' mean cycles from the begin of their leg's stride on.
 
@@ -324,18 +324,18 @@ def normalised(found: RecordingFit, legs: list[LegStrides]
         of the mean cycle, deg, shape (m,).
 
     """
-    stride, curves = found.stride, []
-    for one in legs:
-        if not len(one.begins):
+    stride, curves = result.stride, []
+    for leg in legs:
+        if not len(leg.begins):
             continue
         # The mean of phases that lie round the seam.
-        begin = np.angle(np.exp(2j * np.pi * stride.warp(one.begins)).mean()) / (2.0 * np.pi)
-        for name in found.legs[one.leg]:
+        begin = np.angle(np.exp(2j * np.pi * stride.warp(leg.begins)).mean()) / (2.0 * np.pi)
+        for name in result.legs[leg.leg]:
             if name in stride.joints:
                 k = stride.joints.index(name)
                 mean, spread = (np.interp(stride.theta + begin, stride.theta, row[k], period=1.0)
                                 for row in (stride.mean, stride.spread))
-                curves.append((one.leg, name, np.degrees(mean), np.degrees(spread)))
+                curves.append((leg.leg, name, np.degrees(mean), np.degrees(spread)))
     return curves
 
 
@@ -346,7 +346,7 @@ def symmetry(legs: list[LegStrides]) -> Rows:
     both sides are alike.
     """
     rows: Rows = [('left - right', *_names(legs), 'range')]
-    named = {one.leg: one for one in legs}
+    named = {strides.leg: strides for strides in legs}
     for leg, left in named.items():
         right = named.get('right' if leg == 'left' else 'r' + leg[1:])
         if right is None or not leg.startswith('l'):
@@ -361,23 +361,23 @@ def symmetry(legs: list[LegStrides]) -> Rows:
 
 def notes(legs: list[LegStrides]) -> list[str]:
     """Return the basis of the strokes, one line each."""
-    known = [one.leg for one in legs if not one.why and not one.by_contacts]
-    lines = [f'{one.leg}: cannot tell retraction from protraction: {one.why}'
-             for one in legs if one.why]
+    by_angles = [strides.leg for strides in legs if not strides.why and not strides.by_contacts]
+    lines = [f'{strides.leg}: cannot tell retraction from protraction: {strides.why}'
+             for strides in legs if strides.why]
     if legs[0].by_contacts:
         lines.insert(0, 'stance and swing are those of the loads on the feet: strides begin with '
                      'a touchdown')
-    if known:
-        lines.insert(0, f'{", ".join(known)}: a leg is retracted from the foremost to the '
+    if by_angles:
+        lines.insert(0, f'{", ".join(by_angles)}: a leg is retracted from the foremost to the '
                      'hindmost angle of the joint named, and then protracted; contacts are not '
                      'known, and stance is often shorter')
     return lines
 
 
-def as_csv(found: RecordingFit) -> str:
+def as_csv(result: RecordingFit) -> str:
     """Return every stride as a CSV file."""
     out = io.StringIO()
-    csv.writer(out, lineterminator='\n').writerows(every_stride(strides_of(found)))
+    csv.writer(out, lineterminator='\n').writerows(every_stride(strides_of(result)))
     return out.getvalue()
 
 

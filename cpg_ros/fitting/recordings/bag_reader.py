@@ -82,14 +82,14 @@ class LoadStream:
             return None
         first = self._messages[0]
         try:
-            legs, place = _layout(first)
-            whole = {len(one) for one in self._messages} == {len(first)}
+            legs, offset = _layout(first)
+            whole = {len(message) for message in self._messages} == {len(first)}
         except (struct.error, UnicodeDecodeError, ValueError):
             whole = False
-        if not whole or place + 8 * len(legs) > len(first):
+        if not whole or offset + 8 * len(legs) > len(first):
             raise RecordingError(f'{self.topic}: foot loads need a label with the names of the '
                                  'legs, and a number for each')
-        body = b''.join(one[place:place + 8 * len(legs)] for one in self._messages)
+        body = b''.join(message[offset:offset + 8 * len(legs)] for message in self._messages)
         rows = np.frombuffer(body, f'{_order(first)}f8').reshape(-1, len(legs)).astype(float)
         times = self._on_clock(start)
         rising = np.append(True, np.diff(np.maximum.accumulate(times)) > 0.0)
@@ -127,10 +127,10 @@ def _layout(message: bytes) -> tuple[tuple[str, ...], int]:
     legs = tuple(message[HEAD + 8:end - 1].decode().split(','))
     # Size, stride and offset, four bytes each, then how many numbers there are.
     (count,) = struct.unpack_from(f'{order}I', message, end + -(end - HEAD) % 4 + 12)
-    place = end + -(end - HEAD) % 4 + 16
+    offset = end + -(end - HEAD) % 4 + 16
     if count != len(legs):
         raise ValueError('not a number for each name')
-    return legs, place + -(place - HEAD) % 8
+    return legs, offset + -(offset - HEAD) % 8
 
 
 # The recording: joint states, and the foot loads if there are any.
@@ -191,9 +191,9 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
 
 def _load_stream(bag: Bag) -> LoadStream | None:
     """Return a stream for the topic with foot loads, None unless exactly one has them."""
-    found = {one.topic for one in bag.connections
-             if one.topic.rsplit('/')[-1] == NAME and one.msgtype == TYPE}
-    return LoadStream(found.pop()) if len(found) == 1 else None
+    topics = {connection.topic for connection in bag.connections
+             if connection.topic.rsplit('/')[-1] == NAME and connection.msgtype == TYPE}
+    return LoadStream(topics.pop()) if len(topics) == 1 else None
 
 
 def _with_loads(recording: Recording, stream: LoadStream) -> Recording:

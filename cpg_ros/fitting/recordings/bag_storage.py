@@ -123,12 +123,13 @@ class Bag:
         """Take readers; size is that of all storage files, bytes."""
         self.size = size
         self.path, self.readers, self.notes = path, readers, notes
-        self.connections = [one for reader in readers for one in reader.connections]
+        self.connections = [connection for reader in readers for connection in reader.connections]
         # The library refuses unordered messages in files without an index; those of a single
         # topic mostly are in order.
         self.apart = cut
-        for one in self.connections:
-            for value, kind in ((one.topic, str), (one.msgtype, str), (one.msgcount, int)):
+        for connection in self.connections:
+            for value, kind in ((connection.topic, str), (connection.msgtype, str),
+                                (connection.msgcount, int)):
                 if type(value) is not kind:
                     raise RecordingError(f'{path}: a topic is described by {str(value)[:40]!r}, '
                                          f'where {"a number" if kind is int else "text"} is '
@@ -167,13 +168,14 @@ class Bag:
 
     def kind(self, topic: str) -> str:
         """Return the type of a topic."""
-        return next(one.msgtype for one in self.connections if one.topic == topic)
+        return next(connection.msgtype for connection in self.connections
+                    if connection.topic == topic)
 
     def expected(self) -> Counter[str]:
         """Return the number of messages of each topic in the bag's metadata."""
         counts: Counter[str] = Counter()
-        for one in self.connections:
-            counts[one.topic] += one.msgcount
+        for connection in self.connections:
+            counts[connection.topic] += connection.msgcount
         return counts
 
     def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
@@ -181,8 +183,8 @@ class Bag:
         read: Counter[str] = Counter()
         unpacked = UnpackedSize(self.size)
         for reader in self.readers:
-            connections = [one for one in reader.connections if one.topic in topics]
-            for some in [[one] for one in connections] if self.apart else (
+            connections = [item for item in reader.connections if item.topic in topics]
+            for some in [[item] for item in connections] if self.apart else (
                     [connections] * bool(connections)):
                 try:
                     for connection, received, message in reader.messages(some):
@@ -247,13 +249,14 @@ def _opened(path: Path) -> Iterator[Bag]:
                      'are read as they are')
     with ExitStack() as stack:
         readers = []
-        for one in [path] if whole else files:
+        for storage in [path] if whole else files:
             try:
-                reader = Reader(UnfinishedPath(one) if cut else one)
+                reader = Reader(UnfinishedPath(storage) if cut else storage)
                 reader.open()
             # The library names no complete list of what a damaged bag makes it raise.
             except Exception as error:
-                raise RecordingError(f'{_culprit(one, files, error)}: {line(error)}') from error
+                raise RecordingError(
+                    f'{_culprit(storage, files, error)}: {line(error)}') from error
             stack.callback(reader.close)
             readers.append(reader)
         yield Bag(path, readers, cut, notes, size)
@@ -263,11 +266,11 @@ def _renamed(path: Path, files: list[Path]) -> str:
     """Return the names in metadata.yaml of storage files that all have other names now, or ''."""
     text = (path / METADATA).read_text(errors='replace')[:LARGEST_METADATA]
     part = re.search(r'^  relative_file_paths:\n((?: +- .*\n)+)', text, re.M)
-    names = [] if part is None else [one.strip(' -"\'') for one in part[1].splitlines()]
+    names = [] if part is None else [line.strip(' -"\'') for line in part[1].splitlines()]
     there = {file.name for file in files}
-    known = len(names) == len(files) > 0 and not any(
+    matched = len(names) == len(files) > 0 and not any(
         name.endswith(PACKED) or Path(name).name in there for name in names)
-    return abbreviate(names, 3) if known else ''
+    return abbreviate(names, 3) if matched else ''
 
 
 def _check(file: Path) -> None:
@@ -304,12 +307,12 @@ def files_of_bag(folder: Path) -> list[Path]:
         OSError: the folder cannot be listed.
 
     """
-    files = sorted(one for one in folder.iterdir() if one.is_file() and (
-        one.suffix in STORAGES or one.name == METADATA))
-    storages = [one for one in files if one.suffix in STORAGES]
-    parts = [re.fullmatch(r'(.*)_\d+', one.stem) for one in storages]
+    files = sorted(file for file in folder.iterdir() if file.is_file() and (
+        file.suffix in STORAGES or file.name == METADATA))
+    storages = [file for file in files if file.suffix in STORAGES]
+    parts = [re.fullmatch(r'(.*)_\d+', file.stem) for file in storages]
     split = len(parts) > 1 and all(parts) and len({
-        (part[1], one.suffix) for part, one in zip(parts, storages, strict=True) if part}) == 1
+        (part[1], file.suffix) for part, file in zip(parts, storages, strict=True) if part}) == 1
     return files if split or len(files) > len(storages) else []
 
 

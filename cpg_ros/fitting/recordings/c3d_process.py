@@ -91,10 +91,10 @@ def _reason(code: int, errors: bytes, seconds: float) -> str:
 
 def _point(parameters: Any, first: int) -> dict[str, Any]:
     """Return the values of the parameters of points and events that are used."""
-    wanted = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS', 'UNITS')
+    keys = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS', 'UNITS')
     found: dict[str, Any] = {
-        key: [one if isinstance(one, str) else float(one) for one in entry['value']]
-        for key, entry in parameters['POINT'].items() if key.startswith(wanted)}
+        key: [value if isinstance(value, str) else float(value) for value in entry['value']]
+        for key, entry in parameters['POINT'].items() if key.startswith(keys)}
     if 'EVENT' in parameters:
         known = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
                  if key in parameters['EVENT']}

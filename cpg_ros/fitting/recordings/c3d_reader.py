@@ -151,7 +151,7 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
         why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise RecordingError(f'{path}: no C3D file that can be read: {why[:200]}') from error
     labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
-    units = [str(one) for one in point.get('ANGLE_UNITS', [])]
+    units = [str(unit) for unit in point.get('ANGLE_UNITS', [])]
     count, frames = points.shape[1:]
     if not count or not frames:
         raise RecordingError(f'{path}: {pluralize(count, "point")} in '
@@ -163,19 +163,20 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
     notes = ([f'{pluralize(frames, "frame")}, where the header states {stated}: it may be cut']
              if frames < stated else [])
     names, doubles = marker_names(labels, places)
-    found = Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
+    markers = Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
                     notes=(*notes, *doubles),
                     unit=UNITS.get(''.join(map(str, point.get('UNITS', ['']))), math.nan))
-    known = {name.rpartition(':')[2] for name in angles}
-    return found, [name for name, label in zip(names, labels, strict=True)
-                   if label in angles or label.rpartition(':')[2] in known
+    subjects = {name.rpartition(':')[2] for name in angles}
+    return markers, [name for name, label in zip(names, labels, strict=True)
+                   if label in angles or label.rpartition(':')[2] in subjects
                    ], ''.join(units[:1]).strip(), point.get('EVENT', {})
 
 
 def _names(point: Mapping[str, Any], key: str) -> list[str]:
     """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
-    keys = sorted((one for one in point if one.startswith(key)), key=lambda one: (len(one), one))
-    return [str(name).strip() for one in keys for name in point[one]]
+    keys = sorted((parameter for parameter in point if parameter.startswith(key)),
+                  key=lambda parameter: (len(parameter), parameter))
+    return [str(name).strip() for parameter in keys for name in point[parameter]]
 
 
 def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]
@@ -185,21 +186,21 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     scale = ANGLES.get(unit.lower() or 'deg')
     if scale is None:
         raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
-    wanted = matching(joints, angles, str(source))
-    places = points.points[:, [points.names.index(name) for name in wanted]]
+    names = matching(joints, angles, str(source))
+    places = points.points[:, [points.names.index(name) for name in names]]
     # Some programs write zeros where a model had no value.
     first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
-    silent = [name for k, name in enumerate(wanted) if not np.isfinite(first[:, k]).any()]
-    if silent and (joints or len(silent) == len(wanted)):
+    silent = [name for k, name in enumerate(names) if not np.isfinite(first[:, k]).any()]
+    if silent and (joints or len(silent) == len(names)):
         raise RecordingError(f'{source}: no value of {abbreviate(silent)}')
-    kept = [k for k, name in enumerate(wanted) if name not in silent]
+    indices = [k for k, name in enumerate(names) if name not in silent]
     notes = [*points.notes, 'of each angle the first component is taken, flexion in Plug-in Gait']
     if not unit:
         notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
     if silent:
         notes.append(f'without a value, left out: {abbreviate(silent)}')
-    return recording_of(source, points.stamps, [wanted[k] for k in kept],
-                        unwrapped(first[:, kept]), notes, body=body_of(
+    return recording_of(source, points.stamps, [names[k] for k in indices],
+                        unwrapped(first[:, indices]), notes, body=body_of(
                             load_segments('human_plug_in_gait').named_as(points.names),
                             points, points.points))
 

@@ -95,7 +95,7 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
         if fits.all():
             left = left[~alike]
         else:
-            same, stamps, numbers = same[fits], stamps[fits], [one[fits] for one in numbers]
+            same, stamps, numbers = same[fits], stamps[fits], [array[fits] for array in numbers]
             left = np.setdiff1d(left, same, assume_unique=True)
         yield SerializedBlock(same, stamps, layout.names, *numbers)
     for k in left.tolist():
@@ -114,7 +114,7 @@ def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
     """
     alike: dict[tuple, list[SerializedBlock]] = {}
     for block in blocks:
-        widths = (one.shape[1] for one in (block.positions, block.velocities, block.efforts))
+        widths = (array.shape[1] for array in (block.positions, block.velocities, block.efforts))
         alike.setdefault((block.names, *widths), []).append(block)
     for same in alike.values():
         if len(same) == 1:

@@ -181,8 +181,8 @@ class _Table:
             raise RecordingError(f'{path}: the file is empty')
         line, rest, self.line = head[blank], iter(head[blank + 1:]), blank + 1
         if not any(map(line.strip(EMPTY).count, DELIMITERS)) and '\0' not in line and (
-                found := preamble(line, rest)) is not None:
-            line, self.line, declared = found[0], self.line + found[1], found[2]
+                after := preamble(line, rest)) is not None:
+            line, self.line, declared = after[0], self.line + after[1], after[2]
             if unit and declared and unit != declared:
                 raise RecordingError(f'{path}: its preamble says {declared}, not {unit}')
             unit = unit or declared
@@ -314,25 +314,27 @@ class _Table:
         def called(kind: re.Pattern[str]) -> list[int]:
             return [k for k, name in enumerate(names) if kind.match(name)]
 
-        found = [(k, units[k] or match[2]) for k, name in enumerate(names)
+        candidates = [(k, units[k] or match[2]) for k, name in enumerate(names)
                  if (match := TIME.match(name))]
-        found = [(k, unit) for k, unit in found if unit is None or unit in TIMES]
+        candidates = [(k, unit) for k, unit in candidates if unit is None or unit in TIMES]
         seconds, nanoseconds = called(SECONDS), called(NANOSECONDS)
-        if len(found) != 1 and len(seconds) == len(nanoseconds) == 1:
+        if len(candidates) != 1 and len(seconds) == len(nanoseconds) == 1:
             self.rest = nanoseconds[0]
             return Column(seconds[0], headers[seconds[0]], '', 1.0)
         shares = [k for k in called(SHARE) if units[k] in (None, '%')]
-        if not found and len(shares) == 1:
+        if not candidates and len(shares) == 1:
             self.shares = True
             return Column(shares[0], headers[shares[0]], '', 0.01)
-        found = found or [(k, None) for k in called(RECEIPT)[:1]]
-        if len(found) != 1:
+        candidates = candidates or [(k, None) for k in called(RECEIPT)[:1]]
+        if len(candidates) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '
-                + (f'{len(found)} time columns, {abbreviate([headers[k] for k, _ in found])}'
-                   if found else "no time column, such as 'time' or 'time [ms]'; the columns are "
+                + (f'{len(candidates)} time columns, '
+                   + abbreviate([headers[k] for k, _ in candidates])
+                   if candidates
+                   else "no time column, such as 'time' or 'time [ms]'; the columns are "
                    + abbreviate(headers, 20)))
-        k, unit = found[0]
+        k, unit = candidates[0]
         return Column(k, headers[k], '', self._scale(headers[k], unit, option, TIMES))
 
     def _scale(self, header: str, unit: str | None, option: str | None,
@@ -342,7 +344,7 @@ class _Table:
             raise RecordingError(f'{self.path}: column {header!r} is in {unit}, not {option}')
         return units[(unit or option or next(iter(units))).lower()]
 
-    def _joints(self, headers: list[str], option: str | None, wanted: Sequence[str]
+    def _joints(self, headers: list[str], option: str | None, joints: Sequence[str]
                 ) -> list[Column]:
         """Find the joints' columns."""
         columns, others = [], []
@@ -362,19 +364,19 @@ class _Table:
         positions = [replace(column, joint=match[match.lastindex or 0])
                      for column in columns if (match := POSITION.match(column.joint))]
         named = {column.index: column for column in (*columns, *positions)}
-        if wanted:
+        if joints:
             matches = []
-            for pattern in wanted:
+            for pattern in joints:
                 fitting = [column for column in named.values() if any(
                     pattern == name or fnmatchcase(name, pattern)
                     for name in (column.joint, column.header))]
                 if not fitting:
                     raise RecordingError(f'{self.path}: no column {pattern!r}; there are '
-                                         f'{abbreviate([one.header for one in columns], 40)}')
+                                         f'{abbreviate([other.header for other in columns], 40)}')
                 matches += fitting
             columns = list(dict.fromkeys(matches))
         else:
-            others += [one.header for one in columns] if positions else []
+            others += [other.header for other in columns] if positions else []
             columns = positions or columns
             left = [header for header in others
                     if header not in {column.header for column in columns}]

@@ -50,7 +50,7 @@ FORMATS: dict[str, RecordingFormat] = {
 
 def reading_options() -> list[Option]:
     """Return the options of all formats, each once."""
-    return list(dict.fromkeys(option for one in FORMATS.values() for option in one.options))
+    return list(dict.fromkeys(option for form in FORMATS.values() for option in form.options))
 
 
 def format_of(path: Path) -> RecordingFormat:
@@ -64,13 +64,14 @@ def format_of(path: Path) -> RecordingFormat:
 
     """
     if path.is_dir():
-        folders = [one for one in FORMATS.values() if one.files_in is not None]
-        return next((one for one in folders if one.files_in and one.files_in(path)), folders[0])
-    fitting = [one for one in FORMATS.values() if path.name.endswith(one.endings)]
+        folders = [form for form in FORMATS.values() if form.files_in is not None]
+        return next((form for form in folders if form.files_in and form.files_in(path)),
+                    folders[0])
+    fitting = [form for form in FORMATS.values() if path.name.endswith(form.endings)]
     if fitting:
-        return next((one for one in fitting if one.recognises and one.recognises(path)),
-                    next((one for one in fitting if not one.recognises), fitting[0]))
-    endings = [ending for one in FORMATS.values() for ending in one.endings]
+        return next((form for form in fitting if form.recognises and form.recognises(path)),
+                    next((form for form in fitting if not form.recognises), fitting[0]))
+    endings = [ending for form in FORMATS.values() for ending in form.endings]
     raise RecordingError(f'{path}: no recording; the names of recordings end in '
                          f'{", ".join(endings)}')
 
@@ -126,8 +127,9 @@ def add_reading_options(parser: Parser) -> None:
     source.add_argument(f'--{first.name}', type=Path, metavar=first.metavar, help=first.help)
     source.add_argument('--bags', type=Path, nargs='+', metavar='FOLDER', help='all bags and '
                         'tables in these folders; --out is then a folder for the results')
-    for one in others:
-        source.add_argument(f'--{one.name}', type=Path, metavar=one.metavar, help=one.help)
+    for action in others:
+        source.add_argument(f'--{action.name}', type=Path, metavar=action.metavar,
+                            help=action.help)
     for option in reading_options():
         parser.add_argument(f'--{option.name}', metavar=option.metavar, help=option.help,
                             choices=option.choices or None, nargs='+' if option.several else None,

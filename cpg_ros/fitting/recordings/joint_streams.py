@@ -213,9 +213,9 @@ class Stream:
                 f'position[{k}]' for k in range(count))
         if not self.wanted or not self.wanted.isdisjoint(names):
             return names
-        found = Counter(name[:-len(one)] for name in names for one in self.wanted
-                        if name.endswith(one))
-        (prefix, most), *others = [*found.most_common(2), ('', 0)]
+        prefixes = Counter(name[:-len(joint)] for name in names for joint in self.wanted
+                        if name.endswith(joint))
+        (prefix, most), *others = [*prefixes.most_common(2), ('', 0)]
         # Equally many joints under another prefix belong to another robot.
         if most < 2 or others[0][1] == most:
             return names
@@ -273,37 +273,38 @@ class Stream:
             yield stamps if headers else received, names, positions
 
 
-def _of_joints(wanted: set[str], names: tuple[str, ...], positions: np.ndarray
+def _of_joints(joints: set[str], names: tuple[str, ...], positions: np.ndarray
                ) -> tuple[tuple[str, ...], np.ndarray]:
     """Keep the names and positions of the joints wanted, copied only where others are there."""
-    if wanted.issuperset(names):
+    if joints.issuperset(names):
         return names, positions
-    columns = [k for k, name in enumerate(names) if name in wanted]
+    columns = [k for k, name in enumerate(names) if name in joints]
     return tuple(names[k] for k in columns), positions[:, columns]
 
 
-def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
+def _once_each(streams: list[Stream], joints: Sequence[str]) -> list[str]:
     """Choose one topic for every joint that is on several; return a note for each."""
-    order = sorted(streams, key=lambda one: (
-        -len(one.joints), one.topic.rsplit('/')[-1] != 'joint_states', -one.count))
+    order = sorted(streams, key=lambda candidate: (
+        -len(candidate.joints), candidate.topic.rsplit('/')[-1] != 'joint_states',
+        -candidate.count))
     owner = {name: stream for stream in reversed(order) for name in stream.joints}
     notes = []
     for stream in streams:
-        stream.taken = {name for name in wanted if owner[name] is stream}
+        stream.taken = {name for name in joints if owner[name] is stream}
         for other in streams:
-            common = [name for name in wanted
+            common = [name for name in joints
                       if name in stream.joints and owner[name] is other is not stream]
             if common:
                 notes.append(f'{stream.topic}: {joint_list(common)} taken from {other.topic}')
     return notes
 
 
-def _refuse_two_robots(streams: Sequence[Stream], wanted: Sequence[str], source: str) -> None:
+def _refuse_two_robots(streams: Sequence[Stream], selected: Sequence[str], source: str) -> None:
     """Reject topics of two namespaces that have the same joints."""
     seen: dict[tuple[str, frozenset[str]], str] = {}
     for stream in streams:
         namespace, _, name = stream.topic.rpartition('/')
-        joints = frozenset(stream.joints).intersection(wanted)
+        joints = frozenset(stream.joints).intersection(selected)
         if not joints or not namespace:
             continue
         other = seen.setdefault((name, joints), stream.topic)
@@ -349,8 +350,8 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
             _refuse_lacking(f'{source}{stream.topic}', stream.servo.needs, idle)
     if not there:
         raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
-    found = [name for name in joints if name in there]
-    joints = found if some and found else joints
+    present = [name for name in joints if name in there]
+    joints = present if some and present else joints
     require(joints, there, whole)
     _refuse_two_robots(streams, joints or there, whole)
     notes = [*notes, *_once_each(list(streams), joints or there)]
@@ -394,18 +395,18 @@ class LiveRecording:
 
     def add(self, topic: str, received: int, message: bytes) -> None:
         """Keep a serialised JointState that came in at a time in ns; forget those too old."""
-        kept = self._kept[topic]
-        kept.append((received, message))
+        samples = self._kept[topic]
+        samples.append((received, message))
         if self.window > 0.0:
             oldest = received - int(self.window * 1e9)
-            while kept[0][0] < oldest:
-                kept.popleft()
+            while samples[0][0] < oldest:
+                samples.popleft()
 
     def copy(self) -> 'LiveRecording':
         """Return the same messages, to be decoded while more come in."""
         other = LiveRecording(tuple(self._kept), self.window)
-        for topic, kept in self._kept.items():
-            other._kept[topic].extend(kept)
+        for topic, samples in self._kept.items():
+            other._kept[topic].extend(samples)
         return other
 
     def recording(self, joints: Sequence[str] = (), some: bool = False,
@@ -424,9 +425,9 @@ class LiveRecording:
         if not any(self._kept.values()):
             raise RecordingError(f'{", ".join(self._kept)}: no joint states came in')
         streams = []
-        for topic, kept in self._kept.items():
+        for topic, samples in self._kept.items():
             stream = Stream(topic, joints, servo)
-            for received, message in kept:
+            for received, message in samples:
                 stream.add(received, message)
             stream.decode()
             streams.append(stream)

@@ -104,14 +104,14 @@ class Segments:
 
     def named_as(self, there: Sequence[str]) -> 'Segments':
         """Return the same with those alternatives for markers that are there."""
-        names = {name: next((one for one in others if one in there), name)
+        names = {name: next((marker for marker in others if marker in there), name)
                  for name, others in self.alternatives.items() if name not in there}
 
         def ends(markers: tuple[str, ...]) -> tuple[str, ...]:
-            return tuple(dict.fromkeys(names.get(one, one) for one in markers))
+            return tuple(dict.fromkeys(names.get(marker, marker) for marker in markers))
 
-        return replace(self, segments={name: Segment(ends(one.begin), ends(one.end))
-                                       for name, one in self.segments.items()},
+        return replace(self, segments={name: Segment(ends(marker.begin), ends(marker.end))
+                                       for name, marker in self.segments.items()},
                        body=ends(self.body), feet=ends(self.feet))
 
     def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
@@ -122,9 +122,9 @@ class Segments:
             solid: in three dimensions, where its axis' markers count, too.
 
         """
-        one = self.joints[joint]
+        segment = self.joints[joint]
         return tuple(dict.fromkeys(
-            marker for name in (*one.between, *[one.axis] * bool(one.axis and solid))
+            marker for name in (*segment.between, *[segment.axis] * bool(segment.axis and solid))
             for marker in self.segments[name].markers))
 
 
@@ -261,7 +261,8 @@ def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, 
     seen = np.isfinite(points).all(axis=2).sum(axis=0)
     notes = []
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-        places = sorted((k for k, one in enumerate(names) if one == name), key=lambda k: -seen[k])
+        places = sorted((k for k, other in enumerate(names) if other == name),
+                        key=lambda k: -seen[k])
         for number, k in enumerate(places[1:], 2):
             names[k] = f'{name}#{number}'
         notes.append(f'{len(places)} markers are called {name!r}: the one seen in '
@@ -286,19 +287,19 @@ def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None
 
     """
     with np.errstate(all='ignore'):
-        first, second = (one / np.linalg.norm(one, axis=1, keepdims=True)
-                         for one in (first, second))
+        first, second = (vector / np.linalg.norm(vector, axis=1, keepdims=True)
+                         for vector in (first, second))
         if first.shape[1] == 2:
             cross = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
         elif axis is None:
             cross = np.linalg.norm(np.cross(first, second), axis=1)
         else:
             axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
-            first, second = (one - np.sum(one * axis, axis=1, keepdims=True) * axis
-                             for one in (first, second))
+            first, second = (vector - np.sum(vector * axis, axis=1, keepdims=True) * axis
+                             for vector in (first, second))
             cross = np.sum(axis * np.cross(first, second), axis=1)
         angle = np.arctan2(cross, np.sum(first * second, axis=1))
-        short = [~(np.linalg.norm(one, axis=1) >= SHORTEST) for one in (first, second)]
+        short = [~(np.linalg.norm(vector, axis=1) >= SHORTEST) for vector in (first, second)]
     return np.where(short[0] | short[1], np.nan, angle)
 
 
@@ -326,21 +327,21 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
         segments = load_segments(segments)
     segments = segments.named_as(markers.names)
     notes = list(markers.notes)
-    wanted = matching(joints, list(segments.joints), f'{source}, segments')
+    names = matching(joints, list(segments.joints), f'{source}, segments')
     solid = markers.points.shape[2] == 3
-    needs = {name: segments.markers(name, solid) for name in wanted}
-    found = [name for name in wanted if set(needs[name]) <= set(markers.names)]
-    lost = [name for name in wanted if name not in found]
+    needs = {name: segments.markers(name, solid) for name in names}
+    complete = [name for name in names if set(needs[name]) <= set(markers.names)]
+    lost = [name for name in names if name not in complete]
     missing = sorted({marker for name in lost for marker in needs[name]} - set(markers.names))
-    if lost and (joints or not found):
+    if lost and (joints or not complete):
         raise RecordingError(f'{source}: no marker {abbreviate(missing)}, which '
                              f'{abbreviate(lost)} need{"s" * (len(lost) == 1)}; there are '
                              f'{abbreviate(markers.names, 40)}')
     if lost:
         notes.append(f'without the markers {abbreviate(missing)}, left out: {abbreviate(lost)}')
-    used = list(dict.fromkeys(marker for name in found for marker in needs[name]))
+    used = list(dict.fromkeys(marker for name in complete for marker in needs[name]))
     points = _seen(markers, segments.least_likelihood, used, notes)
-    angles = {name: _angle(name, segments, markers, points) for name in found}
+    angles = {name: _angle(name, segments, markers, points) for name in complete}
     silent = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
     empty = [name for name in used
              if not np.isfinite(points[:, markers.names.index(name)]).all(axis=1).any()]
@@ -391,7 +392,7 @@ def _angle(name: str, segments: Segments, markers: Markers, points: np.ndarray) 
 
     def direction(segment: str) -> np.ndarray:
         ends = segments.segments[segment]
-        begin, end = (points[:, [markers.names.index(one) for one in names]].mean(axis=1)
+        begin, end = (points[:, [markers.names.index(marker) for marker in names]].mean(axis=1)
                       for names in (ends.begin, ends.end))
         return end - begin
 

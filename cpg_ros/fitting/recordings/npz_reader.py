@@ -80,7 +80,7 @@ def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
     with files.opened(path, RecordingError, largest=LARGEST) as file:
         try:
             with zipfile.ZipFile(file) as packed:
-                members = [one.filename for one in packed.infolist()]
+                members = [member.filename for member in packed.infolist()]
                 names = [name for name in members if name.endswith('.npy')]
                 unpacked = UnpackedSize(os.fstat(file.fileno()).st_size)
                 for name in names:
@@ -123,7 +123,7 @@ def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
         if not listed:
             raise RecordingError(f"{path}: the columns of {table!r} have no names: an array "
                                  "'joints' has to list them")
-        names = [str(one) for one in np.ravel(arrays[listed])]
+        names = [str(key) for key in np.ravel(arrays[listed])]
         if arrays[listed].dtype.kind != 'U' or len(names) != arrays[table].shape[1]:
             raise RecordingError(f'{path}: {listed!r} are {arrays[listed].size} of type '
                                  f'{arrays[listed].dtype}, where {table!r} has '
@@ -141,12 +141,12 @@ def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
                 f'the times; there are {abbreviate(_described(arrays), 20)}')
         if len({arrays[name].size for name in names}) > 1:
             raise RecordingError(f'{path}: arrays of different lengths, '
-                                 f'{abbreviate(_described({one: arrays[one] for one in names}))}')
+                                 f'{abbreviate(_described({key: arrays[key] for key in names}))}')
         used, angles = names, np.column_stack([arrays[name] for name in names])
     if angles.dtype.kind not in 'fiu':
         raise RecordingError(f'{path}: {used[0]!r} is of type {angles.dtype}, not of numbers')
-    known = {one for one in arrays if one.lower() in (*TIMES, *RATES, *UNITS)}
-    left = [name for name in arrays if name not in used and name not in known]
+    reserved = {key for key in arrays if key.lower() in (*TIMES, *RATES, *UNITS)}
+    left = [name for name in arrays if name not in used and name not in reserved]
     if left:
         notes.append(f'{pluralize(len(left), "array")} left out: {abbreviate(left)}')
     return names, angles.astype(float)

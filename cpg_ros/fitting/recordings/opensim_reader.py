@@ -161,12 +161,14 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     # As it is no angle, the unit of angles does not hold for the pelvis. Models in a plane have
     # no z.
     body = {match[1]: column for column in columns if (match := PELVIS.match(column))}
-    found = read_csv(path, unit, progress=progress, joints=[*(
+    recording = read_csv(path, unit, progress=progress, joints=[*(
         next(column for column, joint in angles.items() if joint == name) for name in names),
         *body.values()])
-    place = dict(zip(body, found.positions[:, len(names):].T / ANGLES[declared or unit or 'rad'],
+    place = dict(zip(body,
+                     recording.positions[:, len(names):].T / ANGLES[declared or unit or 'rad'],
                      strict=True))
-    found = replace(found, joints=tuple(names), positions=found.positions[:, :len(names)],
+    recording = replace(recording, joints=tuple(names),
+                        positions=recording.positions[:, :len(names)],
                     body=np.column_stack([place.get(axis, 0.0 * place['y']) for axis in 'xzy'])
                     if 'y' in place and np.isfinite([*place.values()]).all() else None)
     notes: list[str] = []
@@ -175,9 +177,9 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     left = [column for column in columns if column not in angles]
     if left:
         notes.append(f'{pluralize(len(left), "column")} left out, no angles: {abbreviate(left)}')
-    if rows is not None and (there := len(found.times)) < rows:
+    if rows is not None and (there := len(recording.times)) < rows:
         notes.append(f'{there} rows, where the header states {rows}')
-    return replace(found, notes=(*notes, *found.notes))
+    return replace(recording, notes=(*notes, *recording.notes))
 
 
 def _joint(column: str) -> str:
@@ -189,10 +191,10 @@ def _header(path: Path) -> tuple[str | None, list[str], int | None]:
     """Return the declared unit, the columns but the time, and the number of rows if stated."""
     with opened(path) as file:
         first = file.readline()
-        found = preamble(first, file) if first else None
-    if found is None:
+        header = preamble(first, file) if first else None
+    if header is None:
         raise RecordingError(f"{path}: no file of OpenSim: it has no line 'endheader'")
-    line, _, unit, stated = found
+    line, _, unit, stated = header
     columns = [name.strip() for name in re.split(r'[\t,;]' if '\t' in line else r'\s+', line)]
     columns = [name for name in columns if name]
     if not columns or columns[0].lower() != 'time':

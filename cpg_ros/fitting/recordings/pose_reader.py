@@ -142,7 +142,7 @@ def pose_markers(path: str | Path, fps: str | float | None, individual: str | No
         raise RecordingError(f'{path}: a project of SLEAP: export its analysis as HDF5 or CSV')
     poses = _poses_of_hdf5(path) if path.suffix == '.h5' else _poses_of_table(path, individual)
     # Only the requested track was read, and it has no name.
-    tracked = {one[0] for one in poses.columns if one} == {''}
+    tracked = {key[0] for key in poses.columns if key} == {''}
     return poses.markers(fps, None if tracked else individual)
 
 

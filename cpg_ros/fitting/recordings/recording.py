@@ -279,23 +279,23 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     if not names:
         raise RecordingError(f'{source}: no samples')
     require(joints, names, source)
-    wanted = tuple(joints) or tuple(names)
+    wanted_names = tuple(joints) or tuple(names)
     notes: list[str] = []
-    found = []
+    read_streams = []
     for group in list(groups):
-        columns = [k for k, name in enumerate(group) if name in wanted]
+        columns = [k for k, name in enumerate(group) if name in wanted_names]
         if columns:
             samples = groups.pop(group)
             stamps, positions = samples.taken()
             notes += [samples.note] if samples.note else []
-            found.append((stamps, [wanted.index(group[k]) for k in columns],
+            read_streams.append((stamps, [wanted_names.index(group[k]) for k in columns],
                           positions[:, columns] if len(columns) < len(group) else positions))
-    found, astray = drop_outlier_stamps(found)
+    read_streams, astray = drop_outlier_stamps(read_streams)
     notes += astray
-    origin = min(int(stamps.min()) for stamps, _, _ in found)
+    origin = min(int(stamps.min()) for stamps, _, _ in read_streams)
     ordered = []
     late = again = received = 0
-    for stamps, columns, positions in found:
+    for stamps, columns, positions in read_streams:
         received += len(stamps)
         # Duplicates are found in float64, where two stamps can be one a week into a recording.
         times = (stamps - origin) / 1e9
@@ -310,35 +310,35 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
             again += int((~fresh).sum())
             times, positions = times[fresh], positions[fresh]
         ordered.append((times, columns, positions))
-    del found
-    far = drop_outlier_positions(ordered, len(wanted))
-    times, positions, odd, twice = _one_table(ordered, len(wanted))
+    del read_streams
+    far = drop_outlier_positions(ordered, len(wanted_names))
+    times, positions, odd, twice = _one_table(ordered, len(wanted_names))
     del ordered
     if late:
         notes.append(f'{pluralize(late, "sample")} out of order, sorted by stamp')
     if again + twice:
         notes.append(f'{pluralize(again + twice, "duplicate")} of a stamp, the first is kept')
     odd -= far
-    notes += [f'joint {wanted[k]!r}: {pluralize(int(odd[k]), "position")} not a finite number'
-              for k in np.flatnonzero(odd)]
-    notes += [f'joint {wanted[k]!r}: {pluralize(int(far[k]), "position")} far beyond the others, '
-              'left out' for k in np.flatnonzero(far)]
+    notes += [f'joint {wanted_names[k]!r}: {pluralize(int(odd[k]), "position")} not a finite '
+              'number' for k in np.flatnonzero(odd)]
+    notes += [f'joint {wanted_names[k]!r}: {pluralize(int(far[k]), "position")} far beyond the '
+              'others, left out' for k in np.flatnonzero(far)]
     there = ~np.isnan(positions)
-    silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
+    silent = [name for name, any_there in zip(wanted_names, there.any(axis=0), strict=True)
               if not any_there]
     if silent:
         raise RecordingError(f'{source}: no finite position of {joint_list(silent)} in '
                              f'{pluralize(received, "sample")}; name the joints to take to do '
                              'without')
-    heard = there.any(axis=1)
-    if not heard.all():
-        times, positions, there = times[heard], positions[heard], there[heard]
+    measured = there.any(axis=1)
+    if not measured.all():
+        times, positions, there = times[measured], positions[measured], there[measured]
     if len(times) < 2:
         raise RecordingError(f'{source}: {pluralize(received, "sample")}, all at stamp '
                              f'{origin / 1e9:.9f} s: no time passes')
-    notes += _missing(wanted, there)
-    notes += _intervals(wanted, times, there)
-    return Recording(wanted, times - times[0], positions, source,
+    notes += _missing(wanted_names, there)
+    notes += _intervals(wanted_names, times, there)
+    return Recording(wanted_names, times - times[0], positions, source,
                      origin / 1e9 + float(times[0]), tuple(notes))
 
 
@@ -505,9 +505,9 @@ def recognise_stride(recording: Recording) -> Recording | None:
     if recording.cycle or len(x) < 16 or not np.isfinite(x).all():
         return None
     gaps, closed = _seam(recording)
-    one = x[:len(x) - closed] / np.maximum(np.ptp(x, axis=0), 1e-9)
-    speeds = np.abs(one - np.roll(one, 1, axis=0)).mean(axis=1)
-    power = np.sum(np.abs(np.fft.rfft(one - one.mean(axis=0), axis=0))**2, axis=1)
+    normalised = x[:len(x) - closed] / np.maximum(np.ptp(x, axis=0), 1e-9)
+    speeds = np.abs(normalised - np.roll(normalised, 1, axis=0)).mean(axis=1)
+    power = np.sum(np.abs(np.fft.rfft(normalised - normalised.mean(axis=0), axis=0))**2, axis=1)
     if (gaps.max() > GAP_RECOGNISED or speeds[[0, 1, -1]].mean() < SEAM_SPEED * speeds.mean()
             or power[1::2].sum() < ODD_SHARE * power.sum()
             or not DURATIONS[0] <= recording.times[-1] <= DURATIONS[1]):

@@ -100,11 +100,11 @@ class Reader:
                 metadata = rosbag2_py.Info().read_metadata(str(self.path), '')
                 if metadata.compression_mode.lower() not in ('', 'none'):
                     self._kind = rosbag2_py.SequentialCompressionReader
-            found = self._opened().get_metadata().topics_with_message_count
+            topics = self._opened().get_metadata().topics_with_message_count
         except RuntimeError as error:
             raise ReaderError(str(error)) from error
-        self.connections = [Connection(one.topic_metadata.name, one.topic_metadata.type,
-                                       one.message_count) for one in found]
+        self.connections = [Connection(topic.topic_metadata.name, topic.topic_metadata.type,
+                                       topic.message_count) for topic in topics]
 
     def close(self) -> None:
         """Every pass over the messages opens the bag anew: there is nothing to close."""
@@ -117,9 +117,9 @@ class Reader:
     def messages(self, connections: Sequence[Connection]
                  ) -> Iterator[tuple[Connection, int, bytes]]:
         """Yield connection, receive time (ns) and bytes of each message, in order of time."""
-        known = {one.topic: one for one in connections}
+        by_topic = {connection.topic: connection for connection in connections}
         reader = self._opened()
-        reader.set_filter(rosbag2_py.StorageFilter(topics=list(known)))
+        reader.set_filter(rosbag2_py.StorageFilter(topics=list(by_topic)))
         while reader.has_next():
             topic, message, received = reader.read_next()
-            yield known[topic], received, message
+            yield by_topic[topic], received, message

@@ -55,15 +55,15 @@ def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
     if not lost:
         return parts, []
     first, last = stamps[ends[most]], stamps[ends[most + 1] - 1]
-    kept = []
+    remaining = []
     for own, columns, positions in parts:
         there = (own >= first) & (own <= last)
         if there.any():
-            kept.append((own[there], columns, positions[there]))
+            remaining.append((own[there], columns, positions[there]))
     stray = stamps[0] if ends[most] else stamps[-1]
-    return kept, [f'{pluralize(lost, "sample")} stamped far from the others, left out, such as at '
-                  f'{stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
-                  f'{last / 1e9:.10g} s']
+    return remaining, [f'{pluralize(lost, "sample")} stamped far from the others, left out, such '
+                       f'as at {stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
+                       f'{last / 1e9:.10g} s']
 
 
 def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
@@ -82,11 +82,11 @@ def _far(column: np.ndarray) -> np.ndarray:
     """Return which positions of a joint are beyond all others, shape (samples,)."""
     there = np.isfinite(column)
     far = there & (np.abs(column) > FARTHEST)
-    known = there & ~far
-    if known.any():
-        low, middle, high = np.percentile(column[known], (5.0, 50.0, 95.0))
-        spikes = known & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
-        if np.count_nonzero(spikes) <= max(1.0, RARE * np.count_nonzero(known)):
+    near = there & ~far
+    if near.any():
+        low, middle, high = np.percentile(column[near], (5.0, 50.0, 95.0))
+        spikes = near & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
+        if np.count_nonzero(spikes) <= max(1.0, RARE * np.count_nonzero(near)):
             far |= spikes
     return far
 

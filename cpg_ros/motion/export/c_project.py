@@ -164,23 +164,23 @@ class CProject:
 
         """
         folder = 'src/' if arduino else ''
-        found = {f'{folder}cpg.h': self._header(), f'{folder}cpg.c': self._source(),
+        files = {f'{folder}cpg.h': self._header(), f'{folder}cpg.c': self._source(),
                  f'{folder}gait_data.c': f'/* {self.title} */\n{self.data.text()}'}
         if golden is not None:
-            found['extras/test_cpg.c' if arduino else 'test_cpg.c'] = golden_test(
+            files['extras/test_cpg.c' if arduino else 'test_cpg.c'] = golden_test(
                 golden, self.data.format.real, self.title)
         if arduino:
-            found['library.properties'] = self._properties()
+            files['library.properties'] = self._properties()
             joints = len(self.data.robot.joints)
             tick = 20 if golden is None else max(1, round(1000.0 * golden.dt))
             fixed = self.data.format.real == 'fixed'
-            found['examples/walk/walk.ino'] = part('walk.ino', {
+            files['examples/walk/walk.ino'] = part('walk.ino', {
                 'TICK': str(tick), 'RAMP': 'CPG_TICKS(3)' if fixed else '3',
                 'TIME': '' if fixed else ', cpg_real(TICK) / 1000',
                 'PINS': ', '.join(map(str, range(2, 2 + joints))),
                 'ONES': ', '.join(['1'] * joints),
                 'JOINTS': comment(', '.join(joint.name for joint in self.data.robot.joints))})
-        return found
+        return files
 
     def _properties(self) -> str:
         robot = comment(self.data.robot.name)
@@ -257,7 +257,8 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
     history = f', and keeps {project.nodes} of them for the delay of {delay:g}' if delay else ''
     form = FORMS[data.format.form].format(step=data.step, history=history, points=data.points)
     fixed, f = data.format.real == 'fixed', 'f' if data.format.real == 'float32' else ''
-    second_time, ramp = (f'CPG_TICKS({one})' if fixed else f'{one}{f}' for one in (1.0, 2.0))
+    second_time, ramp = (f'CPG_TICKS({seconds})' if fixed else f'{seconds}{f}'
+                         for seconds in (1.0, 2.0))
     second = data.plans[1].name if len(data.plans) > 1 else ''
     switch = f'cpg_switch(&c, CPG_GAIT_{c_name(second)}, {second_time});' if second else ''
     return TEXT.format(
@@ -292,8 +293,8 @@ def joint_order(robot: Robot) -> np.ndarray:
         InputError: the robot has not four legs, of these names, with two or three joints each.
 
     """
-    found = {leg.lower(): leg for leg in robot.legs}
-    legs = [found[name] for names in LEGS for name in names if name in found]
+    by_name = {leg.lower(): leg for leg in robot.legs}
+    legs = [by_name[name] for names in LEGS for name in names if name in by_name]
     joints = {len(robot.legs[leg]) for leg in legs}
     if len(legs) != len(LEGS) or len(robot.legs) != len(LEGS) or not joints <= {2, 3} \
             or len(joints) != 1:
@@ -320,11 +321,11 @@ def skill(plan: GaitPlan) -> np.ndarray:
         phases + plan.orbit.phases[robot.cells[joint]], grid, readout.angles[joint], period=1.0)
         for joint in order]).T
     ratio = 1 if np.abs(degrees).max() <= 127.0 else 2
-    found = np.rint(degrees / ratio).astype(int)
-    if np.abs(found).max() > 127:
+    steps = np.rint(degrees / ratio).astype(int)
+    if np.abs(steps).max() > 127:
         raise InputError(f'{plan.name}: an angle of {np.abs(degrees).max():.0f} degrees; skill '
                          'arrays go to 254')
-    return np.concatenate([[frames, 0, 0, ratio], found.ravel()]).astype(np.int8)
+    return np.concatenate([[frames, 0, 0, ratio], steps.ravel()]).astype(np.int8)
 
 
 def skills(plans: Sequence[GaitPlan], title: str) -> str:

@@ -145,8 +145,8 @@ def _refuse_step(step: float | None, plans: Sequence[GaitPlan]) -> None:
     """Refuse a step that a network could not be run with."""
     if step is None:
         return
-    shortest = min(one.orbit.network.delay or one.orbit.period / 8.0 for one in plans)
-    longest = max(one.orbit.network.delay for one in plans)
+    shortest = min(plan.orbit.network.delay or plan.orbit.period / 8.0 for plan in plans)
+    longest = max(plan.orbit.network.delay for plan in plans)
     if not longest / MOST_STEPS <= step <= shortest:
         raise InputError(f'argument --step: {step:g} is not from {longest / MOST_STEPS:g} to '
                          f'{shortest:g}')
@@ -155,7 +155,7 @@ def _refuse_step(step: float | None, plans: Sequence[GaitPlan]) -> None:
 def _title(plans: Sequence[GaitPlan]) -> str:
     first = plans[0]
     return (f'Gaits of {first.robot.name} by the network {first.orbit.network.name}: '
-            f'{", ".join(one.name for one in plans)}')
+            f'{", ".join(plan.name for plan in plans)}')
 
 
 def _project(args: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CProject, float]:

@@ -76,8 +76,8 @@ class FixedData(GaitData):
             raise InputError(f'{fastest:g} strides per second need at least {4.0 * fastest:g} '
                              f'ticks per second, not {rate:g}')
         readouts = [plan.readout for plan in plans]
-        largest = max(float(np.abs(one.angles + plan.shift[:, np.newaxis]).max())
-                      for one, plan in zip(readouts, plans, strict=True))
+        largest = max(float(np.abs(readout.angles + plan.shift[:, np.newaxis]).max())
+                      for readout, plan in zip(readouts, plans, strict=True))
         reach = largest + float(np.abs(self.robot.column('offset')).max())
         if reach >= 2.0**(15 - POSITION):
             raise InputError(f'positions up to {reach:.3g} rad: whole numbers go to 4 rad')
@@ -87,7 +87,7 @@ class FixedData(GaitData):
         #: the point, for a slope times a frequency of 16 bits.
         self.coarser = _halvings(fastest / rate * 2.0**32, 16)
         bound = max(float(bound.max()) for bound in self._bounds)
-        steepest = max(float(np.abs(one.rises).max()) for one in readouts)
+        steepest = max(float(np.abs(readout.rises).max()) for readout in readouts)
         if steepest < STILL:
             raise InputError(f'{self.robot.name}: no joint moves in '
                              f'{", ".join(plan.name for plan in plans)}, so that whole numbers '
@@ -97,12 +97,12 @@ class FixedData(GaitData):
         self._angle = POSITION + self.fine
         self._tables, self._place = [], []
         for plan in plans:
-            first, place = distinct_joints(plan)
+            first, indices = distinct_joints(plan)
             every = plan.readout.angles.shape[1] // POINTS
             self._tables.append(np.hstack([
                 _whole(plan.readout.angles[first][:, ::every], self._angle),
                 _whole(plan.readout.rises[first][:, ::every], self.slope)]))
-            self._place.append(place)
+            self._place.append(indices)
 
     @property
     def _bounds(self) -> list[np.ndarray]:
@@ -137,7 +137,7 @@ class FixedData(GaitData):
     def text(self) -> str:
         """Write ``gait_data.c``, but for its head."""
         lines, structs = ['#define CPG_INTERNAL', '#include "cpg.h"', ''], []
-        for plan, table, place, bound in zip(self.plans, self._tables, self._place,
+        for plan, table, indices, bound in zip(self.plans, self._tables, self._place,
                                              self._bounds, strict=True):
             name = c_name(plan.name).lower()
             lines += [f'static CPG_ROM int16_t {name}_tables[] = '
@@ -146,7 +146,7 @@ class FixedData(GaitData):
                 _whole(plan.shift, self._angle),
                 np.maximum(1, np.ldexp(bound, self._rate_unit).astype(int)),
                 _whole(plan.orbit.phases[self.robot.cells] % 1.0, 16) % 2**16,
-                [f'{name}_tables + {table.shape[1] * one}' for one in place], strict=True)
+                [f'{name}_tables + {table.shape[1] * index}' for index in indices], strict=True)
             start = _whole(plan.readout.start % 1.0, 32) % 2**32
             legs = _whole(leg_phases(plan) % 1.0, 16) % 2**16
             structs += [f'    {{{_whole(plan.frequency / self.rate, 32)}, {start}u, '

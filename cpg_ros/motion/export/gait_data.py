@@ -68,9 +68,9 @@ def check_names(what: str, names: Sequence[str]) -> None:
         InputError: two of them are the same there.
 
     """
-    known: dict[str, str] = {}
+    used: dict[str, str] = {}
     for name in names:
-        other = known.setdefault(c_name(name), name)
+        other = used.setdefault(c_name(name), name)
         if other != name:
             raise InputError(f'{what} {other!r} and {name!r} are both {c_name(name)} in C: rename '
                              'one of them')
@@ -111,9 +111,9 @@ def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], 
 def distinct_joints(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
     """Return joints of which no two share their angles over a cycle, and which each is like."""
     both = np.hstack([plan.readout.angles, plan.readout.rises])
-    _, first, place = np.unique(np.round(both, 12), axis=0, return_index=True,
+    _, first, indices = np.unique(np.round(both, 12), axis=0, return_index=True,
                                 return_inverse=True)
-    return first, place.ravel()
+    return first, indices.ravel()
 
 
 def leg_phases(plan: GaitPlan) -> np.ndarray:
@@ -192,20 +192,20 @@ class GaitData:
         """The gaits."""
         made = []
         for plan in self.plans:
-            one = _Struct(c_name(plan.name).lower(), self.format.real)
-            one.put('frequency', plan.frequency)
-            one.put('period', plan.orbit.period)
-            one.put('start', plan.readout.start)
-            one.put('shift', plan.shift)
-            one.put('speed', plan.speed)
-            (self._table if self.format.form == 'table' else self._network)(one, plan)
-            made.append(one)
+            struct = _Struct(c_name(plan.name).lower(), self.format.real)
+            struct.put('frequency', plan.frequency)
+            struct.put('period', plan.orbit.period)
+            struct.put('start', plan.readout.start)
+            struct.put('shift', plan.shift)
+            struct.put('speed', plan.speed)
+            (self._table if self.format.form == 'table' else self._network)(struct, plan)
+            made.append(struct)
         return made
 
-    def _table(self, one: _Struct, plan: GaitPlan) -> None:
+    def _table(self, struct: _Struct, plan: GaitPlan) -> None:
         readout = plan.readout
         size = readout.angles.shape[1]
-        first, place = distinct_joints(plan)
+        first, indices = distinct_joints(plan)
 
         def curve(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = np.round(phases * size).astype(int) % size
@@ -213,49 +213,49 @@ class GaitData:
 
         tables = hermite_table(curve, self.format.tolerance,
                                [2**n for n in range(4, size.bit_length() - 1)])
-        one.put('joint_phase', plan.orbit.phases[self.robot.cells])
-        one.put('leg_phase', leg_phases(plan))
-        one.put('joint_table', place)
-        one.points = tables.shape[1]
-        one.put('points', one.points)
-        one.point('tables', tables)
+        struct.put('joint_phase', plan.orbit.phases[self.robot.cells])
+        struct.put('leg_phase', leg_phases(plan))
+        struct.put('joint_table', indices)
+        struct.points = tables.shape[1]
+        struct.put('points', struct.points)
+        struct.point('tables', tables)
 
-    def _network(self, one: _Struct, plan: GaitPlan) -> None:
+    def _network(self, struct: _Struct, plan: GaitPlan) -> None:
         orbit, network = plan.orbit, plan.orbit.network
         waves = self._waves(orbit)
-        one.put('p', np.concatenate([value.ravel() for value in values_of(network)]))
-        one.put('gain', plan.gain)
-        one.put('delay', network.delay / self.step)
+        struct.put('p', np.concatenate([value.ravel() for value in values_of(network)]))
+        struct.put('gain', plan.gain)
+        struct.put('delay', network.delay / self.step)
         basis = orbit.symmetry.basis
-        one.put('basis_rows', len(basis) if plan.gain else 0)
-        one.points = waves.shape[1]
-        one.put('points', one.points)
-        one.point('basis', basis if plan.gain else None)
-        one.point('waves', waves)
-        one.put('phase', orbit.phases)
-        one.put('wave', orbit.waves)
-        one.put('weights', plan.readout.joints.weights[:, :self.weights])
+        struct.put('basis_rows', len(basis) if plan.gain else 0)
+        struct.points = waves.shape[1]
+        struct.put('points', struct.points)
+        struct.point('basis', basis if plan.gain else None)
+        struct.point('waves', waves)
+        struct.put('phase', orbit.phases)
+        struct.put('wave', orbit.waves)
+        struct.put('weights', plan.readout.joints.weights[:, :self.weights])
         if self.format.steering:
-            one.put('in_place', plan.in_place.joints.weights[:, :self.weights])
+            struct.put('in_place', plan.in_place.joints.weights[:, :self.weights])
         maps = self.maps(plan)
         if self.retimed:
-            one.put('maps', np.tile([1.0, 0.0, 0.0], (len(self.robot.joints), 1))
+            struct.put('maps', np.tile([1.0, 0.0, 0.0], (len(self.robot.joints), 1))
                     if maps is None else maps)
         if isinstance(plan.readout, PhaseReadout):
-            known = plan.readout.gait.known
-            one.point('shapes', known.shape)
-            one.point('circles', known.circles)
-            one.point('terms', known.terms)
-            one.point('crests', known.crests)
+            phase_maps = plan.readout.gait.known
+            struct.point('shapes', phase_maps.shape)
+            struct.point('circles', phase_maps.circles)
+            struct.point('terms', phase_maps.terms)
+            struct.point('crests', phase_maps.crests)
             return
         every = len(plan.readout.wave.lead) // self.lead
-        one.put('peak', orbit.peak)
-        one.point('lead', plan.readout.wave.lead[::every])
+        struct.put('peak', orbit.peak)
+        struct.point('lead', plan.readout.wave.lead[::every])
         if self.retimed:
             retiming = plan.readout.retiming
-            one.point('turn', None if retiming is None else
+            struct.point('turn', None if retiming is None else
                       retiming.lead[::every] * [1.0, every])
-            one.point('cycle', None if retiming is None else
+            struct.point('cycle', None if retiming is None else
                       retiming.cycle[::every] * [1.0, every, 1.0, every])
 
     def _waves(self, orbit: Orbit) -> np.ndarray:
@@ -264,7 +264,8 @@ class GaitData:
                  for variable in range(self.network.variables)]
 
         def curve(phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            values, slopes = (np.stack([orbit.waveform(phases, order, *one) for one in which])
+            values, slopes = (np.stack([orbit.waveform(phases, order, *indices)
+                                        for indices in which])
                               for order in (0, 1))
             return values, slopes
 
@@ -283,22 +284,22 @@ class GaitData:
     @property
     def points(self) -> int:
         """Most points of a gait's tables."""
-        return max(one.points for one in self.structs)
+        return max(struct.points for struct in self.structs)
 
     @property
     def bytes(self) -> int:
         """Memory of all constants, bytes, to which come pointers and small integers."""
         size = 4 if self.format.real == 'float32' else 8
-        return size * (sum(one.numbers for one in self.structs) + 4 * len(self.robot.joints))
+        return size * (sum(struct.numbers for struct in self.structs) + 4 * len(self.robot.joints))
 
     def text(self) -> str:
         """Write ``gait_data.c``, but for its head."""
         real, robot = self.format.real, self.robot
         lines = ['#define CPG_INTERNAL', '#include "cpg.h"', '']
-        lines += [array for one in self.structs for array in (*one.arrays, '')]
+        lines += [array for struct in self.structs for array in (*struct.arrays, '')]
         lines.append('CPG_ROM cpg_gait cpg_gaits[CPG_GAITS] = {')
-        for one in self.structs:
-            lines += ['    {', *one.fields, '    },']
+        for struct in self.structs:
+            lines += ['    {', *struct.fields, '    },']
         lines += ['};', '', 'CPG_ROM cpg_real cpg_offset[CPG_JOINTS] = '
                   f'{braces(robot.column("offset"), real)};',
                   'CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS] = '

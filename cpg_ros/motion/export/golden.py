@@ -77,27 +77,27 @@ def network_states(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
     states = plan.orbit(np.array(0.0))
     start = states + 0.1 * np.random.default_rng(SEED).uniform(-1.0, 1.0, states.size)
     stepper = Stepper(network, start, plan.step, gain=plan.gain, symmetry=plan.orbit.symmetry)
-    found = []
+    rows = []
     for step in range(1, STEPS + 1):
         stepper.advance(stepper.step)
         if step % EVERY_STEP == 0:
-            found.append(stepper.newest())
-    return start, np.array(found)
+            rows.append(stepper.newest())
+    return start, np.array(rows)
 
 
 def schedule(gaits: int, dt: float) -> dict[int, int]:
     """Return the times and gaits of SWITCHES switches, and of the final stand."""
     times = [RAMP + BETWEEN * n for n in range(SWITCHES + 1)]
     ticks = [round(time / dt) for time in times]
-    found = {tick: (n + 1) % gaits for n, tick in enumerate(ticks[:-1])} if gaits > 1 else {}
-    return {**found, ticks[-1] if gaits > 1 else round(5.0 / dt): -1}
+    gait_at = {tick: (n + 1) % gaits for n, tick in enumerate(ticks[:-1])} if gaits > 1 else {}
+    return {**gait_at, ticks[-1] if gaits > 1 else round(5.0 / dt): -1}
 
 
 def run_pattern(plans: Sequence[GaitPlan], dt: float, events: dict[int, int],
                 strides: np.ndarray | None, substep: float = SUBSTEP) -> np.ndarray:
     """Return the joints' positions after each tick, rad, shape (ticks, joints)."""
     drive = None if strides is None else StrideCommand(len(plans[0].robot.legs))
-    pattern, found = Pattern(plans[0], RAMP, drive=drive), []
+    pattern, samples = Pattern(plans[0], RAMP, drive=drive), []
     pattern.substep, steered = substep, iter(() if strides is None else strides)
     for tick in range(max(events) + round(1.5 * RAMP / dt)):
         event = events.get(tick)
@@ -109,8 +109,8 @@ def run_pattern(plans: Sequence[GaitPlan], dt: float, events: dict[int, int],
         elif event is not None:
             pattern.apply(plans[event], TRANSITION)
         pattern.advance(dt)
-        found.append(pattern.position.copy())
-    return np.array(found)
+        samples.append(pattern.position.copy())
+    return np.array(samples)
 
 
 def golden_of(data: GaitData, dt: float, substep: float = SUBSTEP) -> Golden:

@@ -309,7 +309,7 @@ class Supervisor:
                 reason := self.tracking.update(self._at, self.robot.q, dt)):
             self.sit(now, reason)
         if self.state in ACTIVE:
-            self._lead(now, dt)
+            self._follow_goal(now, dt)
         if self.state is BridgeState.DAMPING:
             self.command.damp(self.damping)
         return True
@@ -339,7 +339,7 @@ class Supervisor:
         if now - targets.accepted > timeout:
             self.sit(now, targets.rejection or f'no fresh target for {1e3 * timeout:.0f} ms')
 
-    def _lead(self, now: float, dt: float) -> None:
+    def _follow_goal(self, now: float, dt: float) -> None:
         settings, state, passed = self._settings, self.state, now - self._began
         # After a late tick, move no further than in two periods.
         dt = min(dt, 2.0 * settings.period)

@@ -359,11 +359,11 @@ class BalanceLoop(SensorLoop):
             pattern.balance = None
             return
         inputs.update(now, pattern.enabled)
-        found, self.waiting = inputs.faults(now)
-        pattern.failed = bool(found)
-        found += [f'{inputs.feet if one == FEET else inputs.monitors[one].name}: {why}'
-                  for one, why in list(pattern.doubts.items())]
-        self.faults = '; '.join(found)
+        faults, self.waiting = inputs.faults(now)
+        pattern.failed = bool(faults)
+        faults += [f'{inputs.feet if joint == FEET else inputs.monitors[joint].name}: {why}'
+                  for joint, why in list(pattern.doubts.items())]
+        self.faults = '; '.join(faults)
         measured, sensors = inputs.sensor_data, self._sensors
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
         sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]

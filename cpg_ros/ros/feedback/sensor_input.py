@@ -69,12 +69,12 @@ class JointLayout:
 
     """
 
-    def __init__(self, data: bytes, wanted: Sequence[str]) -> None:
+    def __init__(self, data: bytes, joints: Sequence[str]) -> None:
         message = deserialize_message(data, JointState)
         names = list(message.name)
-        missing = [name for name in wanted if names.count(name) != 1]
+        missing = [name for name in joints if names.count(name) != 1]
         self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
-        self.places = np.array([] if missing else [names.index(name) for name in wanted], int)
+        self.places = np.array([] if missing else [names.index(name) for name in joints], int)
         self.same = [(1, 2)]
         end = HEADER + 8
 
@@ -235,10 +235,10 @@ class SensorInput:
                                          for part in (senses.stamps, senses.news))
             struct.stamped = hasattr(kind, 'header')
         self.inputs[0].expect(DOUBLE * (np.arange(IMU) - IMU), -(HEADER + DOUBLE * IMU))
-        for one in self.inputs[2:]:
+        for source in self.inputs[2:]:
             if contacts == WRENCHES:
-                one.expect(DOUBLE * (np.arange(FORCE) - WRENCH), -(HEADER + DOUBLE * WRENCH))
-        self.monitors: Sequence[InputMonitor] = [one.monitor for one in self.inputs]
+                source.expect(DOUBLE * (np.arange(FORCE) - WRENCH), -(HEADER + DOUBLE * WRENCH))
+        self.monitors: Sequence[InputMonitor] = [source.monitor for source in self.inputs]
         self.joints = self.monitors[1]
         self._library = native.library()
         self._take_in: Any = None
@@ -276,12 +276,12 @@ class SensorInput:
             judge: whether to judge them now; else the last result is returned.
 
         """
-        found, waiting = [], False
+        faults, waiting = [], False
         for monitor in self.monitors:
             if fault := monitor.fault(now) if judge else monitor.reason:
-                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
+                faults.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
                 waiting = waiting or monitor.believed == -math.inf
-        return found, waiting
+        return faults, waiting
 
     def read(self) -> None:
         """Read the numbers of the messages that have arrived."""

@@ -150,11 +150,12 @@ def missing_requirements(robot: Robot) -> str:
 
 def partial_legs(robot: Robot) -> list[str]:
     """Return a line for each leg that gets only some of the corrections."""
-    known = robot.geometry.legs if robot.geometry is not None else {}
+    legs_of_geometry = robot.geometry.legs if robot.geometry is not None else {}
     return [f'feedback moves the leg {leg} forward and up only: it has no hip that abducts'
-            if leg in known else
+            if leg in legs_of_geometry else
             f'feedback leaves the leg {leg} alone: the robot file has no geometry of it'
-            for leg in robot.legs if leg not in known or len(known[leg].joints) == 2]
+            for leg in robot.legs if leg not in legs_of_geometry
+            or len(legs_of_geometry[leg].joints) == 2]
 
 
 def default_enabled(node: Any, robot: Robot, combined: str, commands: bool) -> Spec:
@@ -227,7 +228,8 @@ class FeedbackSwitch:
 
     def judge(self, parameters: Sequence[Parameter]) -> str:
         """Return why a batch of changes is rejected, or ''."""
-        switched_on = any(one.name == ENABLED and one.value is True for one in parameters)
+        switched_on = any(parameter.name == ENABLED and parameter.value is True
+                          for parameter in parameters)
         obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
@@ -237,12 +239,12 @@ class FeedbackSwitch:
 
     def apply(self) -> None:
         """Apply the parameters."""
-        wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()
-        if wanted and self.loop is None:
+        enabled = self._node.get_parameter(ENABLED).value and not self.obstacle()
+        if enabled and self.loop is None:
             self.loop = self._make()
         if self.loop is not None:
             self._set_gains()
-            self.loop.wanted = wanted and not self._hindrance
+            self.loop.wanted = enabled and not self._hindrance
 
     def hinder(self, reason: str) -> None:
         """Fade the feedback out as long as there is a reason, '' for none."""

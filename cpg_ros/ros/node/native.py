@@ -104,14 +104,14 @@ def library() -> ctypes.CDLL:
     """
     text = _SOURCE.read_text()
     key = hashlib.sha256(f'{platform.machine()}{text}'.encode()).hexdigest()[:14]
-    found = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text}, _SOURCE.name)
+    loaded = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text}, _SOURCE.name)
     whole = ctypes.c_int64
-    found.publish.argtypes, found.publish.restype = (ctypes.c_void_p, whole, whole), whole
-    found.run.argtypes, found.run.restype = (ctypes.c_void_p,), whole
-    found.wait_until.argtypes, found.wait_until.restype = (whole,), whole
-    found.sense.argtypes, found.tick.argtypes = (ctypes.c_void_p,), (ctypes.c_void_p, whole)
-    found.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
-    return found
+    loaded.publish.argtypes, loaded.publish.restype = (ctypes.c_void_p, whole, whole), whole
+    loaded.run.argtypes, loaded.run.restype = (ctypes.c_void_p,), whole
+    loaded.wait_until.argtypes, loaded.wait_until.restype = (whole,), whole
+    loaded.sense.argtypes, loaded.tick.argtypes = (ctypes.c_void_p,), (ctypes.c_void_p, whole)
+    loaded.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
+    return loaded
 
 
 @cache

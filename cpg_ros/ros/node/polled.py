@@ -96,8 +96,8 @@ class PolledSubscription:
         """Take what has arrived: each message, and its time of arrival, ns of system time."""
         handle = self._subscription.handle
         with handle:
-            while (found := handle.take_message(self._kind, self._raw)) is not None:
-                yield found[0], found[1]['received_timestamp']
+            while (taken := handle.take_message(self._kind, self._raw)) is not None:
+                yield taken[0], taken[1]['received_timestamp']
 
     def newest(self) -> Any:
         """Return the newest message since the last call, None if none has come."""
@@ -105,9 +105,9 @@ class PolledSubscription:
         with handle:
             # No more than these can wait.
             for _ in range(self.depth):
-                if (found := handle.take_message(self._kind, self._raw)) is None:
+                if (taken := handle.take_message(self._kind, self._raw)) is None:
                     break
-                newest = found[0]
+                newest = taken[0]
         return newest
 
     @property

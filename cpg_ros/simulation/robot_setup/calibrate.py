@@ -123,17 +123,17 @@ def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Seque
     """
     still = table.in_place[:, columns]
     parts = [part - part.mean(axis=0) for part in (still, table.angles[:, columns] - still)]
-    wanted = mean - mean.mean(axis=0)
+    target = mean - mean.mean(axis=0)
     left = np.empty(POINTS)
     for k in range(POINTS):
-        place = np.round(theta * POINTS).astype(int) + k
-        rows = np.stack([part[place % POINTS].ravel() for part in parts], axis=1)
-        weights, *_ = np.linalg.lstsq(rows, wanted.ravel(), rcond=None)
-        left[k] = np.square(rows @ weights - wanted.ravel()).sum() if weights[0] > 0.0 else np.inf
+        bins = np.round(theta * POINTS).astype(int) + k
+        rows = np.stack([part[bins % POINTS].ravel() for part in parts], axis=1)
+        weights, *_ = np.linalg.lstsq(rows, target.ravel(), rcond=None)
+        left[k] = np.square(rows @ weights - target.ravel()).sum() if weights[0] > 0.0 else np.inf
     return float(left.argmin()) / POINTS
 
 
-def with_efference(robot: Robot, found: Sequence[Calibrated]) -> Robot:
+def with_efference(robot: Robot, calibrated: Sequence[Calibrated]) -> Robot:
     """Return a robot that has these copies, beside those of its other speeds.
 
     A table takes SPEEDS of them. Where there would be more, what was recorded replaces what the
@@ -144,24 +144,24 @@ def with_efference(robot: Robot, found: Sequence[Calibrated]) -> Robot:
 
     """
     motions = dict(robot.motions)
-    for gait in dict.fromkeys(one.gait for one in found):
+    for gait in dict.fromkeys(recording.gait for recording in calibrated):
         motion = motions.get(gait, robot.motion(gait, gait))
         speeds, table = np.empty(0), np.empty((0, BINS, SIGNALS))
-        for one in found:
-            if one.gait == gait:
-                other = np.abs(speeds - one.speed) > SAME
-                speeds = np.append(speeds[other], one.copy.speeds)
-                table = np.concatenate([table[other], one.copy.table])
+        for recording in calibrated:
+            if recording.gait == gait:
+                other = np.abs(speeds - recording.speed) > SAME
+                speeds = np.append(speeds[other], recording.copy.speeds)
+                table = np.concatenate([table[other], recording.copy.table])
         if len(speeds) > SPEEDS:
             raise InputError(f'{gait}: bags of {len(speeds)} speeds; a robot file takes at most '
                              f'{SPEEDS}')
         if motion.efference is not None:
-            known = EfferenceCopy.of(motion.efference)
-            apart = np.abs(known.speeds[:, None] - speeds).min(axis=1)
+            efference = EfferenceCopy.of(motion.efference)
+            apart = np.abs(efference.speeds[:, None] - speeds).min(axis=1)
             farthest = np.argsort(-apart, kind='stable')[:SPEEDS - len(speeds)]
-            kept = farthest[apart[farthest] > SAME]
-            speeds = np.append(known.speeds[kept], speeds)
-            table = np.concatenate([known.table[kept], table])
+            remaining = farthest[apart[farthest] > SAME]
+            speeds = np.append(efference.speeds[remaining], speeds)
+            table = np.concatenate([efference.table[remaining], table])
         rising = np.argsort(speeds)
         motions[gait] = replace(motion, efference=EfferenceCopy(
             speeds[rising], table[rising]).as_table())
@@ -221,9 +221,10 @@ def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calib
     topics = {key: getattr(args, key) for key in TYPES}
     gaits = args.gait * len(args.bags) if len(args.gait) < 2 else args.gait
     none = [None] * len(args.bags)
-    found = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait, speed
+    calibrated = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait,
+                  speed
              in zip(args.bags, gaits or none, args.speed or none, strict=True)]
-    return with_efference(robot, found), found
+    return with_efference(robot, calibrated), calibrated
 
 
 def _comment(path: Path) -> str:
@@ -253,8 +254,9 @@ def _calibrate(args: argparse.Namespace) -> int:
                   '') for gait in args.gait or robot.motions
                  if (measured := robot.motions[gait].efference) is not None]
     else:
-        robot, found = _recorded(robot, args)
-        rows += [(one.source, one.gait, f'{one.speed:.3f}', str(one.cycles)) for one in found]
+        robot, calibrated = _recorded(robot, args)
+        rows += [(recording.source, recording.gait, f'{recording.speed:.3f}',
+                  str(recording.cycles)) for recording in calibrated]
     write_robot(out, robot, _comment(Path(args.robot)))
     say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
     return 0

@@ -114,10 +114,10 @@ def _checked(args: Namespace) -> RobotCheck:
         raise InputError(f'--make: {args.make} does not end in .yaml')
     if args.make is not None and args.make.exists():
         raise InputError(f'--make: {args.make} already exists')
-    known = load_mjcf(args.mjcf) if args.urdf is None else load_urdf(args.urdf)
+    description = load_mjcf(args.mjcf) if args.urdf is None else load_urdf(args.urdf)
     if args.make is None or args.forward in ('', 'x'):
-        return _compared(args, known)
-    args.urdf = _turned(args, known)
+        return _compared(args, description)
+    args.urdf = _turned(args, description)
     try:
         return _compared(args, load_urdf(args.urdf))
     finally:
@@ -125,23 +125,23 @@ def _checked(args: Namespace) -> RobotCheck:
             args.urdf.unlink()
 
 
-def _compared(args: Namespace, known: RobotDescription) -> RobotCheck:
+def _compared(args: Namespace, description: RobotDescription) -> RobotCheck:
     """Check a robot file, or make one and check it."""
     if args.velocity is not None:
-        known = replace(known, joints={name: replace(joint, velocity=args.velocity)
-                                       for name, joint in known.joints.items()})
+        description = replace(description, joints={name: replace(joint, velocity=args.velocity)
+                                       for name, joint in description.joints.items()})
     source = args.mjcf if args.urdf is None else str(args.urdf)
-    robot = load_robot(args.robot) if args.make is None else _made(args, known)
+    robot = load_robot(args.robot) if args.make is None else _made(args, description)
     presets = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in args.gaits:
         if name not in presets:
             raise InputError(f"--gaits: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(presets))}')
-    there = all(joint.name in known.joints and not known.joints[joint.name].flaw
+    there = all(joint.name in description.joints and not description.joints[joint.name].flaw
                 for joint in robot.joints)
-    return checked(robot, known, (args.robot or str(args.make), source),
+    return checked(robot, description, (args.robot or str(args.make), source),
                    list(dict.fromkeys(args.gaits)), args.frequency, args.amplitude,
-                   geometry_from(robot, known) if robot.geometry and there else None)
+                   geometry_from(robot, description) if robot.geometry and there else None)
 
 
 def _given(texts: Sequence[str]) -> dict[str, str]:
@@ -152,22 +152,22 @@ def _given(texts: Sequence[str]) -> dict[str, str]:
     return {leg: text for leg, _, text in pairs}
 
 
-def _made(args: Namespace, known: RobotDescription) -> Robot:
-    legs = legs_in(known, bool(args.forward), _given(args.legs))
-    robot, notes = robot_from(known, args.make.stem, legs)
-    if faults := walking_faults(robot, known):
+def _made(args: Namespace, description: RobotDescription) -> Robot:
+    legs = legs_in(description, bool(args.forward), _given(args.legs))
+    robot, notes = robot_from(description, args.make.stem, legs)
+    if faults := walking_faults(robot, description):
         raise DescriptionError(f'nothing is written, as what would be does not walk: {faults[0]}')
     if len(robot.legs) == 2:
         robot, feet = _biped(args, robot)
     else:
-        geometry = geometry_from(robot, known)
+        geometry = geometry_from(robot, description)
         others = [leg for leg in robot.legs if leg not in geometry.legs]
         feet = ('feedback can move all feet' if not others else
                 f'feedback moves no foot of {", ".join(others)}: a leg must be {LEGS}')
         if geometry.legs and geometry.mass > 0.0:
             robot = replace(robot, geometry=geometry)
         else:
-            feet = f'feedback: no leg is {LEGS}, or the {known.format} gives no mass'
+            feet = f'feedback: no leg is {LEGS}, or the {description.format} gives no mass'
     notes = f'{notes}\n{feet}'
     if args.velocity is not None:
         notes += f'\nvelocity limits: {args.velocity:g} rad/s, as given with --velocity'
@@ -175,7 +175,7 @@ def _made(args: Namespace, known: RobotDescription) -> Robot:
     stand = ', '.join(f'{joint.name} at {joint.offset:g}' for joint in joints)
     notes += f'\ninvented: small amplitudes, and the stand, which has in {leg} {stand} rad'
     source = find_model(args.mjcf) if args.urdf is None else args.urdf
-    write_robot(args.make, robot, COMMENT.format(source=source.name, format=known.format,
+    write_robot(args.make, robot, COMMENT.format(source=source.name, format=description.format,
                                                    notes=notes))
     if args.forward not in ('', 'x'):
         notes += f'\nfor {args.urdf}, which faces x: use it from here on'
@@ -200,7 +200,7 @@ def _biped(args: Namespace, robot: Robot) -> tuple[Robot, str]:
         return robot, f'feedback: none: {error}'
 
 
-def _turned(args: Namespace, known: RobotDescription) -> Path:
+def _turned(args: Namespace, description: RobotDescription) -> Path:
     """Write a URDF beside the given one with a root link that faces x; return its path."""
     if args.urdf is None:
         raise InputError(f'--forward {args.forward}: an MJCF file cannot be turned, as its base '
@@ -213,16 +213,16 @@ def _turned(args: Namespace, known: RobotDescription) -> Path:
     ElementTree.SubElement(tree.getroot(), 'link', name='facing_x')
     joint = ElementTree.SubElement(tree.getroot(), 'joint', name='facing_x_joint', type='fixed')
     ElementTree.SubElement(joint, 'parent', link='facing_x')
-    ElementTree.SubElement(joint, 'child', link=known.root())
+    ElementTree.SubElement(joint, 'child', link=description.root())
     ElementTree.SubElement(joint, 'origin', xyz='0 0 0', rpy=f'0 0 {angle:.9g}')
     write_atomically(path, ElementTree.tostring(tree.getroot()))
     return path
 
 
 def _check(args: Namespace) -> int:
-    found = _checked(args)
-    say(as_json(found.as_dict()) if args.json else found.text())
-    return 1 if found.faults else 0
+    result = _checked(args)
+    say(as_json(result.as_dict()) if args.json else result.text())
+    return 1 if result.faults else 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

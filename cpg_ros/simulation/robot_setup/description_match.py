@@ -145,20 +145,20 @@ class RobotCheck:
         rows: list[tuple[str, ...]] = [
             ('joint', 'leg', 'kind', 'limits [rad]', self.format, 'speed [rad/s]',
              self.format, '')]
-        for one in self.joints:
-            joint, there = one.joint, one.described
+        for row in self.joints:
+            joint, there = row.joint, row.described
             rows.append((joint.name, joint.leg, there.kind if there else '-', _span(joint),
                          _span(there) if there else '-', f'{joint.velocity:.4g}',
                          _limit(there.velocity) if there else '-',
-                         'does not match' if one.faults else 'ok'))
+                         'does not match' if row.faults else 'ok'))
         lines = table(rows, '<<<<<>><')
         rows = [('gait', 'network', 'stride [Hz]', 'nearest limit', 'fastest joint', '')]
         for gait in self.gaits:
-            known = gait.frequency == gait.frequency
-            rows.append((gait.name, gait.network, f'{gait.frequency:.3g}' if known else '-',
-                         f'{_room(gait.room)} ({gait.room_at})' if known else '-',
+            measured = gait.frequency == gait.frequency
+            rows.append((gait.name, gait.network, f'{gait.frequency:.3g}' if measured else '-',
+                         f'{_room(gait.room)} ({gait.room_at})' if measured else '-',
                          f'{100 * gait.fraction:.0f} % of its limit ({gait.share_at})'
-                         if known else '-', 'does not fit' if gait.faults else 'fits'))
+                         if measured else '-', 'does not fit' if gait.faults else 'fits'))
         lines += ['', *table(rows, '<<><<<'), '']
         faults = self.faults
         lines += [f'- {fault}' for fault in faults] + [f'note: {note}' for note in self.notes]
@@ -168,14 +168,14 @@ class RobotCheck:
         return '\n'.join(lines)
 
 
-def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
+def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
             gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0,
             geometry: BodyGeometry | None = None, notes: Sequence[str] = ()) -> RobotCheck:
     """Compare a robot file with the robot's description.
 
     Args:
         robot: what the file says.
-        known: what a URDF or an MJCF file says of it.
+        description: what a URDF or an MJCF file says of it.
         names: of the two files, for messages.
         gaits: gaits or presets; by default all gaits of the robot's networks.
         frequency: strides per second (Hz), 0 for the model's own time; None takes what the
@@ -185,24 +185,24 @@ def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
         notes: of the caller's.
 
     """
-    near = _nearest(robot, known)
-    joints = tuple(JointCheck(joint, known.joints.get(joint.name), tuple(
-        _faults(joint, known, near.get(joint.name, '')))) for joint in robot.joints)
+    near = _nearest(robot, description)
+    joints = tuple(JointCheck(joint, description.joints.get(joint.name), tuple(
+        _faults(joint, description, near.get(joint.name, '')))) for joint in robot.joints)
     pairs = [(network, name) for network in robot.networks for name in
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
-    return RobotCheck(*names, known.format, joints, tuple(
-        _gait(robot, known, network, name, frequency, amplitude) for network, name in pairs),
-        tuple(_lopsided(robot)), tuple(_shape(robot, known, pairs, geometry)),
-        (*notes, *_notes(robot, known)))
+    return RobotCheck(*names, description.format, joints, tuple(
+        _gait(robot, description, network, name, frequency, amplitude) for network, name in pairs),
+        tuple(_lopsided(robot)), tuple(_shape(robot, description, pairs, geometry)),
+        (*notes, *_notes(robot, description)))
 
 
-def _shape(robot: Robot, known: RobotDescription, gaits: Sequence[tuple[str, str]],
+def _shape(robot: Robot, description: RobotDescription, gaits: Sequence[tuple[str, str]],
            geometry: BodyGeometry | None) -> Iterator[str]:
     """Say what is wrong with lengths, masses, sides, the stand and the steps."""
-    yield from _implausible(robot, known)
+    yield from _implausible(robot, description)
     if robot.geometry is not None and geometry is not None:
-        yield from _differing(robot.geometry, geometry, known.format)
-    yield from walking_faults(robot, known, gaits)
+        yield from _differing(robot.geometry, geometry, description.format)
+    yield from walking_faults(robot, description, gaits)
 
 
 def walking_faults(robot: Robot, known: RobotDescription,
@@ -342,8 +342,8 @@ def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str
             yield f"{key}: {mine.tolist()} m is {off:.4g} m from the {what}'s {theirs.tolist()}"
 
 
-def _faults(joint: Joint, known: RobotDescription, near: str) -> Iterator[str]:
-    what, there = known.format, known.joints.get(joint.name)
+def _faults(joint: Joint, description: RobotDescription, near: str) -> Iterator[str]:
+    what, there = description.format, description.joints.get(joint.name)
     if there is None:
         yield f'the {what} has no such joint' + (f", did you mean '{near}'?" if near else '')
         return
@@ -364,7 +364,7 @@ def _faults(joint: Joint, known: RobotDescription, near: str) -> Iterator[str]:
                f"rad/s above the {what}'s {there.velocity:g}")
 
 
-def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
+def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
           frequency: float | None, amplitude: float) -> GaitCheck:
     if frequency is None:
         frequency = _fastest(robot.motion(name, NETWORKS[network].presets()[name].gait))
@@ -376,12 +376,12 @@ def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
     for joint, low, high, speed in zip(robot.joints, *gait_plan.span, gait_plan.speed,
                                        strict=True):
         limits: list[tuple[str, Joint | JointDescription]] = [("the robot file's", joint)]
-        there = known.joints.get(joint.name)
+        there = description.joints.get(joint.name)
         if there and not there.flaw:
-            limits.append((f"the {known.format}'s", there))
-        lower, below = max((one.lower, whose) for whose, one in limits)
-        upper, above = min((one.upper, whose) for whose, one in limits)
-        fastest, slower = min((one.velocity, whose) for whose, one in limits)
+            limits.append((f"the {description.format}'s", there))
+        lower, below = max((limit.lower, whose) for whose, limit in limits)
+        upper, above = min((limit.upper, whose) for whose, limit in limits)
+        fastest, slower = min((limit.velocity, whose) for whose, limit in limits)
         low, high = joint.offset + low, joint.offset + high
         rooms.append((min(low - lower, upper - high), joint.name))
         fractions.append((speed / fastest, joint.name))
@@ -417,20 +417,20 @@ def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
             for near in get_close_matches(joint.name.lower(), list(free), 1)}
 
 
-def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:
-    driven, what = [joint.name for joint in robot.joints], known.format
-    idle = [joint.name for joint in known.joints.values()
+def _notes(robot: Robot, description: RobotDescription) -> Iterator[str]:
+    driven, what = [joint.name for joint in robot.joints], description.format
+    idle = [joint.name for joint in description.joints.values()
             if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
     if idle:
         yield f'moving joints of the {what} that no leg drives: ' + ', '.join(idle)
     yield from invented_limits(robot, what)
     slow = sorted({joint.velocity for joint in robot.joints if joint.velocity < SLOW})
     if slow:
-        yield (f'velocity limits of {" and ".join(f"{one:g}" for one in slow)} rad/s are slow for '
-               f'a walking robot ({SERVOS}), and gaits keep to them: if your motors are faster, '
-               f'correct the {what}, or make the file with --velocity and what they reach')
+        yield (f'velocity limits of {" and ".join(f"{speed:g}" for speed in slow)} rad/s are slow '
+               f'for a walking robot ({SERVOS}), and gaits keep to them: if your motors are '
+               f'faster, correct the {what}, or make the file with --velocity and what they reach')
     unbounded = [name for name in driven
-                 if name in known.joints and known.joints[name].velocity == inf]
+                 if name in description.joints and description.joints[name].velocity == inf]
     if unbounded:
         yield f'the {what} has no velocity limit of ' + (
             'any joint' if len(unbounded) == len(driven) else ', '.join(unbounded))

@@ -49,12 +49,12 @@ CROSSWISE = 1.3
 MOST_JOINTS = 6
 
 
-def legs_in(known: RobotDescription, faces_x: bool = False,
+def legs_in(description: RobotDescription, faces_x: bool = False,
             given: Mapping[str, str] | None = None) -> Legs:
     """Find the legs of a robot; the explanation has a line for each thing that is held.
 
     Args:
-        known: the description.
+        description: the description.
         faces_x: whether x is forward, whatever names and axes say.
         given: leg -> text that the names of its joints contain, of all legs; none to find them.
 
@@ -64,55 +64,55 @@ def legs_in(known: RobotDescription, faces_x: bool = False,
 
     """
     if given:
-        return _cleaned(known, _named(known, given))
-    paths = _paths(known)
-    crosswise = _crosswise(known, paths)
+        return _cleaned(description, _named(description, given))
+    paths = _paths(description)
+    crosswise = _crosswise(description, paths)
     turns = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
-    found = {turn: legs for turn in turns if (legs := _assigned(known, paths, turn))}
-    if crosswise and not faces_x and (legs := _assigned(known, paths, 0)) and all(
+    by_turn = {turn: legs for turn in turns if (legs := _assigned(description, paths, turn))}
+    if crosswise and not faces_x and (legs := _assigned(description, paths, 0)) and all(
             place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
-        found = {0: legs}
-    if not found:
-        raise LegsError(_question(known, paths))
-    fitting = [turn for turn in found if faces_x or not _misnamed(found[turn])]
+        by_turn = {0: legs}
+    if not by_turn:
+        raise LegsError(_question(description, paths))
+    fitting = [turn for turn in by_turn if faces_x or not _misnamed(by_turn[turn])]
     if not fitting:
-        raise LegsError(_contradiction(known, next(iter(found.values()))))
+        raise LegsError(_contradiction(description, next(iter(by_turn.values()))))
     if fitting[0]:
         ways = ' or '.join(FACING[turn] for turn in fitting)
         raise LegsError(
-            f'the robot faces {ways} of the {known.format}, by '
+            f'the robot faces {ways} of the {description.format}, by '
             f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
             f'forward (REP 103): --forward={FACING[fitting[0]]} makes a URDF that is turned, '
             '--forward x takes x for forward')
-    return _cleaned(known, found[fitting[0]])
+    return _cleaned(description, by_turn[fitting[0]])
 
 
-def _paths(known: RobotDescription) -> list[tuple[str, ...]]:
+def _paths(description: RobotDescription) -> list[tuple[str, ...]]:
     """Return the joints that move from the root to each end."""
-    chains = {name: tuple(joint.name for joint in known.chain(name) if joint.kind != 'fixed')
-              for name, joint in known.joints.items() if joint.kind != 'fixed'}
+    chains = {name: tuple(joint.name for joint in description.chain(name) if joint.kind != 'fixed')
+              for name, joint in description.joints.items() if joint.kind != 'fixed'}
     inner = {name for chain in chains.values() for name in chain[:-1]}
     return [chain for name, chain in chains.items() if name not in inner]
 
 
-def _crosswise(known: RobotDescription, paths: Sequence[Sequence[str]]) -> bool:
+def _crosswise(description: RobotDescription, paths: Sequence[Sequence[str]]) -> bool:
     """Return whether more joints turn about x than about y, as in a robot that faces y."""
     along = np.zeros(3)
     for path in paths:
-        axes = np.array([known.direction(name) for name in path
-                         if known.joints[name].kind in TURNING])
+        axes = np.array([description.direction(name) for name in path
+                         if description.joints[name].kind in TURNING])
         if len(axes) and not sprawls(axes):
             along += np.abs(axes).sum(axis=0)
     return bool(along[0] > CROSSWISE * along[1])
 
 
-def _assigned(known: RobotDescription, paths: Sequence[Sequence[str]], turn: int
+def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], turn: int
               ) -> dict[str, tuple[str, ...]]:
     """Return the legs of a robot that faces a direction, from behind; nothing without pairs."""
     ahead = np.round([np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
-    legs = [pair for pair in _pairs(_limbs(known, paths, left), left) if not any(
-        no_leg(limb.joints) or sum(not known.joints[name].flaw for name in limb.joints)
+    legs = [pair for pair in _pairs(_limbs(description, paths, left), left) if not any(
+        no_leg(limb.joints) or sum(not description.joints[name].flaw for name in limb.joints)
         > MOST_JOINTS for limb in pair)]
     if not legs:
         return {}
@@ -132,16 +132,17 @@ def _bottom(limb: LegChain) -> float:
     return float(limb.anchors[0, 2] - sum(limb.lengths))
 
 
-def _limbs(known: RobotDescription, paths: Sequence[Sequence[str]], left: np.ndarray
+def _limbs(description: RobotDescription, paths: Sequence[Sequence[str]], left: np.ndarray
            ) -> list[LegChain]:
     """Return the longest chain of each part of the body that begins beside its middle."""
-    aside = {name: abs(float(known.frame(name)[0] @ left)) for path in paths for name in path}
+    aside = {name: abs(float(description.frame(name)[0] @ left)) for path in paths
+             for name in path}
     middle = max(MIDDLE * max(aside.values(), default=0.0), 1e-6)
     limbs: dict[str, LegChain] = {}
     for path in paths:
         joints = path[next((k for k, name in enumerate(path) if aside[name] > middle), len(path)):]
         if joints:
-            limb = known.leg(joints)
+            limb = description.leg(joints)
             limbs[joints[0]] = max(limb, limbs.get(joints[0], limb),
                                    key=lambda one: float(sum(one.lengths)))
     return [limb for limb in limbs.values() if sum(limb.lengths) > 0.0]
@@ -164,9 +165,9 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
     return pairs
 
 
-def _question(known: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
+def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
     """Ask which limbs are legs, with the option that says so."""
-    limbs = [limb for limb in _limbs(known, paths, np.array([0.0, 1.0, 0.0]))
+    limbs = [limb for limb in _limbs(description, paths, np.array([0.0, 1.0, 0.0]))
              if 1 < len(limb.joints) <= MOST_JOINTS]
     why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
            'images of each other')
@@ -200,9 +201,9 @@ def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
     return wrong
 
 
-def _contradiction(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> str:
+def _contradiction(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -> str:
     leg = _misnamed(legs)[0]
-    x, y, _ = known.frame(legs[leg][0])[0]
+    x, y, _ = description.frame(legs[leg][0])[0]
     return (f"'{legs[leg][0]}' is at x {x:.3g} m, y {y:.3g} m, where {leg} is if x is forward and "
             'y to the left, and no way of turning the robot fits all names: correct the '
             'description; say --forward x if positions are right and names are not, or --legs '
@@ -210,15 +211,15 @@ def _contradiction(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -
                        for leg, joints in legs.items()) + ', changed as it is right')
 
 
-def _named(known: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+def _named(description: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
     """Return the joints whose names contain the texts that were given."""
     if len(given) % 2 or set(given) != set(leg_names(len(given))):
         raise LegsError(f'--legs: {", ".join(given)} are not the names of two, four or six legs, '
                         f'which are {", ".join(leg_names(2))}; {", ".join(leg_names(4))}; '
                         f'{", ".join(leg_names(6))}')
-    legs = {leg: tuple(sorted((name for name, joint in known.joints.items()
+    legs = {leg: tuple(sorted((name for name, joint in description.joints.items()
                                if joint.kind != 'fixed' and given[leg] in name),
-                              key=lambda name: len(known.chain(name))))
+                              key=lambda name: len(description.chain(name))))
             for leg in leg_names(len(given))}
     for leg, names in legs.items():
         if not names:
@@ -229,13 +230,13 @@ def _named(known: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple
     return legs
 
 
-def _cleaned(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs:
+def _cleaned(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs:
     """Remove joints that no cell can drive, on both sides, and add notes on them."""
     notes, names = [], list(legs)
     keep: dict[str, tuple[str, ...]] = {}
     for pair in zip(names[::2], names[1::2], strict=True):
         why = {(leg, k): reason for leg in pair for k, joint in enumerate(legs[leg])
-               if (reason := _held(known, legs[leg], joint))}
+               if (reason := _held(description, legs[leg], joint))}
         alike = len(legs[pair[0]]) == len(legs[pair[1]])
         for leg in pair:
             out = {k for other, k in why if alike or other == leg}
@@ -246,14 +247,14 @@ def _cleaned(known: RobotDescription, legs: Mapping[str, Sequence[str]]) -> Legs
             if not keep[leg]:
                 raise LegsError(f'leg {leg}: none of its joints can be driven')
     driven = {name for joints in keep.values() for name in joints}
-    rest = tuple(name for name, joint in known.joints.items()
+    rest = tuple(name for name, joint in description.joints.items()
                  if joint.kind in TURNING and name not in driven)
     return Legs(keep, '\n'.join(notes), rest)
 
 
-def _held(known: RobotDescription, leg: Sequence[str], name: str) -> str:
+def _held(description: RobotDescription, leg: Sequence[str], name: str) -> str:
     """Return why a joint of a leg is not driven, '' if it is."""
-    joint = known.joints[name]
+    joint = description.joints[name]
     if joint.mimic in leg:
         raise DescriptionError(f"the joint '{name}' follows '{joint.mimic}' of the same leg: legs "
                                'with coupled joints (four-bar linkages, belts) are not supported')
@@ -261,12 +262,12 @@ def _held(known: RobotDescription, leg: Sequence[str], name: str) -> str:
         raise DescriptionError(f"the joint '{name}' has no motor, and joints below it have: legs "
                                'with springs or passive joints between driven ones are not '
                                'supported')
-    return joint.flaw or ('is a wheel' if _wheel(known, leg, joint) else '')
+    return joint.flaw or ('is a wheel' if _wheel(description, leg, joint) else '')
 
 
-def _wheel(known: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
+def _wheel(description: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
     """Return whether a joint is a wheel: unlimited, below two limited, parallel to the last."""
-    before = [name for name in leg if known.joints[name].kind == 'revolute']
+    before = [name for name in leg if description.joints[name].kind == 'revolute']
     if joint.kind != 'continuous' or joint.name != leg[-1] or len(before) < 2:
         return False
-    return bool(abs(known.direction(joint.name) @ known.direction(before[-1])) > 0.7)
+    return bool(abs(description.direction(joint.name) @ description.direction(before[-1])) > 0.7)

@@ -325,8 +325,8 @@ def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarra
             points.append(places - [0.0, 0.0, round_])
     if not points:
         raise SolesError(f'leg {leg} has no shape that could touch the floor')
-    found = np.concatenate(points)
-    lowest = found[:, 2].min()
-    flat = found[found[:, 2] < lowest + FLAT]
+    cloud = np.concatenate(points)
+    lowest = cloud[:, 2].min()
+    flat = cloud[cloud[:, 2] < lowest + FLAT]
     low, high = flat.min(axis=0), flat.max(axis=0)
     return np.array([*(0.5 * (low + high))[:2], lowest]), (high - low)[:2]

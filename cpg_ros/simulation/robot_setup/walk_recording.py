@@ -57,11 +57,11 @@ def measure_efference(loop: ClosedLoopBatch,
     # disturbance.
     signals = np.concatenate([ran.estimated[:, :, :2], ran.angular_velocity[:, :, :2],
                               ran.rpy[:, :, :2]], axis=2)
-    tables = [fold(phase[first:], one[first:])
-              for phase, one in zip(ran.phase, signals, strict=True)]
-    found = ran.velocity[:, first:, 0].mean(axis=1)
-    rising = np.argsort(found)
-    return EfferenceCopy(found[rising], np.array(tables)[rising])
+    tables = [fold(phase[first:], signal[first:])
+              for phase, signal in zip(ran.phase, signals, strict=True)]
+    mean_speed = ran.velocity[:, first:, 0].mean(axis=1)
+    rising = np.argsort(mean_speed)
+    return EfferenceCopy(mean_speed[rising], np.array(tables)[rising])
 
 
 def calibrated(robot: Robot, model: str, gaits: Sequence[str],
@@ -153,7 +153,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     path = Path(path)
     names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
     with opened(path) as bag:
-        kinds = {one.topic: one.msgtype for one in bag.connections}
+        kinds = {connection.topic: connection.msgtype for connection in bag.connections}
         dogs = [topic for topic, kind in kinds.items() if kind == LOW_STATE]
         if dogs and kinds.get(names['joint_states']) != TYPES['joint_states']:
             given, counts = names['joint_states'], bag.expected()
@@ -168,27 +168,28 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
                 raise RecordingError(f'{path}: no topic {topic} of type {TYPES[key]} (--'
                                      f'{key.replace("_", "-")}); it has {there or "none"}')
         key_of = {topic: key for key, topic in names.items()}
-        found: dict[str, list[tuple[int, Any]]] = {key: [] for key in names}
+        by_key: dict[str, list[tuple[int, Any]]] = {key: [] for key in names}
         for topic, received, data in bag.messages(list(names.values())):
             key = key_of[topic]
             try:
-                found[key].append((received, STORE.deserialize_cdr(data, TYPES[key])))
+                by_key[key].append((received, STORE.deserialize_cdr(data, TYPES[key])))
             except SerdeError as error:
                 raise RecordingError(f'{path}, {topic}: a message cannot be read: {error}'
                                      ) from error
-    for key, messages in found.items():
+    for key, messages in by_key.items():
         if len(messages) < 2:
             raise RecordingError(f'{path}: {len(messages)} messages of {names[key]}')
-    return _joined(path, robot, found)
+    return _joined(path, robot, by_key)
 
 
-def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -> WalkRecording:
-    received = np.array([at for at, _ in found['imu']], dtype=float)
-    stamps = np.array([_stamp(message) for _, message in found['imu']])
+def _joined(path: Path, robot: Robot,
+            messages_of: dict[str, list[tuple[int, Any]]]) -> WalkRecording:
+    received = np.array([at for at, _ in messages_of['imu']], dtype=float)
+    stamps = np.array([_stamp(message) for _, message in messages_of['imu']])
     # If the bag was played faster or slower, only the stamps tell the true time.
     first = stamps[0]
     times, keep = np.unique(1e-9 * (stamps - first), return_index=True)
-    messages = [found['imu'][k][1] for k in keep]
+    messages = [messages_of['imu'][k][1] for k in keep]
 
     def to_imu(key: str, rows: np.ndarray, own: np.ndarray) -> np.ndarray:
         if rows.ndim != 2 or not np.isfinite(rows).all():
@@ -196,7 +197,7 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
         return np.stack([np.interp(times, 1e-9 * (own - first), row) for row in rows.T], axis=1)
 
     joints = tuple(joint.name for joint in robot.joints)
-    states = [message for _, message in found['joint_states']]
+    states = [message for _, message in messages_of['joint_states']]
     places = []
     for name in joints:
         if name not in states[0].name:
@@ -209,11 +210,11 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
     # Without stamps: by when they were received, beside the IMU's.
     by_leg = {}
     for key in ('foot_contacts', 'phase'):
-        rows = [message.data for _, message in found.get(key, [])]
+        rows = [message.data for _, message in messages_of.get(key, [])]
         if {len(row) for row in rows} - {len(robot.legs)}:
             raise RecordingError(f'{path}: {key} does not have {len(robot.legs)} numbers, one a '
                                  'leg')
-        at = np.interp([when for when, _ in found.get(key, [])], received, stamps)
+        at = np.interp([when for when, _ in messages_of.get(key, [])], received, stamps)
         by_leg[key] = np.array(rows), at
     loads, at = by_leg['foot_contacts']
     phase = None

@@ -134,13 +134,13 @@ def walked(job: WalkJob) -> list[list[BipedOutcome]]:
     """Return the outcomes of each candidate's walks."""
     runs = {ground: BipedRun(job.model, job.robot, NOISE, terrain=ground)
             for ground in {walk.ground for walk in job.walks}}
-    found = []
+    outcomes = []
     for gains in job.candidates:
         robot = with_gains(job.robot, gains)
-        found.append([runs[walk.ground].run(
+        outcomes.append([runs[walk.ground].run(
             END, ((WALKS_OFF, walk.speed, 0.0, 0.0),), (walk.push,) if walk.push else (),
             BipedFeedback(robot), walk.seed) for walk in job.walks])
-    return found
+    return outcomes
 
 
 def with_gains(robot: Robot, gains: Mapping[str, float]) -> Robot:
@@ -192,8 +192,9 @@ def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
     jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + BATCH])
             for k in range(0, len(fresh), BATCH)]
     parts = [*compute(walked, jobs)]
-    found = _compared(fresh, [[one for part in parts for one in part[k]] for k in range(2)])
-    return with_gains(robot, gains) if found.better else robot, found
+    tuned = _compared(fresh,
+                      [[outcome for part in parts for outcome in part[k]] for k in range(2)])
+    return with_gains(robot, gains) if tuned.better else robot, tuned
 
 
 def _body(robot: Robot) -> BipedBody:
@@ -209,18 +210,18 @@ def _walks(robot: Robot, seed: int, pushes: int, walks: int) -> list[Walk]:
     length, mass = _body(robot).scale[0], _body(robot).total
     pace = math.sqrt(length)
     height = BipedGains.of_body(_body(robot)).height
-    found = []
+    result = []
     for fraction in IMPULSES:
         for _ in range(pushes):
             angle, size = rng.uniform(0.0, 2.0 * math.pi), fraction * mass * math.sqrt(
                 GRAVITY * height)
             push = impulse(PUSHED + pace * rng.uniform(0.0, STRIDE), size * math.cos(angle),
                            size * math.sin(angle))
-            found.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), push))
+            result.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), push))
     for _ in range(walks):
-        found += [Walk(pace * speed, int(rng.integers(2**31))) for speed in SPEEDS]
-        found.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), None, length * TILES))
-    return found
+        result += [Walk(pace * speed, int(rng.integers(2**31))) for speed in SPEEDS]
+        result.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), None, length * TILES))
+    return result
 
 
 def _price(walks: Sequence[Walk], outcomes: Sequence[BipedOutcome]) -> float:
@@ -229,20 +230,21 @@ def _price(walks: Sequence[Walk], outcomes: Sequence[BipedOutcome]) -> float:
     A fall costs more the earlier it happens.
     """
     price = 0.0
-    for walk, one in zip(walks, outcomes, strict=True):
-        if math.isfinite(one.fell):
-            price += 2.0 - one.fell / END + SPEED
+    for walk, outcome in zip(walks, outcomes, strict=True):
+        if math.isfinite(outcome.fell):
+            price += 2.0 - outcome.fell / END + SPEED
             continue
-        price += TILT * one.tilt
+        price += TILT * outcome.tilt
         if walk.push is None:
             scale = max(abs(walk.speed), SPEEDS[1])
-            price += SPEED * min(math.hypot(one.speed[0] - walk.speed, one.speed[1]) / scale, 1.0)
+            price += SPEED * min(math.hypot(outcome.speed[0] - walk.speed,
+                                            outcome.speed[1]) / scale, 1.0)
     return price / len(walks)
 
 
-def _compared(walks: Sequence[Walk], found: Sequence[Sequence[BipedOutcome]]) -> TunedBiped:
+def _compared(walks: Sequence[Walk], outcomes: Sequence[Sequence[BipedOutcome]]) -> TunedBiped:
     """Compare the outcomes of walks with the gains before and after, in this order."""
-    before, after = (np.array([math.isinf(one.fell) for one in some]) for some in found)
+    before, after = (np.array([math.isinf(outcome.fell) for outcome in some]) for some in outcomes)
     pushed = np.array([walk.push is not None for walk in walks])
     return TunedBiped(int(pushed.sum()), int(before[pushed].sum()), int(after[pushed].sum()),
                       int((~pushed).sum()), int((~before[~pushed]).sum()),

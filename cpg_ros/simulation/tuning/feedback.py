@@ -111,9 +111,9 @@ def judged_gaits(robot: Robot) -> list[str]:
     """
     if robot.geometry is None:
         return []
-    geometry, known = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
+    geometry, presets = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
     return [gait for gait, motion in robot.motions.items()
-            if motion.efference is not None and gait in known
+            if motion.efference is not None and gait in presets
             and not Timetable(plan_gait(robot, gait), geometry).hops]
 
 
@@ -146,15 +146,15 @@ class FeedbackTrial:
                ) -> list[Scenario]:
         """Return runs with pushes of each impulse, see IMPULSES, from some directions."""
         unit = self.loop.geometry.weight * math.sqrt(self.length / GRAVITY)
-        found = []
+        pushes = []
         for fraction in impulses:
             first = rng.uniform(0.0, 2.0 * math.pi)
             for k in range(count):
                 way = first + 2.0 * math.pi * k / count
-                found.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
+                pushes.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
                     impulse(PUSHED, fraction * unit * math.cos(way),
                             fraction * unit * math.sin(way)),)))
-        return found
+        return pushes
 
     def calm(self) -> list[Scenario]:
         """Return undisturbed runs."""
@@ -170,14 +170,14 @@ class FeedbackTrial:
 
     def _upright(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
                  ) -> np.ndarray:
-        found = np.zeros(len(scenarios), dtype=bool)
+        upright = np.zeros(len(scenarios), dtype=bool)
         for k, delay in enumerate(DELAYS):
             some = slice(k, len(scenarios), len(DELAYS))
             if not scenarios[some]:
                 continue
-            found[some] = self.loop.run(scenarios[some], duration, gains,
+            upright[some] = self.loop.run(scenarios[some], duration, gains,
                                         noise=replace(SENSORS, delay=delay)).upright
-        return found
+        return upright
 
 
 def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
@@ -207,23 +207,23 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
     first: list[Benefit] = []
     for without in WITHOUT:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
-        gains, found = robot_gains(replace(robot, feedback=tried)), []
+        gains, benefits = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
             upright, old = trial.upright(gains), before[gait]
             new = (trial.survived(gains, pushed[gait]) if upright == UNDISTURBED
                    else np.zeros_like(old))
-            found.append(Benefit(gait, upright, int(new.sum()), int(old.sum()),
+            benefits.append(Benefit(gait, upright, int(new.sum()), int(old.sum()),
                                  int((old & ~new).sum())))
-            if not found[-1].helps:
+            if not benefits[-1].helps:
                 break
-        first = first or found
-        if all(one.helps for one in found):
-            return replace(robot, feedback=replace(tried, made=_text(found))), found
+        first = first or benefits
+        if all(benefit.helps for benefit in benefits):
+            return replace(robot, feedback=replace(tried, made=_text(benefits))), benefits
     return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
 
 
-def _text(found: Sequence[Benefit]) -> str:
-    return 'in simulation, ' + '; '.join(map(str, found))
+def _text(benefits: Sequence[Benefit]) -> str:
+    return 'in simulation, ' + '; '.join(map(str, benefits))
 
 
 #: SEARCHED: law -> its gains that are searched for.
@@ -276,7 +276,7 @@ class PriceJob:
 
 def prices(job: PriceJob) -> list[float]:
     """Return the price of each candidate, the mean over gaits."""
-    found = np.zeros(len(job.candidates))
+    prices = np.zeros(len(job.candidates))
     for gait, cost in zip(job.gaits, job.costs, strict=True):
         trial = FeedbackTrial(job.robot, job.model, gait, job.kp, job.kd)
         rng = np.random.default_rng(job.seed)
@@ -291,9 +291,9 @@ def prices(job: PriceJob) -> list[float]:
             error = np.minimum(np.abs(late / trial.speed - 1.0), 1.0).mean()
             dearer = np.clip(walked.cost[:UNDISTURBED] / cost - 1.0, 0.0, 10.0).mean()
             falls = ~walked.upright
-            found[k] += (PUSH * (~after.upright).mean() + CALM * falls[:UNDISTURBED].mean()
+            prices[k] += (PUSH * (~after.upright).mean() + CALM * falls[:UNDISTURBED].mean()
                          + GROUND * falls[UNDISTURBED:].mean() + SPEED * error + COST * dearer)
-    return (found / len(job.gaits)).tolist()
+    return (prices / len(job.gaits)).tolist()
 
 
 @dataclass(frozen=True)
@@ -372,12 +372,12 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     def price(candidates: Sequence[Gains], draw: int) -> list[float]:
         jobs = [PriceJob(robot, model, gaits, candidates[k:k + TOGETHER], draw, costs, kp, kd)
                 for k in range(0, len(candidates), TOGETHER)]
-        return [one for found in compute(prices, jobs) for one in found]
+        return [item for benefits in compute(prices, jobs) for item in benefits]
 
     own = robot.feedback or OwnFeedback()
     starts = [replace(own, laws={**own.laws, **dict.fromkeys(without, False)})
               for without in WITHOUT]
-    usual = [robot_gains(replace(robot, feedback=one)) for one in starts]
+    usual = [robot_gains(replace(robot, feedback=item)) for item in starts]
     cheapest = int(np.argmin(price(usual, seed)))
     own, before = starts[cheapest], usual[cheapest]
     names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
@@ -390,15 +390,15 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
                              lambda points, draw: price([*map(changed, points)], draw),
                              evaluations, update, len(starts))
     after = changed(logs)
-    found = _compared(trials, before, after, seed)
-    if found.better:
+    benefits = _compared(trials, before, after, seed)
+    if benefits.better:
         listed = dimensionless(after, leg_length(geometry_of(robot)))
         own = replace(own, gains={**own.gains, **{name: listed[name] for name in names}})
     robot, _ = judge_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
     judged = robot.feedback or own
     return replace(robot, feedback=replace(
         judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
-        f'{found}; {judged.made}')), found
+        f'{benefits}; {judged.made}')), benefits
 
 
 def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int

@@ -184,11 +184,11 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
         (2, POINTS).
 
     """
-    one, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
-    table = np.block([[one, psi.T, none], [one, none, psi.T]])
-    found = np.linalg.lstsq(table, curves.ravel(), rcond=None)[0]
-    rest = (table @ found - curves.ravel()).reshape(curves.shape)
-    return float(found[0]), found[1:].reshape(2, 6), rest
+    ones, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
+    table = np.block([[ones, psi.T, none], [ones, none, psi.T]])
+    terms = np.linalg.lstsq(table, curves.ravel(), rcond=None)[0]
+    rest = (table @ terms - curves.ravel()).reshape(curves.shape)
+    return float(terms[0]), terms[1:].reshape(2, 6), rest
 
 
 class FootTrajectoryFit:
@@ -214,15 +214,15 @@ class FootTrajectoryFit:
 
         """
         phase = np.arange(POINTS) / POINTS
-        found = {}
+        joints = {}
         for name, leg in self.legs.items():
             path = paths[name]
-            curves = np.array([leg.angles(*one(phase))
-                               for one in (path, replace(path, stride=0.0))])
+            curves = np.array([leg.angles(*trajectory(phase))
+                               for trajectory in (path, replace(path, stride=0.0))])
             psi = {cell: basis(orbit, cell - 1, self.robot.harmonics, path)
                    for cell in {joint.cell for joint in leg.joints}}
             for joint, curve in zip(leg.joints, curves.swapaxes(0, 1), strict=True):
                 offset, weights, _ = fit(curve, psi[joint.cell])
                 full, still = (tuple(float(w) for w in row) for row in weights.round(DIGITS))
-                found[joint.name] = JointMotion(round(offset, DIGITS), full, still)
-        return found
+                joints[joint.name] = JointMotion(round(offset, DIGITS), full, still)
+        return joints

@@ -76,8 +76,8 @@ def measure(batch: OpenLoopBatch, plan: GaitPlan,
         commands = [np.full(left.size, stride),
                     *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
                       for sign in (1.0, -1.0))]
-        trials = batch.run([(targets(plan, DURATION, batch.timestep, one.tolist(), pace),
-                             floor) for one in commands for floor in FLOORS])
+        trials = batch.run([(targets(plan, DURATION, batch.timestep, command.tolist(), pace),
+                             floor) for command in commands for floor in FLOORS])
         speeds = [trial.speed for trial in trials]
         turns = [trial.turn for trial in trials]
         n = len(FLOORS)
@@ -185,8 +185,8 @@ class GaitTarget:
 
     def slower(self, fraction: float) -> 'GaitTarget':
         """Return the same at this share of all frequencies, and of the speed that follows."""
-        low, start, high = (replace(one, frequency=fraction * one.frequency)
-                            for one in (self.low, self.start, self.high))
+        low, start, high = (replace(design, frequency=fraction * design.frequency)
+                            for design in (self.low, self.start, self.high))
         return GaitTarget(fraction * self.speed, self.hops, low, start, high)
 
     @property

@@ -197,9 +197,9 @@ class Tuner:
                 'stand: gaits move the feet below it')
         # Scale the pushes to the same change of the Froude number.
         heavy = body.mass / MASS * math.sqrt(self.scale)
-        self.scenarios = tuple(replace(one, pushes=tuple(
-            (when, heavy * forward, heavy * left) for when, forward, left in one.pushes))
-            for one in SCENARIOS)
+        self.scenarios = tuple(replace(scenario, pushes=tuple(
+            (when, heavy * forward, heavy * left) for when, forward, left in scenario.pushes))
+            for scenario in SCENARIOS)
 
     def motion(self, gait: str, design: Design) -> Motion:
         """Return the robot's motion by a design."""
@@ -216,8 +216,8 @@ class Tuner:
         """Plan a gait on one of the robot's networks or the first; errors as of plan."""
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
-            one = (1.0,)
-            motion = replace(motion, steering=SteeringTable(one, one, one, one))
+            single = (1.0,)
+            motion = replace(motion, steering=SteeringTable(single, single, single, single))
         return plan_gait(replace(self.robot, motions={gait: motion}), gait, network=network)
 
     def prices(self, gait: str, designs: Sequence[Design],
@@ -307,12 +307,12 @@ class Tuner:
         """Return starts, ever gentler, and slower ones if the joints cannot follow any."""
         self._nearest = None
         aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
-        prices = self.prices(gait, [one.start for one in aims])
+        prices = self.prices(gait, [aim.start for aim in aims])
         nearest = self._nearest
         if prices.min() < REFUSED or nearest is None or nearest.fraction == 1.0:
             return aims, prices
-        aims = [one.slower(max(ROOM * nearest.fraction, SLOWEST)) for one in aims]
-        return aims, self.prices(gait, [one.start for one in aims], aims[0])
+        aims = [aim.slower(max(ROOM * nearest.fraction, SLOWEST)) for aim in aims]
+        return aims, self.prices(gait, [aim.start for aim in aims], aims[0])
 
 
 @dataclass(frozen=True)
@@ -331,14 +331,14 @@ class DesignTrial:
     def search(self, tuner: Tuner, update: Callable[[int], None]) -> Tuned | NoDesign:
         """Search for the design of a gait, and measure its steering table."""
         try:
-            found = tuner.tune(self.gait, self.evaluations, self.seed, update)
+            design = tuner.tune(self.gait, self.evaluations, self.seed, update)
         except NoDesign as error:
             return error
         if AIMS[self.gait].hops:
-            return found
-        steering = measure(tuner.batch, tuner.plan(self.gait, found.motion),
+            return design
+        steering = measure(tuner.batch, tuner.plan(self.gait, design.motion),
                            lambda done: update(self.evaluations + done))
-        return replace(found, motion=replace(found.motion, steering=steering))
+        return replace(design, motion=replace(design.motion, steering=steering))
 
 
 def search(trial: DesignTrial) -> Tuned | NoDesign:
@@ -385,9 +385,9 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
 
     """
     tuner = Tuner(robot, model, kp, kd, threads, say)
-    known = NETWORKS[robot.networks[0]].presets()
+    presets = NETWORKS[robot.networks[0]].presets()
     for gait in gaits:
-        if gait not in known:
+        if gait not in presets:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
         have = robot.networks_with(gait)
         if lacking := [name for name in robot.networks if name not in have]:
@@ -395,28 +395,29 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
                 f'{"has" if len(lacking) == 1 else "have"} no such gait')
     file = Path(model)
     # Workers may have another folder for theirs.
-    place = str(file.resolve()) if file.is_file() else model
-    trials = [DesignTrial(robot, place, gait, evaluations, seed + k, kp, kd, threads or 1)
+    model_name = str(file.resolve()) if file.is_file() else model
+    trials = [DesignTrial(robot, model_name, gait, evaluations, seed + k, kp, kd, threads or 1)
               for gait in gaits for k in range(seeds)]
     results = iter(_here(tuner, trials) if executor is None else executor.map(search, trials))
-    motions, found, missing = dict(robot.motions), [], []
+    motions, designs, missing = dict(robot.motions), [], []
     for gait in gaits:
         tuned = [next(results) for _ in range(seeds)]
         # Of equal prices, the first seed's counts.
-        best = min(tuned, key=lambda one: math.inf if isinstance(one, NoDesign) else one.price)
+        best = min(tuned, key=lambda design: math.inf if isinstance(design, NoDesign)
+                   else design.price)
         if isinstance(best, NoDesign):
             missing.append(str(best))
             continue
         motions[gait] = replace(best.motion, verdict=best.verdict)
-        found.append(best)
+        designs.append(best)
     # Let the progress bar end.
     next(results, None)
-    if not found:
+    if not designs:
         raise NoDesign('; '.join(missing))
     # Feedback needs the efference copies, too.
-    measured = [one.gait for one in found]
+    measured = [design.gait for design in designs]
     robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
-    return robot, found, missing
+    return robot, designs, missing
 
 
 def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], seed: int,

@@ -98,12 +98,12 @@ def figures(tuned: Sequence[Tuned]) -> list[str]:
     rows: list[tuple[str, ...]] = [
         ('gait', 'distance [m]', 'heading [deg]', 'speed [m/s]', 'Hz', 'duty', 'hops',
          'lift [cm]', 'pitch [deg]', 'cost of transport', 'slip', 'verdict')]
-    for one in tuned:
-        trial = one.trial
-        rows.append((one.gait, f'{trial.distance:.2f}', f'{trial.heading:+.1f}',
-                     f'{trial.speed:.2f}', f'{one.motion.frequency:.2f}', f'{trial.duty:.2f}',
+    for design in tuned:
+        trial = design.trial
+        rows.append((design.gait, f'{trial.distance:.2f}', f'{trial.heading:+.1f}',
+                     f'{trial.speed:.2f}', f'{design.motion.frequency:.2f}', f'{trial.duty:.2f}',
                      str(trial.hops), f'{100.0 * trial.lift:.1f}', f'{trial.pitch:.1f}',
-                     f'{trial.cost:.2f}', f'{trial.slip:.2f}', one.verdict))
+                     f'{trial.cost:.2f}', f'{trial.slip:.2f}', design.verdict))
     return table(rows, '<>>>>>>>>>><')
 
 
@@ -130,19 +130,19 @@ def _tune_biped(args: argparse.Namespace, robot: Robot) -> int:
     _refuse_out(args)
     with (executor_for(2, args, 'walks', partial(note, 'tune')) as executor,
           progress_bar("tuning the biped's walk", args.evaluations) as bar):
-        robot, found = tune_biped(robot, args.model, args.evaluations, args.seed,
+        robot, result = tune_biped(robot, args.model, args.evaluations, args.seed,
                                   executor=executor, update=bar)
-    return _written(args, robot, found.better, str(found))
+    return _written(args, robot, result.better, str(result))
 
 
 def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
     if robot.biped is not None:
         return _tune_biped(args, robot)
-    known = judged_gaits(robot)
-    if lacking := [gait for gait in args.gaits or [] if gait not in known]:
+    gaits_judged = judged_gaits(robot)
+    if lacking := [gait for gait in args.gaits or [] if gait not in gaits_judged]:
         raise InputError(f"argument --gaits: robot file '{robot.name}' has no efference copy of "
                          f'{" and ".join(lacking)}, or it hops: tune the gait first')
-    gaits = args.gaits or known
+    gaits = args.gaits or gaits_judged
     if not gaits:
         raise InputError(f"argument --feedback: robot file '{robot.name}' has no gait with an "
                          'efference copy and legs with a geometry: tune its gaits first')
@@ -150,9 +150,9 @@ def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
     report = partial(note, 'tune')
     with (executor_for(2, args, 'prices of gains', report) as executor,
           progress_bar('tuning the feedback', args.evaluations) as bar):
-        robot, found = tune_feedback(robot, args.model, gaits, args.evaluations, args.seed,
+        robot, result = tune_feedback(robot, args.model, gaits, args.evaluations, args.seed,
                                      executor=executor, kp=args.kp, kd=args.kd, update=bar)
-    return _written(args, robot, found.better, _verdict(robot))
+    return _written(args, robot, result.better, _verdict(robot))
 
 
 def _written(args: argparse.Namespace, robot: Robot, better: bool, verdict: str) -> int:
@@ -186,15 +186,15 @@ def _tune(args: argparse.Namespace) -> int:
     if args.feedback:
         return _tune_feedback(args, robot)
     if args.gaits is None:
-        known = NETWORKS[robot.networks[0]].gaits()
-        args.gaits = [gait for gait in AIMS if gait in known]
+        gaits_of_network = NETWORKS[robot.networks[0]].gaits()
+        args.gaits = [gait for gait in AIMS if gait in gaits_of_network]
     _refuse_out(args)
     with executor_for(len(args.gaits) * args.seeds, args, 'searches', report) as executor:
-        robot, found, missing = tune(
+        robot, designs, missing = tune(
             robot, args.model, args.gaits, args.evaluations, args.seed,
             executor=executor, seeds=args.seeds, kp=args.kp, kd=args.kd,
             threads=1 if executor else args.jobs, say=report)
-    lines = [*figures(found), *missing, *invented_limits(robot, 'model')]
+    lines = [*figures(designs), *missing, *invented_limits(robot, 'model')]
     if judged := judged_gaits(robot):
         robot, _ = judge_feedback(robot, args.model, judged, args.kp, args.kd, args.seed)
         lines.append(_verdict(robot))
@@ -203,7 +203,7 @@ def _tune(args: argparse.Namespace) -> int:
         f'{LONG:g} s in simulation from the stand:', *lines]))
     say('\n'.join([f'{LONG:g} s from the stand in simulation:', *lines,
                    f'written: {args.out}']))
-    if not any(one.good for one in found):
+    if not any(design.good for design in designs):
         report('no gait is good')
         return 1
     return 0
