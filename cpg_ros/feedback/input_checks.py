@@ -200,6 +200,9 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
 #: Indices of the last verdicts. REPEATED: the same values; MISSTAMPED: a stamp far from the clock;
 #: UNREADABLE: another layout.
 REPEATED, MISSTAMPED, UNREADABLE = 11, 12, 13
+#: JOLT: largest change of the angular velocity between two messages, rad/s, and SPUN: what the
+#: time between them adds, rad/s^2.
+JOLT, SPUN = 5.0, 1000.0
 #: UNIT: largest difference of a quaternion's length from 1; FASTEST: largest angular velocity,
 #: rad/s; HARDEST: largest acceleration, m/s^2, and TELLING: time constant of its low-pass, s.
 UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
@@ -227,8 +230,9 @@ HEAVIEST, DRAWN = 4.0, -0.5
 #: their indices: 0-2 acceleration, 3-5 vertical, 6-8 its recent change by the orientation and 9-11
 #: by the angular velocity, 12 mean square of their difference and 13 of both, 14-16 mean
 #: acceleration less gravity, 17 time so far, 18 whether that mean is too large, 19 whether
-#: orientation and angular velocity contradict each other, 20 time since the vertical last changed.
-IMU, IMU_MEMORY = 37, 21
+#: orientation and angular velocity contradict each other, 20 time since the vertical last changed,
+#: 21-23 the last angular velocity.
+IMU, IMU_MEMORY = 37, 24
 
 
 @jit
@@ -322,7 +326,13 @@ def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
                   w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c)
     turning = turned_by(mount, values[13], values[14], values[15])
     felt = turned_by(mount, values[25], values[26], values[27])
-    if math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > FASTEST:
+    jump = 0.0
+    for k in range(3):
+        jump += (turning[k] - memory[21 + k])**2
+        memory[21 + k] = turning[k]
+    # A single message with another angular velocity is a spike, and not what the base does.
+    if (math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > FASTEST
+            or (memory[17] > 0.0 and math.sqrt(jump) > JOLT + SPUN * dt)):
         return 4
     hard = 0.0
     for k in range(3):

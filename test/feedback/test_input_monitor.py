@@ -16,7 +16,10 @@
 
 from cpg_ros.feedback.input_checks import (
     DELAYED,
+    IMU,
+    IMU_MEMORY,
     InputMonitor,
+    judge_imu,
     judge_joints,
     LATE,
     note,
@@ -73,6 +76,20 @@ def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
                            np.full(2, -1.0), np.full(2, 1.0), FASTEST, *found)
     assert VERDICTS[verdict] == why
     assert (found == ([angles, speeds] if not why else 7.0)).all()
+
+
+def test_a_spike_of_the_gyroscope_is_left_out():
+    memory, mount, filled = np.zeros(IMU_MEMORY), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros((3, 3))
+    message = np.zeros(IMU)
+    message[3], message[27] = 1.0, 9.81
+    verdicts = []
+    for spike in (0.0, 0.0, 30.0, 0.0, 0.0):
+        message[13] = spike
+        verdicts.append(judge_imu(message, 0.002, False, mount, memory, *filled))
+        assert not filled[1].any()
+    # The jump back counts as one, too.
+    assert [VERDICTS[verdict] for verdict in verdicts] == [
+        '', '', 'an impossible angular velocity', 'an impossible angular velocity', '']
 
 
 def late_monitor(delay, now):

@@ -28,7 +28,6 @@ from cpg_ros.feedback.biped.substitutes import (
     IMU,
     JOINTS,
     LastStride,
-    REPEATED,
     Substitutes,
 )
 from cpg_ros.feedback.biped.support import Arms
@@ -74,6 +73,9 @@ TWISTED, TURNED, USUAL, SEEN_LEVEL = 0.015, 0.05, 1.0, 1.0
 TOPPLES = 0.05
 #: GOOD: time, s, after which an input that failed counts as valid again.
 GOOD = 0.3
+#: BLIND: age of IMU and joints, s, from which on nothing balances a walk: its last stride is
+#: repeated; LATE: the same where an input has failed already.
+BLIND, LATE = 0.025, 0.015
 #: A joint was moved by hand, or its sensor failed, if it moves from one tick to the next by more
 #: than JUMP, rad, plus FASTEST, rad/s, times the time between.
 JUMP, FASTEST = 0.15, 40.0
@@ -206,6 +208,11 @@ class BalancedPattern(Pattern):
         self._lowers = self.balance is not None and self._known and not self.fallen
         return self._lowers
 
+    def resume(self, stall: float) -> None:
+        """Go on after a stall in s, in which joints moved unseen."""
+        super().resume(stall)
+        self._gap, self._before = self._gap + stall, None
+
     def release(self) -> None:
         """Stop balancing, as without sensors, and hold the angles of the stand."""
         self.balancing, self._stood = False, 0.0
@@ -256,7 +263,7 @@ class BalancedPattern(Pattern):
         self.held += confine(target, rate, self._limits, dt, self.position, self.velocity,
                              self._behind) > 0
         if self.balancing:
-            self._stride.record(balance, self._unseen, self.position[self._places])
+            self._stride.record(balance, self._is_blind, self.position[self._places])
 
     def _attach(self, balance: BipedFeedback) -> None:
         self._arms = balance.arms
@@ -272,7 +279,7 @@ class BalancedPattern(Pattern):
         A crouch that begins in a walk waits for the moment at which the body is over the foot
         that stands.
         """
-        blind = self._unseen > REPEATED
+        blind = self._is_blind
         if not (self._stops or self._lowers or blind):
             self._waited = self._failing = 0.0
             self._blind = False
@@ -284,9 +291,10 @@ class BalancedPattern(Pattern):
                 or (self._blind and (balance.mode != WALK or self._passes(balance))))
 
     @property
-    def _unseen(self) -> float:
-        """Age of the newest measurement of IMU and joints that is used now, s."""
-        return float(np.maximum(self._ages, self.latencies)[:FEET].min())
+    def _is_blind(self) -> bool:
+        """Whether IMU and joints are both too old to balance a walk."""
+        return bool(np.maximum(self._ages, self.latencies)[:FEET].min()
+                    > (LATE if self.failed else BLIND))
 
     @property
     def _stops(self) -> bool:
@@ -311,7 +319,7 @@ class BalancedPattern(Pattern):
         if self._held:
             self._held = False
             self._start[:] = self.position
-        target = self._stride.replay(balance, self._unseen, balance.advance(sensors, dt))
+        target = self._stride.replay(balance, self._is_blind, balance.advance(sensors, dt))
         if not np.isfinite(target).all():
             self._fall()
             return None

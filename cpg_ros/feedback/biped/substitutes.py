@@ -45,9 +45,8 @@ FASTEST = 15.0
 ADOPTED = 0.02
 
 
-#: REPEATED: age of IMU and joints, s, from which on the last stride is repeated; KEPT: ticks that
-#: are kept of it.
-REPEATED, KEPT = 0.025, 512
+#: KEPT: ticks that are kept of the last stride.
+KEPT = 512
 
 
 class LastStride:
@@ -61,18 +60,18 @@ class LastStride:
         self._commands, self._phases = np.zeros((KEPT, joints)), np.full(KEPT, np.inf)
         self._row = 0
 
-    def record(self, balance: BipedFeedback, age: float, command: np.ndarray) -> None:
+    def record(self, balance: BipedFeedback, blind: bool, command: np.ndarray) -> None:
         """Keep the command of a tick of a walk, rad, shape (joints,), if sensors are valid."""
         if balance.mode != WALK or balance.kind != WALKS:
             self._phases[:] = np.inf
-        elif age < REPEATED:
+        elif not blind:
             self._commands[self._row] = command
             self._phases[self._row] = balance.memory.phases[0]
             self._row = (self._row + 1) % KEPT
 
-    def replay(self, balance: BipedFeedback, age: float, command: np.ndarray) -> np.ndarray:
+    def replay(self, balance: BipedFeedback, blind: bool, command: np.ndarray) -> np.ndarray:
         """Return the command to give in place of another, rad, shape (joints,)."""
-        if age < REPEATED:
+        if not blind:
             return command
         off = np.abs((self._phases - balance.memory.phases[0] + 0.5) % 1.0 - 0.5)
         row = int(np.argmin(np.where(np.isfinite(off), off, 1.0)))

@@ -23,9 +23,10 @@ pytest.importorskip('mujoco')
 from humanoid_under_fault import HumanoidUnderFault  # noqa: E402
 
 
-@pytest.mark.parametrize('fault', ['dropped imu', 'dropped joints', *in_depth(
-    'none', 'NaN imu', 'NaN joints', 'frozen joints', 'NaN feet', 'dropped feet', 'no velocities',
-    '0.2 s without imu')])
+@pytest.mark.parametrize('fault', [
+    'dropped imu', 'dropped joints', 'spikes', 'stalled 0.2 s', *in_depth(
+        'none', 'NaN imu', 'NaN joints', 'frozen joints', 'NaN feet', 'dropped feet',
+        'no velocities', '0.2 s without imu')])
 def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
