@@ -207,7 +207,8 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
         float(lock[0]), lock[1].basis)
 
     # A single run takes as long in C, which compiles in a fraction of numba's time.
-    compiled = (c_kernels if batch == 1 and not noise else _maker)(type(networks[0]))
+    maker = c_kernels if batch == 1 and not noise else _maker
+    compiled = (numba_kernels if noise and COMPILED else maker)(type(networks[0]))
     head = nodes - 1
     systems = [System(one_p, one_tau, gain, basis)
                for one_p, one_tau in zip(flat_p, tau, strict=True)]
