@@ -206,8 +206,8 @@ def test_unused_folders_of_the_cache_are_removed_and_no_others(tmp_path):
     other.mkdir()
     with (old[-1] / 'in_use').open() as running:
         fcntl.flock(running, fcntl.LOCK_SH)
-        subprocess.run([sys.executable, '-c', 'import cpg_ros.motion.strides'], env=given,
-                       check=True)
+        (tmp_path / 'one.py').write_text(ONE)
+        subprocess.run([sys.executable, tmp_path / 'one.py'], env=given, check=True)
         left = {folder for folder in cache.iterdir() if folder.name.startswith('package-')}
     # The new one, those last used, and the oldest, which is in use.
     assert set(old) & left == {*old[:KEPT - 1], old[-1]} and len(left) == KEPT + 1
