@@ -14,7 +14,7 @@
 
 """Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
 phase errors of the cells, the leading Floquet multiplier of the gait's orbit and, for a gait with
-two waveforms, minus their difference in shape. The set chosen from the Pareto front has the
+two waveforms, minus their difference in shape. The set selected from the Pareto front has the
 smallest phase errors and then the smallest multiplier; it is verified by its exact orbit and under
 noise.
 """
@@ -78,7 +78,7 @@ def write_front(path: Path, front: Front) -> None:
 
 
 def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndarray]) -> None:
-    """Draw two objectives of all sets; the front and the chosen set stand out."""
+    """Draw two objectives of all sets; the front and the selected set stand out."""
     on = np.array([score.network in {entry.network for entry in front.scores}
                    for score in front.tried])
     selected = np.array([score.network == front.best.preset.network for score in front.tried])
@@ -131,7 +131,7 @@ def _signals(axes: Axes, front: Front) -> None:
 
 
 def draw_front(path: Path, front: Front) -> None:
-    """Draw objectives against each other, and the chosen set's signals."""
+    """Draw objectives against each other, and the selected set's signals."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     names = objective_names(front.space.symmetry)
@@ -225,7 +225,7 @@ def _parser() -> Parser:
 
 
 def table(front: Front) -> str:
-    """Return the chosen set as lines of a name, a value and a unit."""
+    """Return the selected set as lines of a name, a value and a unit."""
     best, space = front.best, front.space
     parameters = best.preset.network.as_dict()
     rows = []

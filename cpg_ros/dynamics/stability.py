@@ -43,7 +43,7 @@ class Stability:
     Attributes:
         enough: symmetry gain above which transverse disturbances decay, 1/model time.
         lock_gain: gain with which they decay at RATE, 1/model time.
-        reason: why no gain makes the gait attract, or why that cannot be told; or ''.
+        reason: why no gain makes the gait attract, or why that is undecided; or ''.
 
     """
 

@@ -80,7 +80,7 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     some, one = np.zeros((1, joints)), np.zeros(1)
     planned = PlannedMotion(some, one, np.zeros((1, 2), dtype=np.int64), one.copy(),
                             np.zeros((1, 2)), one.copy(), one.copy())
-    instant = Instant(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), one, np.zeros(legs))
+    instant = Instant.empty(legs, one)
     arguments = (geometry.arrays, feedback.tables, feedback.gains, feedback.memory, senses,
                  sensors, planned, rates_memory(legs), instant, np.zeros(STATE), some.copy())
     close(*arguments)

@@ -190,7 +190,7 @@ class Instant(NamedTuple):
     Attributes:
         numbers: see DT to CHANGES.
         gaits: keys of the gait that is left and of the gait that is entered, shape (2,).
-        wish: speeds forward and to the left, m/s, and yaw rate, rad/s.
+        command: speeds forward and to the left, m/s, and yaw rate, rad/s.
         scale: factor of the stride frequency, shape (1,); filled.
         trim: added to the strides, shape (legs,); filled.
 
@@ -198,9 +198,14 @@ class Instant(NamedTuple):
 
     numbers: np.ndarray
     gaits: np.ndarray
-    wish: np.ndarray
+    command: np.ndarray
     scale: np.ndarray
     trim: np.ndarray
+
+    @classmethod
+    def empty(cls, legs: int, scale: np.ndarray) -> 'Instant':
+        """Return zeros for a number of legs, with an array for ``scale``."""
+        return cls(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), scale, np.zeros(legs))
 
 
 @jit
@@ -272,8 +277,8 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
         memory.kp_scale[0], instant.scale[0], trim[:], out[0] = 1.0, 1.0, 0.0, planned.angles[0]
         return 2 if closed and wrong else 0
     planned.gaits[0, 0], planned.gaits[0, 1], planned.mix[0] = old, new, numbers[MIX]
-    planned.phase[0], turn, heading = numbers[PHASE], instant.wish[2], planned.heading
-    planned.velocity[0, 0], planned.velocity[0, 1] = instant.wish[0], instant.wish[1]
+    planned.phase[0], turn, heading = numbers[PHASE], instant.command[2], planned.heading
+    planned.velocity[0, 0], planned.velocity[0, 1] = instant.command[0], instant.command[1]
     planned.turn[0], yaw = turn, sensors.rpy[0, 2]
     if state[FRACTION] > 0.0 and level > 0.0:
         # Without a wanted turn the heading is kept; with one it advances.

@@ -90,7 +90,7 @@ def _sources() -> dict[str, str]:
     # Both readouts stand in it.
     own = {'waveform': '#define look look_waveform\n', 'host_phases': '#undef look\n',
            'phase': '#define look look_phases\n'}
-    return {'cpg.h': part('host.h', {'DEFINES': defines}),
+    return {'cpg.h': part('host.h', {'DEFINES': defines, 'RAMP': part('ramp.h')}),
             'cpg.c': part('common.c') + ''.join(own.get(name, '') + part(f'{name}.c')
                                                 for name in names)}
 

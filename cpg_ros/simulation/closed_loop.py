@@ -83,8 +83,8 @@ class Patterns:
             self._steer(run, first)
         self._time = 0.0
         self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(
-            [(wish[0], run, '', wish[1:]) for run, one in enumerate(scenarios)
-             for wish in one.commands]
+            [(command[0], run, '', command[1:]) for run, one in enumerate(scenarios)
+             for command in one.commands]
             + [(when, run, name, ()) for run, one in enumerate(scenarios)
                for when, name in one.switches], reverse=True)
 
@@ -105,12 +105,12 @@ class Patterns:
         planned, feedback = self.planned, self._feedback
         self._time += self._dt
         while self._events and self._events[-1][0] <= self._time:
-            _, run, name, wish = self._events.pop()
+            _, run, name, command = self._events.pop()
             plan = self._plans[name] if name else self._patterns[run].plan
             if name:
                 self._patterns[run].apply(plan, TRANSITION)
             else:
-                planned.velocity[run], planned.turn[run] = wish[:2], wish[2]
+                planned.velocity[run], planned.turn[run] = command[:2], command[2]
             self._steer(run, plan)
         planned.heading[:] += planned.turn * self._dt
         for run, pattern in enumerate(self._patterns):

@@ -97,7 +97,7 @@ def walker():
 def test_it_stands_walks_as_wished_and_stops(walker):
     pattern = walker.pattern
     assert abs(walker.go(1.0)) < 0.03 and pattern.balancing and pattern.standing
-    pattern.wish = 0.3, 0.0, 0.0
+    pattern.command = 0.3, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(3.0)
     assert pattern.level == 1.0 and not pattern.standing
@@ -110,7 +110,7 @@ def test_it_stands_walks_as_wished_and_stops(walker):
 
 def test_wishes_keep_to_what_was_tried(walker):
     pattern = walker.pattern
-    pattern.wish = 9.0, -9.0, 9.0
+    pattern.command = 9.0, -9.0, 9.0
     pattern.enable(True, 1.0)
     walker.go(1.5)
     assert pattern.balance.command == pytest.approx([0.6, -0.2, 0.5])
@@ -118,7 +118,7 @@ def test_wishes_keep_to_what_was_tried(walker):
 
 def test_after_a_fall_it_holds_the_stand_until_it_is_put_on_its_feet(walker):
     pattern, body = walker.pattern, walker.run.body
-    pattern.wish = 0.2, 0.0, 0.0
+    pattern.command = 0.2, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(4.0)
     body.push(np.array([0.0, 1200.0, 0.0]), PUSH)
@@ -136,7 +136,7 @@ def test_after_a_fall_it_holds_the_stand_until_it_is_put_on_its_feet(walker):
 
 def test_a_robot_that_is_moved_in_mid_stride_starts_from_the_stand(walker):
     pattern, body = walker.pattern, walker.run.body
-    pattern.wish = 0.3, 0.0, 0.0
+    pattern.command = 0.3, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(5.05)
     body.reset()
@@ -160,7 +160,7 @@ def test_without_sensors_it_holds_the_stand(walker):
 @pytest.mark.parametrize('fault', ['none', 'blind', 'tilted', 'switched off'])
 def test_limits_hold_in_a_walk_and_at_its_end(walker, fault):
     pattern = walker.pattern
-    pattern.wish = 0.5, 0.0, 0.0
+    pattern.command = 0.5, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(4.1)
     if fault == 'none':
@@ -191,7 +191,7 @@ def test_without_feedback_it_is_the_open_loop_pattern(walker):
 
 def test_another_frequency_keeps_the_phase(walker):
     pattern = walker.pattern
-    pattern.wish = 0.2, 0.0, 0.0
+    pattern.command = 0.2, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(4.0)
     phase, preset = pattern.phases[0], Biped.presets()['walk']
@@ -207,7 +207,7 @@ def test_another_frequency_keeps_the_phase(walker):
 def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed):
     pattern = walker.pattern
     if speed > 0.0:
-        pattern.wish = speed, 0.0, 0.0
+        pattern.command = speed, 0.0, 0.0
         pattern.enable(True, 1.0)
     walker.go(3.4)
     pattern.enable(False, 0.5)
@@ -226,7 +226,7 @@ def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed)
 def test_a_run_ends_in_the_crouch_too(walker):
     pattern = walker.pattern
     pattern.apply(gait_plan(pattern.robot, 'run'), 0.0)
-    pattern.wish = 1.0, 0.0, 0.0
+    pattern.command = 1.0, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(6.0)
     pattern.enable(False, 0.5)
@@ -244,7 +244,7 @@ def test_from_the_crouch_it_stands_up_and_walks(walker):
     walker.go(1.0)
     assert pattern.crouching and not walker.run.body.fallen
     walker.blind = False
-    pattern.wish = 0.3, 0.0, 0.0
+    pattern.command = 0.3, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(4.0)
     assert pattern.balancing and walker.go(2.0) > 0.4 and not pattern.falls

@@ -206,7 +206,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     gain, basis = (0.0, np.zeros((1, components))) if lock is None else (
         float(lock[0]), lock[1].basis)
 
-    # A single run takes as long in C, which compiles in a fraction of numba's time.
+    # A single run takes as long in C, which compiles sooner than numba's but has no noise.
     maker = c_kernels if batch == 1 and not noise else _maker
     compiled = (numba_kernels if noise and COMPILED else maker)(type(networks[0]))
     head = nodes - 1

@@ -101,7 +101,7 @@ class BalancedPattern(Pattern):
     Attributes:
         balance: the feedback, None for the open-loop pattern.
         sensors: present measurements, joints in the feedback's order; None if they are unknown.
-        wish: speeds forward and to the left, m/s, and rate of turning, rad/s.
+        command: speeds forward and to the left, m/s, and rate of turning, rad/s.
         balancing: whether the feedback bears the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
         falls: how often it fell.
@@ -121,7 +121,7 @@ class BalancedPattern(Pattern):
         super().__init__(plan, ramp, enabled)
         self.balance: BipedFeedback | None = None
         self.sensors: SensorData | None = None
-        self.wish = 0.0, 0.0, 0.0
+        self.command = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
         self.ages, self.latencies = np.zeros(3), np.zeros(3)
@@ -243,6 +243,7 @@ class BalancedPattern(Pattern):
             sensors = self._substitutes.fill(sensors, self._ages, self.latencies,
                                              balance.memory, dt)
             self._watch(balance, sensors, dt)
+        self._unseen = self._out_of_sight()
         self._good = 0.0 if self.failed or self.doubts else self._good + dt
         if self.balancing and self._gives_up(balance, sensors, dt):
             # First, as another thread may ask whether it has come to rest.
@@ -263,7 +264,7 @@ class BalancedPattern(Pattern):
         self.held += confine(target, rate, self._limits, dt, self.position, self.velocity,
                              self._behind) > 0
         if self.balancing:
-            self._stride.record(balance, self._is_blind, self.position[self._places])
+            self._stride.record(balance, self._unseen, self.position[self._places])
 
     def _attach(self, balance: BipedFeedback) -> None:
         self._arms = balance.arms
@@ -279,20 +280,18 @@ class BalancedPattern(Pattern):
         A crouch that begins in a walk waits for the moment at which the body is over the foot
         that stands.
         """
-        blind = self._is_blind
-        if not (self._stops or self._lowers or blind):
+        if not (self._stops or self._lowers or self._unseen):
             self._waited = self._failing = 0.0
             self._blind = False
             return sensors is None
         self._failing += dt
         self._waited = self._waited + dt if balance.mode == STAND else 0.0
-        self._blind = self._blind or blind or (self._stops and self._failing > PATIENCE)
+        self._blind = self._blind or self._unseen or (self._stops and self._failing > PATIENCE)
         return (sensors is None or self._waited > SETTLED
                 or (self._blind and (balance.mode != WALK or self._passes(balance))))
 
-    @property
-    def _is_blind(self) -> bool:
-        """Whether IMU and joints are both too old to balance a walk."""
+    def _out_of_sight(self) -> bool:
+        """Return whether IMU and joints are both too old to balance a walk."""
         return bool(np.maximum(self._ages, self.latencies)[:FEET].min()
                     > (LATE if self.failed else BLIND))
 
@@ -312,14 +311,14 @@ class BalancedPattern(Pattern):
                   ) -> np.ndarray | None:
         """Return the angles that balance requests, rad, (joints,); None after a fall."""
         if self.enabled and not (self._stops or self._lowers):
-            forward, left, turn = self.wish
+            forward, left, turn = self.command
             balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
         else:
             balance.stand()
         if self._held:
             self._held = False
             self._start[:] = self.position
-        target = self._stride.replay(balance, self._is_blind, balance.advance(sensors, dt))
+        target = self._stride.replay(balance, self._unseen, balance.advance(sensors, dt))
         if not np.isfinite(target).all():
             self._fall()
             return None
@@ -389,7 +388,7 @@ class BalancedPattern(Pattern):
         if not wrong.any():
             wrong, reason = np.zeros(joints.size, dtype=bool), 'is stuck'
             wrong[balance.rows] = self._unchanged[balance.rows] > STEADY
-        # Somebody who moves the robot moves more than one joint.
+        # A person who moves the robot moves more than one joint.
         if wrong.sum() == 1 and JOINTS not in self.doubts:
             assert self._substitutes is not None
             self._substitutes.suspect = int(wrong.argmax())

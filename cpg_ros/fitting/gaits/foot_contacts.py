@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stance and swing from the loads on the feet; walk and run told apart by the flight.
+"""Stance and swing from the loads on the feet; walk and run by the flight.
 
 A stride is from touchdown to touchdown; duty is the share of it in stance. In a walk a foot is on
 the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).

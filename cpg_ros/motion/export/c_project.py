@@ -138,7 +138,7 @@ class CProject:
         return part(self.header, {
             'TITLE': self.title, 'REAL': TYPES.get(self.data.format.real, ''),
             'DEFINES': self._defines(), 'TRACKS': str(self.tracks),
-            'SUBSTEP': f'{self.substep!r}{suffix}'})
+            'SUBSTEP': f'{self.substep!r}{suffix}', 'RAMP': part('ramp.h')})
 
     @property
     def parts(self) -> tuple[str, ...]:

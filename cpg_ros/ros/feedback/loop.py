@@ -110,8 +110,7 @@ class FeedbackLoop(SensorLoop):
         self._pattern, legs = pattern, len(pattern.robot.legs)
         self._wanted, self._goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
-        self._instant = Instant(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), scale,
-                                np.zeros(legs))
+        self._instant = Instant.empty(legs, scale)
         self._planned = PlannedMotion(self._wanted[None], np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
                                       np.zeros((1, 2)), np.zeros(1), np.zeros(1))
@@ -237,7 +236,7 @@ class FeedbackLoop(SensorLoop):
 
     def renew(self) -> None:
         """Take over the wanted motion."""
-        self._instant.wish[:] = self._motion()
+        self._instant.command[:] = self._motion()
 
     def _correct(self, angles: np.ndarray) -> np.ndarray:
         """Return the corrected angles, rad, shape (joints,), of planned ones."""
@@ -373,5 +372,5 @@ class BalanceLoop(SensorLoop):
         pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
         pattern.latencies[:FEET] = [monitor.latency(now) for monitor in inputs.monitors[:FEET]]
         pattern.sensors = None if self.waiting else sensors
-        pattern.wish = self._motion()
+        pattern.command = self._motion()
         pattern.balance = self.feedback

@@ -102,7 +102,7 @@ def discover(node: Node) -> Graph:
 
 #: PATIENCE: longest time to find a service, and again for it to answer, s.
 PATIENCE = 5.0
-#: SILENCE: time without a service after which the user is told of the wait, s.
+#: SILENCE: time without a service after which a line announces the wait, s.
 SILENCE = 1.0
 #: POLL: period in which services and responses are checked, s.
 POLL = 0.01

@@ -63,18 +63,7 @@ typedef struct {
 } cpg_drive;
 #endif
 
-typedef struct {
-    cpg_real start, rate, end, time;
-} cpg_ramp_part;
-
-/* A level on the way to its target, and its rate, 1/s. */
-typedef struct {
-    cpg_real level, rate, past;
-    cpg_ramp_part part;
-    cpg_real end, time;  /* of the part after that, which begins at rest */
-    uint8_t parts;
-} cpg_ramp;
-
+@RAMP@
 typedef struct cpg {
     cpg_real position[CPG_JOINTS];  /* rad, leg by leg */
     cpg_real velocity[CPG_JOINTS];  /* rad/s */

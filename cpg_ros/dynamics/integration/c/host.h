@@ -60,17 +60,7 @@ typedef struct {
     int32_t legs, at_once;
 } cpg_drive;
 
-typedef struct {
-    cpg_real start, rate, end, time;
-} cpg_ramp_part;
-
-typedef struct {
-    cpg_real level, rate, past;
-    cpg_ramp_part part;
-    cpg_real end, time;  /* of the part after that, which begins at rest */
-    uint8_t parts;
-} cpg_ramp;
-
+@RAMP@
 typedef struct {
     int32_t joints, tracks, held, ticks_held, faults, followed, recovering, jumped;
     cpg_track *track[CPG_TRACKS];
