@@ -15,10 +15,13 @@
 """A generator at 500 Hz of every network under storms of requests; all it publishes is checked.
 
 Parameters (hostile and fair), cmd_vel, ~/enable and SIGSTOP; with --pipe nobody reads the log
-during the second half of each storm, and the pipe is closed before its end.
+during the second half of each storm, and the pipe is closed before its end. The row 'humanoid' is
+a simulated humanoid in lockstep with its generator, which walks with feedback through the same
+storm (a Unitree G1 if its model is installed); it is put on its feet every 10 s.
 """
 
 import argparse
+from importlib.util import find_spec
 import os
 import random
 import signal
@@ -31,18 +34,24 @@ from common import emit, log
 from geometry_msgs.msg import Twist
 from hostile import requests
 import numpy as np
-from processes import ends_with_us, enter_workspace, GENERATOR
+from processes import ends_with_us, enter_workspace, GENERATOR, Process
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 import rclpy
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
-from std_srvs.srv import SetBool
+from stage import SIM
+from std_srvs.srv import SetBool, Trigger
 
 RATE = 500.0
-NETWORKS = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka', 'phase')
+NETWORKS = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka', 'phase', 'humanoid')
 #: Robots that the networks move; the others move the generic quadruped.
-ROBOTS = {'delayed': 'unitree_go2', 'quadruped': 'unitree_go2', 'biped': 'biped'}
-STEERED = ('unitree_go2',)
+ROBOTS = {'delayed': 'unitree_go2', 'quadruped': 'unitree_go2', 'biped': 'biped',
+          'humanoid': 'unitree_g1' if find_spec('mjlab') else 'humanoid'}
+STEERED = ('unitree_go2', 'unitree_g1', 'humanoid')
+#: Topic of all commands; a simulated robot publishes what it measures on joint_states.
+COMMANDS = 'joint_commands'
+#: The simulated robot is put on its feet as often, s.
+RESET_EVERY = 10.0
 TYPES = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGER,
          float: ParameterType.PARAMETER_DOUBLE, str: ParameterType.PARAMETER_STRING}
 #: A node that does not end within this time is killed, s.
@@ -94,15 +103,16 @@ class Piped:
 class Checker:
     """Listens to joint states and compares each message with the robot's limits."""
 
-    def __init__(self, robot: str) -> None:
+    def __init__(self, robot: str, simulated: bool) -> None:
         from cpg_ros.motion.robot_file import load_robot
         from cpg_ros.ros.node.polled import PolledSubscription
         joints = load_robot(robot).joints
         self._limits = {joint.name: (joint.lower, joint.upper, joint.velocity)
                         for joint in joints}
+        self._simulated = simulated
         self.node = rclpy.create_node('checker')
         # At RATE, more than arrives while a request waits in vain for its answer.
-        self._topic = PolledSubscription(self.node, JointState, 'joint_states',
+        self._topic = PolledSubscription(self.node, JointState, COMMANDS,
                                          QoSProfile(depth=10000), overridable=False)
         self.messages, self.crossed, self.fastest, self.off = 0, [], 0.0, 0.0
         self._before: tuple[float, np.ndarray, np.ndarray] | None = None
@@ -129,14 +139,18 @@ class Checker:
             # A message is a tick, however long the process was stopped before it.
             step = (position - old) * RATE
             self.fastest = max(self.fastest, float(np.max(np.abs(step) / limit)))
-            if stamp <= then or (np.abs(step) > limit * (1.0 + 1e-3)).any():
+            # A stop goes on by the steady clock where simulated time stands still.
+            again = stamp <= then and not self._simulated
+            if again or (np.abs(step) > limit * (1.0 + 1e-3)).any():
                 wrong = f'moved {np.max(np.abs(step) / limit):.3g} of the limit'
             elif stamp - then < 1.5 / RATE:
                 low, high = np.minimum(before, velocity), np.maximum(before, velocity)
                 off = float(np.max(np.maximum(low - step, step - high) / limit))
                 self.off = max(self.off, off)
                 if off > TOLERANCE:
-                    wrong = f'velocity {off:.3g} of the limit beside the step'
+                    worst = np.argmax(np.maximum(low - step, step - high) / limit)
+                    wrong = (f'{message.name[worst]}: velocity {before[worst]:.4g}, then '
+                             f'{velocity[worst]:.4g}, step {step[worst]:.4g} rad/s')
         if wrong:
             self.crossed.append(f'{stamp:.3f}: {wrong}')
         self._before = stamp, position, velocity
@@ -159,23 +173,29 @@ def fair(rng: random.Random, gaits: list[str]) -> list[Parameter]:
         type=ParameterType.PARAMETER_DOUBLE, double_value=number))]
 
 
-def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, object]:
+def storm(row: str, seconds: float, pipe: bool, seed: int) -> dict[str, object]:
     from cpg_ros.networks.registry import PRESETS
-    rng = random.Random(f'{network} {seed}')
-    robot = ROBOTS.get(network, 'quadruped')
+    rng = random.Random(f'{row} {seed}')
+    robot = ROBOTS.get(row, 'quadruped')
+    simulated = row == 'humanoid'
+    network = 'biped' if simulated else row
+    body = Process(SIM, robot=robot, model=robot, lockstep='true') if simulated else None
     node = Piped(rate=RATE, network=network, robot=robot, ramp=0.2,
-                 cmd_vel=str(robot in STEERED).lower(), **{'feedback.enabled': 'false'})
+                 cmd_vel=str(robot in STEERED).lower(), combined_topic=COMMANDS,
+                 use_sim_time=str(simulated).lower(),
+                 **{'feedback.enabled': str(simulated).lower()})
     node.wait_for(b'publishing')
-    checker, client = Checker(robot), ParameterClient()
+    checker, client = Checker(robot, simulated), ParameterClient()
     walk = client.node.create_publisher(Twist, 'cmd_vel', 10)
     enable = client.node.create_client(SetBool, 'cpg_generator/enable')
+    reset = client.node.create_client(Trigger, 'robot_sim/reset')
     names = [name for name in client.names() if not name.startswith('qos_overrides')]
     values = client.get(names)
     types = {name: TYPES[type(value)] for name, value in values.items() if type(value) in TYPES}
     odd = requests(types, 1 << 30, seed)
     gaits, counts = list(PRESETS[network]), dict.fromkeys(
         ('requests', 'accepted', 'unanswered', 'stops', 'enables', 'cmd_vels'), 0)
-    began, closed = time.monotonic(), False
+    began, closed, put_up = time.monotonic(), False, 0.0
     while (past := time.monotonic() - began) < seconds and node.child.poll() is None:
         if pipe and past > seconds / 2:
             node.reading.clear()
@@ -183,6 +203,9 @@ def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, obje
             closed = True
             node.child.stdout.close()
             node.reading.set()
+        if simulated and past > put_up + RESET_EVERY:
+            put_up = past
+            reset.call_async(Trigger.Request())
         twist = Twist()
         twist.linear.x, twist.angular.z = rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)
         walk.publish(twist)
@@ -208,7 +231,9 @@ def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, obje
     time.sleep(0.5)
     checker.end()
     client.node.destroy_node()
-    log(f'{network}: {checker.messages} messages, {len(checker.crossed)} wrong, code {code}')
+    if body:
+        body.end()
+    log(f'{row}: {checker.messages} messages, {len(checker.crossed)} wrong, code {code}')
     return {**counts, 'messages': checker.messages, 'limits_crossed': len(checker.crossed),
             'first': checker.crossed[:3], 'fastest': checker.fastest,
             'velocity_off': checker.off, 'exit_code': code}

@@ -92,6 +92,21 @@ def test_a_spike_of_the_gyroscope_is_left_out():
         '', '', 'an impossible angular velocity', 'an impossible angular velocity', '']
 
 
+def test_gravity_is_judged_by_a_quarter_of_a_second_and_not_by_the_first_message():
+    memory, mount, filled = np.zeros(IMU_MEMORY), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros((3, 3))
+    message = np.zeros(IMU)
+    message[3] = 1.0
+    # A robot that is put on the ground falls freely at first; before it, a second of silence.
+    for k, dt in enumerate((1.0, *(100 * [0.002]))):
+        message[27] = 9.81 * (k > 5)
+        assert judge_imu(message, dt, False, mount, memory, *filled) == 0
+    # Gravity removed by the driver is named once it has been seen for long enough.
+    memory[:], message[27] = 0.0, 0.0
+    verdicts = [judge_imu(message, dt, False, mount, memory, *filled)
+                for dt in (1.0, *(140 * [0.002]))]
+    assert verdicts[90] == 0 and 'gravity' in VERDICTS[verdicts[-1]]
+
+
 def late_monitor(delay, now):
     monitor = InputMonitor('imu', latest=LATE)
     for _ in range(100):
