@@ -22,7 +22,6 @@ import subprocess
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.motion.export.c_project import CProject
-from cpg_ros.motion.export.fixed_point import FixedData, FixedProject
 from cpg_ros.motion.export.gait_data import CFormat, GaitData
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot import Joint, Robot
@@ -71,9 +70,7 @@ def data_of(made, form='network', real='float64', tolerance=None, step=None, ste
 
 
 def project_of(data, substep=0.001):
-    """Return the files of constants; fixed ones have ticks of one part."""
-    if isinstance(data, FixedData):
-        return FixedProject(data, 'a test')
+    """Return the files of constants."""
     return CProject(data, 'a test', substep)
 
 

@@ -14,4 +14,4 @@
 
 """Gaits as C for processors without Python: equations, readout, pattern and golden vectors."""
 
-__all__ = ['c_project', 'export', 'fixed_point', 'gait_data', 'golden']
+__all__ = ['c_project', 'export', 'gait_data', 'golden']

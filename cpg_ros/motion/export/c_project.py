@@ -17,19 +17,14 @@
 The parts in ``c`` are put together as a network and a form need them.
 """
 
-from collections.abc import Sequence
 import math
 
-from cpg_ros.common.errors import InputError
-from cpg_ros.dynamics.integration.c_text import braces, part
+from cpg_ros.dynamics.integration.c_text import part
 from cpg_ros.dynamics.integration.kernel_source import field_source, FieldSource
 from cpg_ros.motion.export.gait_data import c_name, check_names, comment, GaitData
 from cpg_ros.motion.export.golden import Golden, golden_test
 from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.equations import equations_of
-import numpy as np
 
 SUBSTEP = 0.001
 TYPES = {'float32': 'float', 'float64': 'double'}
@@ -43,8 +38,6 @@ class CProject:
         title: the first line of every file.
 
     """
-
-    header = 'cpg.h'
 
     def __init__(self, data: GaitData, title: str, substep: float = SUBSTEP) -> None:
         """Prepare gaits for export; substep is the longest part of a tick while they fade, s.
@@ -135,8 +128,8 @@ class CProject:
 
     def _header(self) -> str:
         suffix = 'f' if self.data.format.real == 'float32' else ''
-        return part(self.header, {
-            'TITLE': self.title, 'REAL': TYPES.get(self.data.format.real, ''),
+        return part('cpg.h', {
+            'TITLE': self.title, 'REAL': TYPES[self.data.format.real],
             'DEFINES': self._defines(), 'TRACKS': str(self.tracks),
             'SUBSTEP': f'{self.substep!r}{suffix}', 'RAMP': part('ramp.h')})
 
@@ -173,12 +166,9 @@ class CProject:
             files['library.properties'] = self._properties()
             joints = len(self.data.robot.joints)
             tick = 20 if golden is None else max(1, round(1000.0 * golden.dt))
-            fixed = self.data.format.real == 'fixed'
             files['examples/walk/walk.ino'] = part('walk.ino', {
-                'TICK': str(tick), 'RAMP': 'CPG_TICKS(3)' if fixed else '3',
-                'TIME': '' if fixed else ', cpg_real(TICK) / 1000',
-                'PINS': ', '.join(map(str, range(2, 2 + joints))),
-                'ONES': ', '.join(['1'] * joints),
+                'TICK': str(tick), 'PINS': ', '.join(map(str, range(2, 2 + joints))),
+                'CENTRES': ', '.join(['90'] * joints), 'ONES': ', '.join(['1'] * joints),
                 'JOINTS': comment(', '.join(joint.name for joint in self.data.robot.joints))})
         return files
 
@@ -228,7 +218,7 @@ static cpg c;                       /* {ram} bytes */
 cpg_start(&c, CPG_GAIT_{first}, {ramp});   /* stand, then into the gait within 2 s */
 for (;;) {{                          /* {rate:g} times a second */
     cpg_advance(&c{dt});
-    /* {result}: {joints} ... */
+    /* c.position[joint] in rad and c.velocity[joint] in rad/s: {joints} ... */
 }}
 {switch}{steer}cpg_enable(&c, 0, {ramp});          /* down to the stand */
 ```
@@ -256,11 +246,9 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
     delay = max(plan.orbit.network.delay for plan in data.plans)
     history = f', and keeps {project.nodes} of them for the delay of {delay:g}' if delay else ''
     form = FORMS[data.format.form].format(step=data.step, history=history, points=data.points)
-    fixed, f = data.format.real == 'fixed', 'f' if data.format.real == 'float32' else ''
-    second_time, ramp = (f'CPG_TICKS({seconds})' if fixed else f'{seconds}{f}'
-                         for seconds in (1.0, 2.0))
+    f = 'f' if data.format.real == 'float32' else ''
     second = data.plans[1].name if len(data.plans) > 1 else ''
-    switch = f'cpg_switch(&c, CPG_GAIT_{c_name(second)}, {second_time});' if second else ''
+    switch = f'cpg_switch(&c, CPG_GAIT_{c_name(second)}, 1.0{f});' if second else ''
     return TEXT.format(
         title=project.title, command=command, ram=project.ram, constants=data.bytes, form=form,
         test=('cc -std=c99 -Isrc src/*.c extras/test_cpg.c -lm -o test_cpg' if arduino else
@@ -268,80 +256,8 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
         network=', the network step by step' if data.format.form == 'network' else '',
         switches=golden.switches, samples=len(golden.positions), tolerance=golden.tolerance,
         first=c_name(data.plans[0].name), rate=1.0 / golden.dt,
-        ramp=ramp, dt='' if fixed else f', {golden.dt!r}{f}',
-        result='c.position[joint] in 2^-13 rad' if fixed else
-        'c.position[joint] in rad and c.velocity[joint] in rad/s',
+        ramp=f'2.0{f}', dt=f', {golden.dt!r}{f}',
         joints=comment(', '.join(joint.name for joint in data.robot.joints[:3])),
         switch=f'{switch}   /* cross-fade in 1 s */\n' if switch else '',
         steer='cpg_steer(&c, strides, pace);   /* each leg, -1 to 1; the pace, 0 to 2 */\n'
         if data.format.steering else '')
-
-
-# Gaits as skill arrays of Petoi's OpenCat: one cycle in frames of whole degrees.
-
-#: Limits of a skill array. MOST_BYTES: size in the robot's memory, bytes; MOST_FRAMES: number of
-#: frames, which the first number, an int8, states.
-MOST_BYTES, MOST_FRAMES = 450, 127
-HEAD = 4
-LEGS = (('lf', 'fl'), ('rf', 'fr'), ('rh', 'hr', 'rb', 'br', 'rr'), ('lh', 'hl', 'lb', 'bl', 'rl'))
-
-
-def joint_order(robot: Robot) -> np.ndarray:
-    """Return which of the robot's joints each number of a frame is.
-
-    Raises:
-        InputError: the robot has not four legs, of these names, with two or three joints each.
-
-    """
-    by_name = {leg.lower(): leg for leg in robot.legs}
-    legs = [by_name[name] for names in LEGS for name in names if name in by_name]
-    joints = {len(robot.legs[leg]) for leg in legs}
-    if len(legs) != len(LEGS) or len(robot.legs) != len(LEGS) or not joints <= {2, 3} \
-            or len(joints) != 1:
-        raise InputError(f'robot {robot.name}: skill arrays are for four legs, named lf, rf, rh '
-                         f'and lh, with two or three joints each; it has {", ".join(robot.legs)}')
-    names = [joint.name for joint in robot.joints]
-    return np.array([names.index(robot.legs[leg][number].name)
-                     for number in range(joints.pop()) for leg in legs])
-
-
-def skill(plan: GaitPlan) -> np.ndarray:
-    """Return a gait's array of int8, from where its first leg's phase is 0.
-
-    Raises:
-        InputError: an angle is beyond twice the range of int8, or the robot is none of Petoi's.
-
-    """
-    order, readout, robot = joint_order(plan.robot), plan.readout, plan.robot
-    frames = min(MOST_FRAMES, (MOST_BYTES - HEAD) // order.size)
-    phases = np.arange(frames) / frames - readout.start
-    grid = np.arange(readout.angles.shape[1]) / readout.angles.shape[1]
-    stand = plan.shift + robot.column('offset')
-    degrees = np.degrees([stand[joint] + np.interp(
-        phases + plan.orbit.phases[robot.cells[joint]], grid, readout.angles[joint], period=1.0)
-        for joint in order]).T
-    ratio = 1 if np.abs(degrees).max() <= 127.0 else 2
-    steps = np.rint(degrees / ratio).astype(int)
-    if np.abs(steps).max() > 127:
-        raise InputError(f'{plan.name}: an angle of {np.abs(degrees).max():.0f} degrees; skill '
-                         'arrays go to 254')
-    return np.concatenate([[frames, 0, 0, ratio], steps.ravel()]).astype(np.int8)
-
-
-def skills(plans: Sequence[GaitPlan], title: str) -> str:
-    """Write gaits as arrays of C.
-
-    Raises:
-        InputError: as of skill, or two gaits have the same name in C.
-
-    """
-    check_names('gait', [plan.name for plan in plans])
-    arrays = []
-    for plan in plans:
-        data = skill(plan)
-        rows = [data[:HEAD], *data[HEAD:].reshape(data[0], -1)]
-        numbers = ',\n'.join('    ' + braces(row, 'int8')[1:-1] for row in rows)
-        arrays.append(f'/* {data[0]} frames a stride: {plan.frequency:g} strides per second are '
-                      f'{data[0] * plan.frequency:g} frames per second. */\n'
-                      f'const int8_t {c_name(plan.name).lower()}[] PROGMEM = {{\n{numbers}}};\n')
-    return '\n'.join([f'/* {comment(title)}, as skill arrays of OpenCat. */', *arrays])

@@ -30,8 +30,7 @@ from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.common.files import write_atomically
 from cpg_ros.dynamics.integration.c_kernel import c_kernels
 from cpg_ros.dynamics.integration.simulate import use
-from cpg_ros.motion.export.c_project import CProject, readme, skills, SUBSTEP
-from cpg_ros.motion.export.fixed_point import FixedData, FixedProject
+from cpg_ros.motion.export.c_project import CProject, readme, SUBSTEP
 from cpg_ros.motion.export.gait_data import CFormat, GaitData
 from cpg_ros.motion.export.golden import golden_of
 from cpg_ros.motion.plan import GaitPlan, plan, PlanError
@@ -60,15 +59,14 @@ def _parser() -> Parser:
                         "that defines one (default: the robot's first)")
     parser.add_argument('--gaits', nargs='+', metavar='GAIT', help='gaits or presets of the '
                         "network, the first one at the start (default: the network's usual gait)")
-    parser.add_argument('--target', choices=('c99', 'arduino', 'petoi'), default='c99',
-                        help='plain files, an Arduino library with an example sketch, or skill '
-                        "arrays of Petoi's OpenCat (default: %(default)s)")
+    parser.add_argument('--target', choices=('c99', 'arduino'), default='c99',
+                        help='plain files, or an Arduino library with an example sketch (default: '
+                        '%(default)s)')
     parser.add_argument('--form', choices=('network', 'table'), default='network',
                         help="the network's equations, or the gaits' orbits alone, as tables, for "
                         'the smallest boards (default: %(default)s)')
-    parser.add_argument('--real', choices=('float32', 'float64', 'fixed'), default='float32',
-                        help='type of all numbers; fixed, with --form table, has whole numbers '
-                        'for processors of 8 bits (default: %(default)s)')
+    parser.add_argument('--real', choices=('float32', 'float64'), default='float32',
+                        help='type of all numbers (default: %(default)s)')
     parser.add_argument('--steering', action='store_true', help='strides and pace can be changed: '
                         'for --form network')
     parser.add_argument('--step', type=number, metavar='T', help="model time per step (default: "
@@ -77,9 +75,9 @@ def _parser() -> Parser:
                         help='longest part of a tick while gaits fade or the ramp moves, s '
                         f'(default: {SUBSTEP:g}, as in the generator); at most one tick on slow '
                         'boards')
-    parser.add_argument('--rate', type=number, metavar='HZ',
-                        help='ticks per second of the golden vectors, the sketch and all that is '
-                        'fixed, Hz (default: 1000, or 50 with --real fixed)')
+    parser.add_argument('--rate', type=number, metavar='HZ', default=1000.0,
+                        help='ticks per second of the golden vectors and the sketch, Hz (default: '
+                        '%(default)g)')
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second of all '
                         'gaits, Hz (default: as the robot file has it, or else 1)')
     parser.add_argument('--tolerance', type=number, metavar='SHARE', help='by which tables may '
@@ -98,22 +96,8 @@ def _refuse_options(args: argparse.Namespace) -> None:
         if value is not None and not low < value <= high:
             raise InputError(f'argument --{option}: {value:g} is not above {low:g} and up to '
                              f'{high:g}')
-    if args.target == 'petoi':
-        for option, usual in (('form', 'network'), ('real', 'float32'), ('step', None),
-                              ('substep', None), ('rate', None), ('tolerance', None),
-                              ('steering', False)):
-            if getattr(args, option) != usual:
-                raise InputError(f'argument --{option}: not for --target petoi, which has frames '
-                                 'of whole degrees')
-    elif args.steering and args.form != 'network':
+    if args.steering and args.form != 'network':
         raise InputError('argument --steering: needs --form network')
-    elif args.real == 'fixed':
-        if args.form != 'table':
-            raise InputError('argument --real: fixed needs --form table')
-        for option in ('step', 'substep', 'tolerance'):
-            if getattr(args, option) is not None:
-                raise InputError(f'argument --{option}: not for --real fixed, which has tables of '
-                                 '256 points and ticks of one part')
     refuse_repeated('argument --gaits', args.gaits or [])
     if args.out.exists() and not args.out.is_dir():
         raise InputError(f'argument --out: {args.out} is not a directory')
@@ -158,28 +142,15 @@ def _title(plans: Sequence[GaitPlan]) -> str:
             f'{", ".join(plan.name for plan in plans)}')
 
 
-def _project(args: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CProject, float]:
-    """Return the project to export, and the ticks per second of its test."""
-    title = _title(plans)
-    if args.real == 'fixed':
-        rate = args.rate or 50.0
-        return FixedProject(FixedData(plans, rate), title), rate
-    tolerance = args.tolerance or TOLERANCES[args.real]
-    data = GaitData(plans, CFormat(args.form, args.real, tolerance, args.steering))
-    return CProject(data, title, args.substep or SUBSTEP), args.rate or 1000.0
-
-
 def _export(args: argparse.Namespace) -> int:
     _refuse_options(args)
     use(c_kernels)
     plans = _plans(args)
-    if args.target == 'petoi':
-        _write(args.out, {'petoi_skills.h': skills(plans, _title(plans))})
-        return 0
-    project, rate = _project(args, plans)
-    data = project.data
+    data = GaitData(plans, CFormat(args.form, args.real, args.tolerance or TOLERANCES[args.real],
+                                   args.steering))
+    project = CProject(data, _title(plans), args.substep or SUBSTEP)
     try:
-        golden = golden_of(data, 1.0 / rate, project.substep)
+        golden = golden_of(data, 1.0 / args.rate, project.substep)
     except CpgError as error:
         raise InputError(f'the golden vectors cannot be made: {error}') from error
     arduino = args.target == 'arduino'

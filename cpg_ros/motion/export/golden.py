@@ -172,22 +172,22 @@ static int pattern(void)
     static cpg c;
     static const int ticks[@EVENTS@] = @TICKS@;
     static const int gaits[@EVENTS@] = @GAITS@;
-@STRIDES@    static const @TYPE@ positions[@SAMPLES@][CPG_JOINTS] = @POSITIONS@;
+@STRIDES@    static const cpg_real positions[@SAMPLES@][CPG_JOINTS] = @POSITIONS@;
     double worst = 0.0;
     int event = 0;
-    cpg_start(&c, 0, @TIME@(@RAMP@));
+    cpg_start(&c, 0, (cpg_real)@RAMP@);
     for (int tick = 0; tick < @SAMPLES@ * @EVERY@; tick++) {
         if (event < @EVENTS@ && ticks[event] == tick) {
 @STEER@            if (gaits[event] < 0) {
-                cpg_enable(&c, 0, @TIME@(@RAMP@));
+                cpg_enable(&c, 0, (cpg_real)@RAMP@);
             } else {
-                cpg_switch(&c, (uint8_t)gaits[event], @TIME@(@TRANSITION@));
+                cpg_switch(&c, (uint8_t)gaits[event], (cpg_real)@TRANSITION@);
             }
             event++;
         }
-        cpg_advance(&c@DT@);
+        cpg_advance(&c, (cpg_real)@DT@);
         for (int joint = 0; (tick + 1) % @EVERY@ == 0 && joint < CPG_JOINTS; joint++) {
-            const double off = @VALUE@
+            const double off = (double)c.position[joint]
                              - (double)positions[tick / @EVERY@][joint];
             worst = fmax(worst, fabs(off));
         }
@@ -208,8 +208,7 @@ int main(void)
 
 def golden_test(golden: Golden, real: str, title: str) -> str:
     """Write a test in C that exits with 1 if the C of gaits differs from the Python generator."""
-    both, fixed = golden.network_tolerance > 0.0, real == 'fixed'
-    numbers = 'float32' if fixed else real
+    both = golden.network_tolerance > 0.0
     text = ('#include "cpg.h"\n\n#include <math.h>\n#include <stdio.h>\n#include <stdlib.h>\n'
             + (NETWORK_TEST if both else '') + TEST)
     events = golden.events
@@ -223,12 +222,9 @@ def golden_test(golden: Golden, real: str, title: str) -> str:
             ('STATE_ROWS', braces(golden.states, real)), ('EVERY_STEP', EVERY_STEP),
             ('NETWORK_TOLERANCE', f'{golden.network_tolerance:g}'), ('EVENTS', len(events)),
             ('TICKS', braces(list(events), real)), ('GAITS', braces(list(events.values()), real)),
-            ('SAMPLES', len(golden.positions)), ('POSITIONS', braces(golden.positions, numbers)),
+            ('SAMPLES', len(golden.positions)), ('POSITIONS', braces(golden.positions, real)),
             ('RAMP', RAMP), ('EVERY', golden.every), ('TRANSITION', TRANSITION),
-            ('DT', '' if fixed else f', (cpg_real){golden.dt!r}'),
-            ('TYPE', 'float' if fixed else 'cpg_real'),
-            ('TIME', 'CPG_TICKS' if fixed else '(cpg_real)'),
-            ('VALUE', f'{"CPG_RADIANS" if fixed else "(double)"}(c.position[joint])'),
+            ('DT', repr(golden.dt)),
             ('TOLERANCE', f'{golden.tolerance:g}'),
             ('CALLS', '\n'.join(f'    failed += {name}();' for name in
                                 (*(['network'] if both else []), 'pattern')))):

@@ -7,16 +7,6 @@
 
 #include "cpg.h"
 
-#ifdef CPG_FIXED
-#define TIME(seconds) CPG_TICKS(seconds)
-#define ADVANCE(c) cpg_advance(c)
-#define RADIANS(position) CPG_RADIANS(position)
-#else
-#define TIME(seconds) ((cpg_real)(seconds))
-#define ADVANCE(c) cpg_advance(c, (cpg_real)0.02)
-#define RADIANS(position) (position)
-#endif
-
 #define UNUSED 0xA5
 
 static cpg c;
@@ -61,13 +51,13 @@ int main(void)
     for (uint8_t *byte = &__heap_start; byte < (uint8_t *)SP - 8; byte++) {
         *byte = UNUSED;
     }
-    cpg_start(&c, 0, TIME(1.0));
+    cpg_start(&c, 0, (cpg_real)1.0);
     for (int tick = 0; tick < 200; tick++) {
         if (tick == 100) {
-            cpg_switch(&c, CPG_GAITS - 1, TIME(1.0));
+            cpg_switch(&c, CPG_GAITS - 1, (cpg_real)1.0);
         }
         begin();
-        ADVANCE(&c);
+        cpg_advance(&c, (cpg_real)0.02);
         const uint32_t taken = cycles();
         uint32_t *worst = tick >= 60 && tick < 100 ? &cruise : &fading;
         *worst = taken > *worst ? taken : *worst;
@@ -81,7 +71,7 @@ int main(void)
     printf("state %u\n", (unsigned)sizeof c);
     printf("stack %u\n", (unsigned)(RAMEND - (uint16_t)byte));
     for (int joint = 0; joint < CPG_JOINTS; joint++) {
-        printf("position %ld\n", (long)(RADIANS(c.position[joint]) * 1e5f));
+        printf("position %ld\n", (long)(c.position[joint] * 1e5f));
     }
 #ifndef CPG_TABLE
     uint32_t worst = 0;

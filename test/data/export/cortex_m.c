@@ -2,16 +2,6 @@
  * and under qemu -icount shift=0 an instruction takes 1 ns. Results go out by semihosting. */
 #include "cpg.h"
 
-#ifdef CPG_FIXED
-#define TIME(seconds) CPG_TICKS(seconds)
-#define ADVANCE(c) cpg_advance(c)
-#define RADIANS(position) CPG_RADIANS(position)
-#else
-#define TIME(seconds) ((cpg_real)(seconds))
-#define ADVANCE(c) cpg_advance(c, (cpg_real)0.02)
-#define RADIANS(position) (position)
-#endif
-
 extern uint32_t data_begin, data_end, data_load, bss_begin, bss_end;
 int main(void);
 void reset(void);
@@ -80,13 +70,13 @@ static cpg c;
 int main(void)
 {
     long cruise = 0, fading = 0;
-    cpg_start(&c, 0, TIME(1.0));
+    cpg_start(&c, 0, (cpg_real)1.0);
     for (int tick = 0; tick < 200; tick++) {
         if (tick == 100) {
-            cpg_switch(&c, CPG_GAITS - 1, TIME(1.0));
+            cpg_switch(&c, CPG_GAITS - 1, (cpg_real)1.0);
         }
         begin();
-        ADVANCE(&c);
+        cpg_advance(&c, (cpg_real)0.02);
         const long taken = instructions();
         long *worst = tick >= 60 && tick < 100 ? &cruise : &fading;
         *worst = taken > *worst ? taken : *worst;
@@ -95,7 +85,7 @@ int main(void)
     print("fading", fading);
     print("state", (long)sizeof c);
     for (int joint = 0; joint < CPG_JOINTS; joint++) {
-        print("position", (long)(RADIANS(c.position[joint]) * 1e5f));
+        print("position", (long)(c.position[joint] * 1e5f));
     }
 #ifndef CPG_TABLE
     begin();

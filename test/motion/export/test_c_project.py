@@ -22,7 +22,6 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.motion.export.c_project import CProject, readme
-from cpg_ros.motion.export.fixed_point import FixedData
 from cpg_ros.motion.export.golden import golden_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
@@ -142,64 +141,6 @@ def test_ten_switches_are_those_of_the_generator(tmp_path, robot, network, gaits
 
 
 @needs_gcc
-@pytest.mark.parametrize('robot, network, gaits, degrees', [
-    ('quadruped', 'delayed', ('trot', 'walk'), 0.03),
-    ('biped', 'biped', ('walk', 'run'), 0.06),
-    *in_depth(('unitree_go2', 'delayed', ('trot', 'walk'), 0.06),
-              ('quadruped', 'phase', ('walk', 'trot'), 0.06),
-              ('goat', 'delayed', ('trot', 'walk'), 0.2),
-              ('octopod', 'phase8', ('pace', 'pronk'), 0.06))])
-@pytest.mark.parametrize('rate', [50.0, 100.0])
-def test_whole_numbers_switch_ten_times_as_the_generator_does(
-        tmp_path, robot, network, gaits, degrees, rate):
-    data = FixedData(plans(robot, network, gaits), rate)
-    text = output(compiled(tmp_path, data, golden_of(data, 1.0 / rate, 1.0 / rate)))
-    off = float(re.search(r'rad, ([\d.e+-]+) degrees', text)[1])
-    print(f'\n| {robot}, {network}, {", ".join(gaits)} | fixed, {rate:g} Hz | {off:.1e} |')
-    assert 'pattern: 10 switches' in text and off < degrees, text
-
-
-@needs_gcc
-def test_whole_numbers_stay_within_limits_whatever_is_asked(tmp_path):
-    """Short fades, and ramps that turn round, at any moment; UBSan would see an overflow."""
-    shim = """
-#include "cpg.h"
-#include <stdio.h>
-
-int main(void)
-{
-    static cpg c;
-    uint32_t draw = 1;
-    cpg_start(&c, 200, 0);
-    for (int tick = 0; tick < 20000; tick++) {
-        draw = draw * 1664525u + 1013904223u;
-        if (draw >> 28 == 0) {
-            cpg_switch(&c, (uint8_t)(draw >> 8), (uint16_t)(draw >> 22 & 63));
-        }
-        if (draw >> 28 == 1) {
-            cpg_enable(&c, (uint8_t)(draw >> 9 & 1), (uint16_t)(draw >> 22 & 63));
-        }
-        cpg_advance(&c);
-        printf("%d ", c.level);
-        for (int joint = 0; joint < CPG_JOINTS; joint++) {
-            printf("%.17g ", CPG_RADIANS(c.position[joint]));
-        }
-    }
-    return 0;
-}
-"""
-    made = plans('hexapod', 'delayed6', ('tripod', 'ripple'))
-    found = np.array(output(compiled(tmp_path, FixedData(made, 50.0), shim=shim)).split(), float)
-    found = found.reshape(20000, -1)
-    level, position = found[:, 0] / 2**14, found[:, 1:]
-    lower, upper, fastest = (made[0].robot.column(key) for key in ('lower', 'upper', 'velocity'))
-    assert (level >= -0.001).all() and (level <= 1.001).all() and np.ptp(level) > 0.9
-    assert (position >= lower).all() and (position <= upper).all()
-    assert (np.abs(np.diff(position, axis=0)) <= fastest / 50.0).all()
-    assert np.abs(np.diff(position, axis=0)).max() > 1e-2
-
-
-@needs_gcc
 @pytest.mark.parametrize('robot, network, gaits', ROBOTS[:1] + in_depth(*ROBOTS[1:6]))
 @pytest.mark.parametrize('form', ['network', 'table'])
 def test_float32_drifts_by_less_than_a_ten_thousandth_of_a_cycle_in_1000_strides(
@@ -271,26 +212,6 @@ def test_times_that_are_none_break_nothing(tmp_path, form):
     assert np.abs(np.diff(found, axis=1)).max() <= 0.01 * made[0].robot.column('velocity').max()
 
 
-@needs_gcc
-def test_whole_numbers_take_times_that_are_none(tmp_path):
-    shim = """
-#include "cpg.h"
-#include <math.h>
-#include <stdio.h>
-int main(void)
-{
-    static cpg c;
-    cpg_start(&c, 0, CPG_TICKS(-1.0));
-    cpg_advance(&c);
-    printf("%d %d %d %d", CPG_TICKS(-1.0), CPG_TICKS((double)NAN), CPG_TICKS(1e30),
-           cpg_leg_phase(&c, 200) == cpg_leg_phase(&c, 0));
-    return 0;
-}
-"""
-    data = FixedData(plans('quadruped', 'delayed', ('trot',)), 50.0)
-    assert output(compiled(tmp_path, data, shim=shim)) == '0 0 65535 1'
-
-
 def with_joints(made, change):
     """Return plans for a robot whose joints are changed."""
     robot = made[0].robot
@@ -318,13 +239,6 @@ def test_names_that_would_end_a_comment(tmp_path):
     assert line.count('*/') == 1 and line.endswith(' */')
     assert all(text.count('/*') == text.count('*/') for text in files.values())
     output(compiled(tmp_path, data, golden_of(data, 0.01)))
-
-
-def test_whole_numbers_need_a_joint_that_moves():
-    made = with_joints(plans('quadruped', 'delayed', ('trot',)),
-                       lambda joint: replace(joint, weights=(0.0,)))
-    with pytest.raises(InputError, match='no joint moves in trot'):
-        FixedData(made, 50.0)
 
 
 @needs_gcc
@@ -391,11 +305,10 @@ DEPARTURES = {
 
 @needs_gcc
 @pytest.mark.skipif(shutil.which('cppcheck') is None, reason='cppcheck is not installed')
-@pytest.mark.parametrize('form', ['network', 'table', 'fixed'])
+@pytest.mark.parametrize('form', ['network', 'table'])
 def test_cppcheck_finds_nothing_beyond_what_is_departed_from(tmp_path, form):
     made = plans('quadruped', 'delayed', ('trot', 'walk'))
-    data = FixedData(made, 50.0) if form == 'fixed' else data_of(made, form, 'float32')
-    for name, text in project_of(data).files().items():
+    for name, text in project_of(data_of(made, form, 'float32')).files().items():
         (tmp_path / name).write_text(text)
     done = subprocess.run(
         ['cppcheck', '--std=c99', '--enable=warning,performance,portability', '--addon=misra',

@@ -46,7 +46,6 @@ def test_it_writes_c_with_a_test_that_passes(tmp_path, capsys):
 @pytest.mark.skipif(shutil.which('gcc') is None, reason='gcc is not installed')
 @pytest.mark.parametrize('words', [
     ['--form', 'table', '--rate', '50', '--substep', '0.02'],
-    ['--form', 'table', '--real', 'fixed'],
     ['--step', '0.05', '--rate', '25', '--substep', '0.04']])
 def test_slow_boards_with_long_ticks_do_what_the_generator_does_with_such(tmp_path, words):
     assert export.main(['--robot', 'quadruped', '--gaits', 'trot', 'walk', *words, '--out',
@@ -71,9 +70,7 @@ def test_an_arduino_library(tmp_path):
 
 
 @pytest.mark.parametrize('words, message', [
-    (['--real', 'fixed'], 'argument --real: fixed needs --form table'),
-    (['--real', 'fixed', '--form', 'table', '--substep', '0.02'], 'argument --substep: not for'),
-    (['--real', 'fixed', '--form', 'table', '--rate', '2'], 'need at least'),
+    (['--steering', '--form', 'table'], 'argument --steering: needs --form network'),
     (['--gaits', 'canter'], "argument --gaits: 'canter' is not one of"),
     (['--gaits', 'trot', 'trot'], 'trot is given twice'),
     (['--network', 'biped'], "'biped' does not drive goat"),
@@ -87,6 +84,15 @@ def test_arguments_of_no_use_are_refused_in_one_line(tmp_path, capsys, words, me
     printed = capsys.readouterr().err
     assert message in printed and printed.count('\n') == 1
     assert not out.exists()
+
+
+@pytest.mark.parametrize('words', [['--target', 'petoi'], ['--real', 'fixed']])
+def test_what_is_no_choice_is_refused_in_one_line(tmp_path, capsys, words):
+    with pytest.raises(SystemExit, match='2'):
+        export.main([*WORDS, *words, '--out', str(tmp_path)])
+    printed = capsys.readouterr().err
+    assert f"argument {words[0]}: invalid choice: '{words[1]}'" in printed
+    assert printed.count('\n') == 1 and not list(tmp_path.iterdir())
 
 
 def test_a_gait_that_cannot_run_is_refused(tmp_path, capsys):
@@ -123,10 +129,9 @@ def test_a_network_of_your_own(tmp_path):
 @pytest.mark.skipif(shutil.which('avr-g++') is None or not CORE.is_dir(),
                     reason='avr-gcc or arduino-core-avr is not installed')
 @pytest.mark.parametrize('board, chip', [('standard', 'atmega328p'), ('mega', 'atmega2560')])
-@pytest.mark.parametrize('real', [('float32', '--substep', '0.02'), ('fixed',)])
-def test_the_sketch_compiles_for_a_board(tmp_path, board, chip, real):
+def test_the_sketch_compiles_for_a_board(tmp_path, board, chip):
     assert export.main([*WORDS, '--target', 'arduino', '--form', 'table', '--rate', '50',
-                        '--real', *real, '--out', str(tmp_path)]) == 0
+                        '--substep', '0.02', '--out', str(tmp_path)]) == 0
     (tmp_path / 'Servo.h').write_text(SERVO)
     common = [f'-mmcu={chip}', '-DF_CPU=16000000L', '-DARDUINO=10819', '-Os', '-Wall', '-Wextra',
               '-Werror', f'-I{CORE}/cores/arduino', f'-I{CORE}/variants/{board}', '-Isrc', '-I.',
@@ -137,3 +142,46 @@ def test_the_sketch_compiles_for_a_board(tmp_path, board, chip, real):
                   ['avr-gcc', '-std=gnu11', 'src/gait_data.c', '-o', 'gait_data.o']):
         done = subprocess.run([*words, *common], cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+
+
+#: A board without time, whose servos print what they are told.
+BOARD = """
+#include <cstdio>
+#include <cstdint>
+static unsigned long millis() { return 0; }
+static void delay(int) {}
+struct Servo { void attach(int) {} void write(int degrees) { std::printf("%d ", degrees); } };
+#include "walk.ino"
+int main() { setup(); }
+"""
+
+
+@pytest.mark.skipif(shutil.which('g++') is None, reason='g++ is not installed')
+def test_each_servo_of_the_sketch_has_a_centre_of_its_own(tmp_path):
+    assert export.main([*WORDS, '--target', 'arduino', '--form', 'table', '--rate', '50',
+                        '--out', str(tmp_path)]) == 0
+    (tmp_path / 'Servo.h').touch()
+    (tmp_path / 'main.cpp').write_text(BOARD)
+    sketch = tmp_path / 'examples' / 'walk' / 'walk.ino'
+    text = sketch.read_text()
+    joints = text.count('90,') + 1
+
+    def compiled(centre):
+        sketch.write_text(text.replace('{90, 90', f'{{{centre}, 90', 1))
+        return subprocess.run(
+            ['g++', '-std=gnu++11', '-Wall', '-Wextra', '-Isrc', '-I.', '-Iexamples/walk',
+             'main.cpp', '-x', 'c', 'src/cpg.c', 'src/gait_data.c', '-lm', '-o', 'board'],
+            cwd=tmp_path, capture_output=True, text=True)
+
+    def stand(centre):
+        done = compiled(centre)
+        assert done.returncode == 0, done.stderr
+        return list(map(int, subprocess.run(
+            [tmp_path / 'board'], capture_output=True, text=True).stdout.split()))
+
+    level, moved = stand(90), stand(135)
+    assert len(level) == joints and moved[1:] == level[1:]
+    assert moved[0] == min(180, level[0] + 45)
+    for centre in (-1, 181, 300):
+        done = compiled(centre)
+        assert done.returncode and 'CENTRE: degrees from 0 to 180' in done.stderr

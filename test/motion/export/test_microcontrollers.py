@@ -22,7 +22,6 @@ import shutil
 import subprocess
 
 from c_export import compiled, data_of, needs_gcc, output, plans, project_of
-from cpg_ros.motion.export.fixed_point import FixedData
 import numpy as np
 import pytest
 
@@ -37,28 +36,18 @@ HOST = """
 #include "cpg.h"
 #include <stdio.h>
 
-#ifdef CPG_FIXED
-#define TIME(seconds) CPG_TICKS(seconds)
-#define ADVANCE(c) cpg_advance(c)
-#define RADIANS(position) CPG_RADIANS(position)
-#else
-#define TIME(seconds) (seconds)
-#define ADVANCE(c) cpg_advance(c, 0.02f)
-#define RADIANS(position) (position)
-#endif
-
 int main(void)
 {
     static cpg c;
-    cpg_start(&c, 0, TIME(1.0f));
+    cpg_start(&c, 0, 1.0f);
     for (int tick = 0; tick < 200; tick++) {
         if (tick == 100) {
-            cpg_switch(&c, CPG_GAITS - 1, TIME(1.0f));
+            cpg_switch(&c, CPG_GAITS - 1, 1.0f);
         }
-        ADVANCE(&c);
+        cpg_advance(&c, 0.02f);
     }
     for (int joint = 0; joint < CPG_JOINTS; joint++) {
-        printf("%.8g ", (double)RADIANS(c.position[joint]));
+        printf("%.8g ", (double)c.position[joint]);
     }
     return 0;
 }
@@ -69,7 +58,7 @@ def project(form, gaits):
     """Return what a small board runs: a step of 0.05, one part a tick."""
     made = plans('quadruped', 'delayed', gaits)
     steered = form == 'steered'
-    data = FixedData(made, 50.0) if form == 'fixed' else data_of(
+    data = data_of(
         made, 'network' if steered else form, 'float32', steering=steered,
         step=None if form == 'table' else 0.05)
     return data, project_of(data, 0.02)
@@ -114,8 +103,7 @@ def check(name, form, folder, found, positions, memory, unit):
 
 
 #: Of each form; steered is the network's, with steering.
-GAITS = {'network': ('trot',), 'steered': ('trot',), 'table': ('trot', 'walk'),
-         'fixed': ('trot', 'walk')}
+GAITS = {'network': ('trot',), 'steered': ('trot',), 'table': ('trot', 'walk')}
 
 
 @needs_gcc
@@ -135,10 +123,6 @@ def test_an_atmega_has_the_time_and_the_memory(tmp_path, chip, form):
     assert ram + found['stack'] < 2048
     if form == 'table':
         assert found['state'] < 1024 and found['tick'] < 64_000 and found['fading'] < 320_000
-    if form == 'fixed':
-        # Within 5 % of 20 ms; where gaits fade, too, but for the longer calls of the ATmega2560.
-        assert found['state'] + found['stack'] < 256 and found['tick'] < 5_000
-        assert found['fading'] < (16_000 if chip == 'atmega328p' else 17_600)
     check(chip, form, tmp_path, found, positions, (flash, ram), 'cycles')
 
 
