@@ -53,7 +53,6 @@ from cpg_ros.ros.joint_tracking import JointTracking
 from cpg_ros.ros.kernels import compile_kernels
 from cpg_ros.ros.node import native
 from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers, STEADY
-from cpg_ros.ros.node.logging import QUEUE
 from cpg_ros.ros.node.node_base import Lifecycle, run, StartedNode, StartError
 from cpg_ros.ros.node.polled import latched, OVERRIDABLE
 from cpg_ros.ros.node.ticker import RealTime, SPECS, Ticker
@@ -138,8 +137,7 @@ class Diagnostics:
             'symmetry gain [1/model time]': f'{plan.gain:.4g}',
             'rate wanted [Hz]': f'{self._ticker.rate:.6g}', 'ticks in the last second':
             new['ticks'], **counts,
-            'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
-            'log lines dropped': QUEUE.dropped}
+            'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}'}
         if self._cmd_vel:
             values['cmd_vel'] = self._cmd_vel.state
         values |= self._feedback.state(1e-9 * self._node.get_clock().now().nanoseconds)

@@ -41,7 +41,6 @@ from cpg_ros.ros.node.polled import best_effort, latched, OVERRIDABLE
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException
-from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -164,7 +163,10 @@ class Inversion(StartedNode):
             well, message = await work
         finally:
             self._busy = False
-        self.get_logger().log(message, LoggingSeverity.INFO if well else LoggingSeverity.WARN)
+        if well:
+            self.get_logger().info(message)
+        else:
+            self.get_logger().warning(message)
         return well, message
 
     def _work(self, live: LiveRecording, work: Future) -> None:

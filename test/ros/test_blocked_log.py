@@ -88,12 +88,6 @@ def console(request):
     os.close(console.node)
 
 
-def dropped(watcher):
-    found = [value.value for status in watcher.diagnostics[-1:] for value in status.values
-             if value.key == 'log lines dropped']
-    return int(found[0]) if found else 0
-
-
 def ended(process):
     """Return the exit code; none if it is still there after END."""
     try:
@@ -112,12 +106,10 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
     try:
         watcher.record(1.0)
         console.block()
-        for _ in range(3000):
+        # More lines than a pipe holds: 64 kB.
+        for _ in range(500):
             for gait in ('walk', 'trot'):
                 assert watcher.set(gait=gait)[0].successful
-            if dropped(watcher):
-                break
-        assert dropped(watcher) > 0
         times, _, _ = watcher.record(1.0)
         assert np.median(np.diff(times)) == pytest.approx(0.005, abs=1e-4)
         # The graph hears what the console does not.
@@ -164,8 +156,7 @@ def test_a_bridge_sits_down(console, number):
     health = []
     walk.watcher.node.create_subscription(
         DiagnosticArray, '/diagnostics', lambda message: health.extend(
-            value.key for status in message.status if 'unitree' in status.name
-            for value in status.values), 10)
+            status.name for status in message.status if 'unitree' in status.name), 10)
     try:
         for _ in range(10):
             until(lambda: walk.phase in ('standing', 'damping'), 'the stand')
@@ -176,7 +167,7 @@ def test_a_bridge_sits_down(console, number):
             until(lambda: walk.phase != 'damping' or not walk.robot.damped, 'the start')
             time.sleep(1.0)
         console.block()
-        until(lambda: 'log lines dropped' in health, 'the health')
+        until(lambda: health, 'the health')
         walk.bridge.signal(number)
         assert ended(walk.bridge) == 0
         assert [phase for _, phase in walk.phases][-2:] == ['sitting', 'damping']
@@ -194,8 +185,8 @@ def run(code, output, **options):
 
 STRAYS = """
 import ctypes, sys, threading, warnings
-from cpg_ros.ros.node.console import Console
-console = Console()
+from cpg_ros.ros.node.console import never_wait
+never_wait('strays', [])
 for k in range(3000):
     ctypes.CDLL(None).dprintf(2, b'%s\\n', b'from C' * 10)
     print('from Python' * 10)
@@ -207,7 +198,6 @@ for k in range(100):
     thread.start()
     thread.join()
 warnings.warn('a last word')
-console.drain(0.2)
 """
 
 
@@ -225,8 +215,10 @@ def test_nothing_that_a_process_writes_makes_it_wait(kind):
 @pytest.mark.parametrize('end', ['', 'raise SystemExit(0)', 'os._exit(0)', 'os.abort()',
                                  'os.kill(os.getpid(), 9)', 'raise ValueError'])
 def test_what_is_written_before_an_end_comes_out(end):
-    lines = [f'line {k} of {stream}' for k in range(200) for stream in ('stdout', 'stderr')]
-    code = ('import os, sys\nfrom cpg_ros.ros.node.console import Console\nConsole()\n'
+    streams = 'stdout', 'stderr'
+    lines = [f'line {k} of {stream}' for k in range(200) for stream in streams]
+    code = ('import os, sys\nfrom cpg_ros.ros.node.console import never_wait\n'
+            "never_wait('ending', [])\n"
             f'for line in {lines}:\n    print(line, file=getattr(sys, line.split()[-1]))\n{end}')
     read, write = os.pipe()
     process = run(code, write)
@@ -234,9 +226,10 @@ def test_what_is_written_before_an_end_comes_out(end):
     with open(read) as stream:
         text = stream.read().splitlines()
     process.wait(60.0)
-    # Both streams in their order, since both go to the same place.
-    assert text[:400] == lines
-    assert (text[-1:] == ['ValueError']) == (end == 'raise ValueError')
+    for name in streams:
+        assert ([line for line in text if line.endswith(name)]
+                == [line for line in lines if line.endswith(name)])
+    assert ('ValueError' in text) == (end == 'raise ValueError')
 
 
 LOG = """
@@ -244,14 +237,13 @@ import sys
 import rclpy
 from rclpy.logging import get_logger
 
-if sys.argv[1] == 'queued':
-    from cpg_ros.ros.node.logging import NO_FILE, QUEUE, QueuedLogger
-    QUEUE.start('name', sys.argv[2:])
-    rclpy.init(args=[*sys.argv[2:], '--ros-args', NO_FILE])
-    logger = QueuedLogger('some.name')
+if sys.argv[1] == 'copied':
+    from cpg_ros.ros.node.console import never_wait, TO_STREAM
+    never_wait('name', sys.argv[2:])
+    rclpy.init(args=[*sys.argv[2:], *TO_STREAM])
 else:
     rclpy.init(args=sys.argv[2:])
-    logger = get_logger('some.name')
+logger = get_logger('some.name')
 logger.debug('a {name} of\\ntwo lines')
 logger.info('a {name} of\\ntwo lines')
 logger.warning('a {name} of\\ntwo lines')
@@ -304,7 +296,7 @@ def test_lines_look_as_those_of_rclpy(words, form, terminal, tmp_path):
         return ''.join('0' if one.isdigit() else one for one in text)
 
     native = lines('native')
-    assert lines('queued') == native
+    assert lines('copied') == native
     assert native[1] and bool(native[0]) == (words != ['--disable-stdout-logs'])
 
 

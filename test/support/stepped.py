@@ -25,11 +25,11 @@ from unittest import mock
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.generator import Generator
-from cpg_ros.ros.node.logging import QUEUE, ROSOUT
 from graph import free_domain, OCCUPIED, PATIENCE, until, Watcher
 from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool
@@ -80,12 +80,11 @@ class SteppedGenerator:
         self._node.begin()
         self._serving.start()
         self._node.parameter_service.thread.start()
-        if not QUEUE._thread.is_alive():
-            QUEUE._thread.start()
         self.watcher = Watcher(self.domain, self._node.get_fully_qualified_name())
         self.lines: list[str] = []
         self.watcher.node.create_subscription(
-            Log, '/rosout', lambda message: self.lines.append(message.msg), ROSOUT)
+            Log, '/rosout', lambda message: self.lines.append(message.msg),
+            QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self.now, self.pace, self._end_time = 100.0, math.inf, math.inf
         self._clock = self.watcher.node.create_publisher(Clock, '/clock', 10)
         self._going, self._ended = threading.Event(), threading.Event()

@@ -40,14 +40,12 @@ from cpg_ros.ros.bridges.watchdog_link import (
 )
 from cpg_ros.ros.command_topics import Commands, KINDS, KpScaleSubscription
 from cpg_ros.ros.node.health import Health, HealthPublisher, NAMELESS, others_on, STEADY
-from cpg_ros.ros.node.logging import QUEUE
 from cpg_ros.ros.node.node_base import StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, Spec
 from cpg_ros.ros.node.polled import command_qos, latched, PolledSubscription
 from cpg_ros.ros.node.ticker import Ticker
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
-from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from std_msgs.msg import String
@@ -335,10 +333,14 @@ class BridgeNode(StartedNode):
 
     def _report(self, state: BridgeState, reason: str) -> None:
         """Log and publish a new state."""
-        severity = {BridgeState.DAMPING: LoggingSeverity.ERROR,
-                    BridgeState.SITTING: LoggingSeverity.WARN}
-        self.get_logger().log(f'{state.value}: {reason}',
-                              severity.get(state, LoggingSeverity.INFO))
+        logger, text = self.get_logger(), f'{state.value}: {reason}'
+        # rclpy lets a place in the code have one severity only.
+        if state is BridgeState.DAMPING:
+            logger.error(text)
+        elif state is BridgeState.SITTING:
+            logger.warning(text)
+        else:
+            logger.info(text)
         self._state_publisher.publish(String(data=state.value))
 
     def _halt(self, reason: str, now: float) -> None:
@@ -507,7 +509,7 @@ class BridgeNode(StartedNode):
             'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
             'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
             'largest tracking error [rad]': supervisor.tracking.worst,
-            'log lines dropped': QUEUE.dropped, **self.measured_values()}
+            **self.measured_values()}
 
     # -- beginning and end ----------------------------------------------------------------
 

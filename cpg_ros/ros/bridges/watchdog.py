@@ -39,7 +39,7 @@ from cpg_ros.ros.bridges.watchdog_link import (
     of_this_user,
     TickMonitor,
 )
-from cpg_ros.ros.node.logging import NO_FILE, QUEUE, QueuedLogger
+from cpg_ros.ros.node.console import never_wait, TO_STREAM
 from cpg_ros.ros.node.polled import command_qos
 import rclpy
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -140,13 +140,13 @@ def main(args: list[str]) -> int:
     name = interface.watchdog_name()
     # Ctrl-C in the bridge's terminal is the bridge's to handle.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    QUEUE.start(name, [])
-    rclpy.init(args=['--ros-args', NO_FILE], domain_id=domain,
+    never_wait(name, [])
+    rclpy.init(args=[*TO_STREAM], domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
                              start_parameter_services=False, use_global_arguments=False)
     publisher = node.create_publisher(interface.command_type(), topic, command_qos())
-    logger = QueuedLogger(node.get_logger().name)
+    logger = node.get_logger()
     if not spared():
         logger.info('this process may be ended when memory runs out: it lacks CAP_SYS_RESOURCE')
     try:

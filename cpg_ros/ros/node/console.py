@@ -12,36 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Standard output and error of a node, written by a separate process that may be blocked.
+"""Standard output and error of a node, copied by a separate process that may have to wait.
 
-A terminal paused by Ctrl-S, or a pipe that nobody reads, blocks its writers; a thread of C++ code
-that is blocked there with the interpreter's lock stops all others. So both streams become pipes
-that never block: what does not fit is lost, and counted where possible. Another process, which
-outlives the node even if it crashes, relays the contents of the pipes. As a program, this file is
-that process: python console.py DESCRIPTOR ... with the descriptors from which it reads.
+A terminal paused by Ctrl-S, a pipe that nobody reads and a slow disk make their writers wait;
+rclpy's logger waits with the interpreter's lock, and so do all threads. Therefore both streams
+become pipes that never make a writer wait: lines that do not fit are lost. Another process, which
+outlives the node even if it crashes, copies them to the original streams, and the log to its file,
+too. As a program, this file is that process: python console.py LOG_FILE PIPE.
 """
 
-import array
-from collections.abc import Sequence
+import atexit
 import contextlib
-import fcntl
 import io
-import mmap
 import os
+from pathlib import Path
+import re
 import select
 import signal
 import subprocess
 import sys
-import termios
-import threading
 import time
+from typing import TextIO
 
-OUT, ERROR = STREAMS = 1, 2
-#: WORDS: words of 8 bytes for each stream in shared memory: whether output is being relayed, and
-#: the number of lost lines.
-WORDS = 2
-#: SIGNALS: signals that end nodes, which the relay ignores: it ends after all writers.
+IN, OUT, ERROR = 0, 1, 2
+#: TO_STREAM: arguments by which rclpy's logger writes to its stream only: to a file it would wait.
+TO_STREAM = '--ros-args', '--disable-external-lib-logs', '--enable-stdout-logs'
+#: SIGNALS: signals that end nodes, which the copying process ignores: it ends after all writers.
 SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
+#: PATIENCE: longest time that the end of a node waits for its last lines to be copied, s.
+PATIENCE = 0.2
+COLOR = re.compile(rb'\033\[\d+m')
 
 
 class _Stream(io.FileIO):
@@ -52,7 +52,7 @@ class _Stream(io.FileIO):
         self._terminal = terminal
 
     def isatty(self) -> bool:
-        """Tell whether what is written ends on a terminal."""
+        """Return whether the original stream is a terminal."""
         return self._terminal
 
     def write(self, data: bytes) -> int:  # type: ignore[override]
@@ -62,125 +62,121 @@ class _Stream(io.FileIO):
         return len(data)
 
 
-class Console:
-    """Standard output and error of this process, made so that writing never blocks.
+def _streams() -> tuple[int, int]:
+    """Return the stream of rcutils' log, and the other one."""
+    return (OUT, ERROR) if os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1' else (ERROR, OUT)
 
-    Attributes:
-        colored: whether log lines have colors: they go to a terminal, or
-            RCUTILS_COLORIZED_OUTPUT is set to 1.
+
+def aside() -> TextIO:
+    """Return the stream that is not copied to the log file."""
+    return sys.stdout if _streams()[1] == OUT else sys.stderr
+
+
+def never_wait(name: str, arguments: list[str]) -> None:
+    """Make writing to standard output and error never wait, and start the process that copies.
+
+    Args:
+        name: prefix of the log file's name unless --log-file-name gives one.
+        arguments: of ROS.
+
+    Raises:
+        OSError: the system has no pipe or process left.
 
     """
-
-    def __init__(self) -> None:
-        """Start the relay.
-
-        Raises:
-            OSError: the system has no pipe or process left.
-
-        """
-        for descriptor in STREAMS:
-            try:
-                os.fstat(descriptor)
-            except OSError:
-                os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
-        for stream in (sys.stdout, sys.stderr):
-            if stream is not None:
-                stream.flush()
-        terminal = {descriptor: os.isatty(descriptor) for descriptor in STREAMS}
-        use = OUT if os.environ.get('RCUTILS_LOGGING_USE_STDOUT') == '1' else ERROR
-        # rcutils looks at the stream, which is a pipe from now on.
-        color = os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', str(int(terminal[use])))
-        self.colored, self._log = color == '1', use
-        self._lost = 0
-        shared = os.memfd_create('console')
-        os.ftruncate(shared, mmap.PAGESIZE)
-        self._shared = memoryview(mmap.mmap(shared, mmap.PAGESIZE)).cast('Q')
-        # Streams that are the same stay the same, so that their lines keep their order.
-        same = os.path.sameopenfile(*STREAMS)
-        pipes = [os.pipe() for _ in STREAMS[same:]]
-        reads = [read for read, _ in pipes]
-        # A session of its own: Ctrl-C, or the end of a terminal, is not for the relay.
-        self._relay = subprocess.Popen(
-            [sys.executable, '-IS', __file__, str(shared), *map(str, reads)],
-            stdin=subprocess.DEVNULL, pass_fds=[shared, *reads], start_new_session=True)
-        os.close(shared)
-        for read in reads:
-            os.close(read)
-        self._writes = [write for _, write in pipes]
-        for write, descriptor in zip(self._writes * (1 + same), STREAMS, strict=True):
-            os.set_blocking(write, False)
-            os.dup2(write, descriptor)
-        for name, descriptor in (('stdout', OUT), ('stderr', ERROR)):
-            stream = io.TextIOWrapper(
-                io.BufferedWriter(_Stream(descriptor, terminal[descriptor])), line_buffering=True,
-                errors='backslashreplace', write_through=descriptor == ERROR)
-            setattr(sys, name, stream)
-            setattr(sys, f'__{name}__', stream)
-
-    def write(self, line: str) -> None:
-        """Write a line of a log if there is room."""
-        data = line.encode(errors='backslashreplace')
+    for descriptor in OUT, ERROR:
         try:
-            if os.write(self._log, data) < len(data):
-                self._lost += 1
+            os.fstat(descriptor)
         except OSError:
-            self._lost += 1
+            os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+    log, other = _streams()
+    # rcutils looks at the stream, which is a pipe from now on.
+    os.environ.setdefault('RCUTILS_COLORIZED_OUTPUT', str(int(os.isatty(log))))
+    (read, write), (read_other, write_other) = os.pipe(), os.pipe()
+    # A session of its own: Ctrl-C, or the end of a terminal, is not for it.
+    copying = subprocess.Popen(
+        [sys.executable, '-IS', __file__, _log_file(name, arguments), str(read_other)],
+        stdin=read, stdout=log if _wanted('stdout', arguments) else subprocess.DEVNULL,
+        stderr=other, pass_fds=[read_other], start_new_session=True)
+    for descriptor, pipe in (log, write), (other, write_other):
+        stream = 'stdout' if descriptor == OUT else 'stderr'
+        if (original := getattr(sys, stream)) is not None:
+            original.flush()
+        terminal = os.isatty(descriptor)
+        os.set_blocking(pipe, False)
+        os.dup2(pipe, descriptor)
+        setattr(sys, stream, io.TextIOWrapper(
+            io.BufferedWriter(_Stream(descriptor, terminal)), line_buffering=True,
+            errors='backslashreplace'))
+    for descriptor in read, write, read_other, write_other:
+        os.close(descriptor)
+    atexit.register(_end, copying)
 
-    @property
-    def lost(self) -> int:
-        """Number of lost lines: of the log for lack of room, of both streams for other reasons."""
-        return self._lost + sum(self._shared[1:WORDS * len(self._writes):WORDS])
 
-    def drain(self, patience: float) -> None:
-        """Wait until everything has been relayed, but no longer than ``patience``, s."""
-        end = time.monotonic() + patience
-        while self._waiting() and self._relay.poll() is None and time.monotonic() < end:
-            time.sleep(0.002)
-
-    def _waiting(self) -> bool:
-        for k, write in enumerate(self._writes):
-            left = array.array('i', [0])
-            fcntl.ioctl(write, termios.FIONREAD, left)
-            if left[0] or self._shared[WORDS * k]:
-                return True
-        return False
+def _end(copying: subprocess.Popen) -> None:
+    """Close both streams, and wait until all is copied, but no longer than PATIENCE."""
+    closed = os.open(os.devnull, os.O_WRONLY)
+    for descriptor in OUT, ERROR:
+        os.dup2(closed, descriptor)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        copying.wait(PATIENCE)
 
 
-def _relay(read: int, write: int, shared: memoryview) -> None:
-    """Relay a stream until nobody can write to it any more."""
-    poll = select.poll()
-    poll.register(read, select.POLLIN)
-    while True:
-        poll.poll()
-        shared[0] = 1
-        data = os.read(read, 1 << 16)
-        if not data:
+def _wanted(kind: str, arguments: list[str]) -> bool:
+    """Return whether the arguments of ROS enable a kind of logs: the last switch counts."""
+    switches = [word for word in arguments if word.endswith(f'able-{kind}-logs')]
+    return switches[-1:] != [f'--disable-{kind}-logs']
+
+
+def _log_file(name: str, arguments: list[str]) -> str:
+    """Return the path of the log file."""
+    # The process that copies has no rclpy.
+    from rclpy.logging import get_logging_directory
+    if not _wanted('external-lib', arguments):
+        return os.devnull
+    if '--log-file-name' in arguments[:-1]:
+        name = arguments[arguments.index('--log-file-name') + 1]
+    milliseconds = time.time_ns() // 10 ** 6
+    return str(get_logging_directory() / f'{name}_{os.getpid()}_{milliseconds}.log')
+
+
+def _write(descriptor: int, data: bytes) -> None:
+    """Write all, and wait where need be; drop what a full disk or a closed terminal refuses."""
+    while data:
+        try:
+            data = data[os.write(descriptor, data):]
+        except BlockingIOError:
+            # Another process has made it so, for all who share the stream.
+            select.select([], [descriptor], [])
+        except OSError:
             return
-        while data:
-            try:
-                data = data[os.write(write, data):]
-            except BlockingIOError:
-                # Another process has made it so, for all who share the stream.
-                select.select([], [write], [])
-            except OSError:
-                # The disk is full, or the terminal is gone.
-                shared[1] += max(1, data.count(b'\n'))
-                data = b''
-        shared[0] = 0
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Relay streams; arguments are the descriptors of the shared memory and of the pipes."""
+def main(path: str, other: int) -> None:
+    """Copy the log from standard input to standard output and, without colors, to a file.
+
+    Args:
+        path: of the file.
+        other: descriptor of a pipe that is copied to standard error.
+
+    """
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    memory, *reads = map(int, arguments)
-    shared = memoryview(mmap.mmap(memory, mmap.PAGESIZE)).cast('Q')
-    for k, read in enumerate(reads):
-        # The last stream is standard error, and the only one if both are the same.
-        write = STREAMS[k + len(STREAMS) - len(reads)]
-        threading.Thread(target=_relay, args=(read, write, shared[WORDS * k:WORDS * (k + 1)])
-                         ).start()
+    try:
+        Path(path).parent.mkdir(parents=True, exist_ok=True)
+        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    except OSError as error:
+        _write(OUT, f'no log file {path}: {error.strerror}\n'.encode())
+        file = os.open(os.devnull, os.O_WRONLY)
+    targets = {IN: OUT, other: ERROR}
+    while targets:
+        for pipe in select.select(list(targets), [], [])[0]:
+            data = os.read(pipe, 1 << 16)
+            if pipe == IN:
+                _write(file, COLOR.sub(b'', data))
+            _write(targets[pipe], data)
+            if not data:
+                del targets[pipe]
 
 
 if __name__ == '__main__':
-    main(sys.argv[1:])
+    main(sys.argv[1], int(sys.argv[2]))

@@ -28,7 +28,7 @@ from typing import Any
 
 from cpg_ros.common.command_line import say
 from cpg_ros.common.errors import CpgError
-from cpg_ros.ros.node.logging import NO_FILE, QUEUE, QueuedLogger
+from cpg_ros.ros.node.console import never_wait, TO_STREAM
 from cpg_ros.ros.node.parameters import as_doubles, as_list, kind_of, Spec, StrictParameterService
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
@@ -42,6 +42,7 @@ from rclpy.exceptions import (
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
+from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -68,7 +69,6 @@ def exit_code(code: int, *threads: threading.Thread | None) -> int:
     for thread in filter(None, threads):
         thread.join(PATIENCE)
         if thread.is_alive():
-            QUEUE.drain()
             os._exit(code)
     return code
 
@@ -194,8 +194,7 @@ class StartedNode(Node):
     SETS_OTHERS: frozenset[str] = frozenset()
 
     def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, start_parameter_services=False, enable_rosout=False, **options)
-        self._logger = QueuedLogger.of(self)
+        super().__init__(name, start_parameter_services=False, **options)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self._lists: dict[str, list] = {}
@@ -386,13 +385,13 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     leave_shared_memory()
     arguments = sys.argv if args is None else args
     try:
-        QUEUE.start(name, arguments)
+        never_wait(name, arguments)
     except OSError as error:
         print(f'{name}: no process that writes the log can be started: {error.strerror}',
               file=sys.stderr)
         return 1
     try:
-        rclpy.init(args=[*arguments, '--ros-args', NO_FILE],
+        rclpy.init(args=[*arguments, *TO_STREAM],
                    signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
@@ -400,7 +399,7 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     try:
         node = make()
     except (CpgError, NameValidationException, ParameterException) as error:
-        QueuedLogger(name).fatal(' '.join(str(error).split()))
+        get_logger(name).fatal(' '.join(str(error).split()))
         rclpy.shutdown()
         return 1
     # An Event may not be set here: a signal that comes while it is being waited for, or while

@@ -16,7 +16,6 @@
 
 import asyncio
 from collections.abc import Callable, Iterable
-import functools
 import os
 from pathlib import Path
 import socket
@@ -40,6 +39,7 @@ from cpg_ros.ros.node.client import (
     PATIENCE,
     ServiceClients,
 )
+from cpg_ros.ros.node.console import aside
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
@@ -363,7 +363,7 @@ class Panel(StartedNode):
         """
         super().__init__(NAME)
         self._declare(SPECS)
-        self._token = token_for(self._value('host'), self._value('token'), sys.stderr.isatty())
+        self._token = token_for(self._value('host'), self._value('token'), aside().isatty())
         if urdf := self._value('urdf'):
             try:
                 load_urdf(Path(urdf).expanduser())
@@ -420,10 +420,9 @@ class Panel(StartedNode):
         shown = f'[{shown}]' if ':' in shown else shown
         self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/'
                                + ' with ?token=WORD' * bool(self._token))
-        if self._token and sys.stderr.isatty():
-            # Print, as the log is kept in files; in a thread, as a terminal may be stopped.
-            asyncio.get_running_loop().run_in_executor(None, functools.partial(
-                print, f'http://{shown}:{port}/?token={self._token}', file=sys.stderr))
+        if self._token and aside().isatty():
+            # The log is kept in files.
+            print(f'http://{shown}:{port}/?token={self._token}', file=aside())
         if not is_loopback(host):
             self.get_logger().warning('anyone on this network who has the token can '
                                       'open the page, and nothing is encrypted')
