@@ -14,7 +14,6 @@
 
 """Monitoring whether the measured joints follow the generator's commands."""
 
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -25,8 +24,8 @@ from cpg_ros.ros.node.health import STEADY
 import numpy as np
 from rclpy.node import Node
 
-#: PERIOD: period in which commanded and measured angles are compared, s; FRESH: largest age of the
-#: measured angles, s.
+#: PERIOD: interval at which commanded and measured angles are compared, s; FRESH: largest age of
+#: the measured angles, s.
 PERIOD, FRESH = 0.1, 0.2
 #: AGAIN: time without a fault, s, after which the joints count as following again.
 AGAIN = 3.0
@@ -66,9 +65,13 @@ class JointTracking:
         self._monitor = TrackingMonitor(limits)
         self._measured, self._commanded, self._news = measured, commanded, news
         self._well, self.text = 0.0, ''
+        self._clock, self._then = node.get_clock(), 0
         self._timer = node.create_timer(PERIOD, self._compare, clock=STEADY)
 
     def _compare(self) -> None:
+        # Slow simulated time counts as it passes: a moment of a stride is no mean.
+        now = self._clock.now().nanoseconds
+        dt, self._then = min(max(1e-9 * (now - self._then), 0.0), PERIOD), now
         commanded = self._commanded()
         if commanded is None:
             self._monitor.reset()
@@ -77,8 +80,8 @@ class JointTracking:
             angles = self._measured.receive(FRESH)
             # A joint that is not measured says nothing.
             reason = self._monitor.update(
-                commanded, np.where(np.isnan(angles), commanded, angles), PERIOD)
-        self._well = 0.0 if reason else self._well + PERIOD
+                commanded, np.where(np.isnan(angles), commanded, angles), dt)
+        self._well = 0.0 if reason else self._well + dt
         if reason and not self.text:
             self.text = reason
             self._news(reason)

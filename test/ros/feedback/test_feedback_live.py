@@ -14,6 +14,7 @@
 
 """Feedback over the graph: the shipped Go2 walks closed, and an input that fails is named."""
 
+from collections import deque
 import importlib.util
 import math
 
@@ -24,6 +25,7 @@ from nav_msgs.msg import Odometry
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
 
@@ -32,17 +34,30 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 
 #: Of the shipped trot, strides a second.
 STRIDES = 2.005
+#: Of the simulation and the generator, ns.
+PERIOD = 4_000_000
+
+
+def nanoseconds(stamp):
+    return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
 class Between(Watcher):
-    """Hands the IMU on, as it is or not, and sees where the body is."""
+    """Hands the IMU on, as it is or not, then the time, and sees where the body is.
+
+    The generator's time waits for its IMU: however late this process is, the robot only gets slow.
+    """
 
     def __init__(self, domain):
         super().__init__(domain)
         self.how, self.frozen, self.rows, self.time = '', None, [], 0.0
         best = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
         self.out = self.node.create_publisher(Imu, 'relay/imu', 5)
+        self.clock = self.node.create_publisher(Clock, 'relay/clock', 5)
+        # Times in ns: of the newest IMU, and those that wait for theirs.
+        self.measured, self.times = 0, deque()
         self.node.create_subscription(Imu, 'imu', self._hand_on, best, raw=True)
+        self.node.create_subscription(Clock, '/clock', self._tell, 10)
         self.node.create_subscription(Odometry, 'odom', self._odom, best)
         self.kp_scales = []
         # Reliable, as the last one, 1, is not repeated.
@@ -51,6 +66,7 @@ class Between(Watcher):
         self.pusher = self.node.create_publisher(Wrench, 'robot_sim/push', 10)
 
     def _hand_on(self, data):
+        stamp = deserialize_message(data, Imu).header.stamp
         if self.how == 'frozen':
             # A driver that stamps its last measurement anew.
             self.frozen = self.frozen or data
@@ -61,6 +77,18 @@ class Between(Watcher):
             data = message
         if self.how != 'dead':
             self.out.publish(data)
+        self.measured = nanoseconds(stamp)
+        self._go_on()
+
+    def _tell(self, message):
+        self.times.append(message)
+        self._go_on()
+
+    def _go_on(self):
+        """Tell the times before which nothing is measured any more; the first ones at once."""
+        while self.times and (not self.measured or nanoseconds(self.times[0].clock)
+                              <= self.measured + PERIOD):
+            self.clock.publish(self.times.popleft())
 
     def _odom(self, message):
         stamp, pose = message.header.stamp, message.pose.pose
@@ -86,9 +114,9 @@ def between():
                    executable=EXECUTABLE.with_name('robot_sim'))
     found = Between(body.domain)
     # On by default, as the robot is calibrated and the topic of its joints is its own.
-    generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=250.0', '-p',
-                        "combined_topic:=''", '-p', 'robot:=unitree_go2', '-p',
-                        'feedback.imu_topic:=relay/imu', '-p', 'feedback.stiffen_from:=0.4',
+    generator = Process('-r', '/clock:=relay/clock', '-p', 'use_sim_time:=true', '-p',
+                        'rate:=250.0', '-p', "combined_topic:=''", '-p', 'robot:=unitree_go2',
+                        '-p', 'feedback.imu_topic:=relay/imu', '-p', 'feedback.stiffen_from:=0.4',
                         domain=body.domain)
     yield body, found, generator
     for one in (generator, found, body):

@@ -14,6 +14,8 @@
 
 """A joint that does not follow is reported, and feedback does not correct by it."""
 
+import time
+
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import until
 import pytest
@@ -39,8 +41,10 @@ def followed(stepped):
     def follow(command):
         angles = {**dict(zip(names, command.data, strict=True)), **jammed}
         publisher.publish(JointState(name=list(angles), position=list(angles.values())))
+        newest[:] = command.data
+    newest = []
     watcher.node.create_subscription(Float64MultiArray, COMMANDS, follow, 10)
-    return generator, watcher, jammed
+    return generator, watcher, jammed, lambda: follow(Float64MultiArray(data=newest))
 
 
 def state(watcher):
@@ -48,7 +52,7 @@ def state(watcher):
 
 
 def test_a_joint_that_jams_is_an_error_and_ends_the_feedback(followed):
-    generator, watcher, jammed = followed
+    generator, watcher, jammed, _ = followed
     until(lambda: len(watcher.diagnostics) >= 4, 'diagnostics')
     assert all(one.level != DiagnosticStatus.ERROR for one in watcher.diagnostics)
     # It is enabled, and waits for the other sensors.
@@ -68,3 +72,17 @@ def test_a_joint_that_jams_is_an_error_and_ends_the_feedback(followed):
     generator.wait_for('all joints follow again')
     until(lambda: watcher.diagnostics[-1].level != DiagnosticStatus.ERROR, 'the way back')
     assert state(watcher).startswith('waiting: ')
+
+
+def test_the_mean_is_over_simulated_time(followed):
+    generator, watcher, jammed, measure = followed
+    until(lambda: len(watcher.diagnostics) >= 2, 'diagnostics')
+    jammed[JOINT] = JAMMED
+    generator.run(0.1)
+    # A simulation may be slower than the wall: this is a moment of a stride.
+    for _ in range(40):
+        measure()
+        time.sleep(0.05)
+    assert 'does not follow' not in generator.log
+    generator.run()
+    generator.wait_for(f'{JOINT} does not follow')
