@@ -79,7 +79,7 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     senses, sensors = warm_up_senses(legs, joints)
     some, one = np.zeros((1, joints)), np.zeros(1)
     planned = PlannedMotion(some, one, np.zeros((1, 2), dtype=np.int64), one.copy(),
-                            np.zeros((1, 2)), one.copy(), one.copy())
+                            np.zeros((1, 2)), one.copy(), one.copy(), np.zeros((1, 3)))
     instant = Instant.empty(legs, one)
     arguments = (geometry.arrays, feedback.tables, feedback.gains, feedback.memory, senses,
                  sensors, planned, rates_memory(legs), instant, np.zeros(STATE), some.copy())

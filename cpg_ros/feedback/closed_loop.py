@@ -180,15 +180,15 @@ def take_in(senses, sensors, legs, now, moving):
  STATE) = range(11)
 #: Indices of an instant. DT: length of the tick, s; NOW: time, s; LEVEL: of the ramp, 0 to 1;
 #: PHASE: cycles; MIX: share of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
-#: whether the gait changes.
-DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES = range(7)
+#: whether the gait changes; ROLL, and pitch and yaw behind it: of the body against its feet, rad.
+DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES, ROLL = range(8)
 
 
 class Instant(NamedTuple):
     """Present state of the pattern, commands, and the outputs for the pattern.
 
     Attributes:
-        numbers: see DT to CHANGES.
+        numbers: see DT to ROLL.
         gaits: keys of the gait that is left and of the gait that is entered, shape (2,).
         command: speeds forward and to the left, m/s, and yaw rate, rad/s.
         scale: factor of the stride frequency, shape (1,); filled.
@@ -205,7 +205,8 @@ class Instant(NamedTuple):
     @classmethod
     def empty(cls, legs: int, scale: np.ndarray) -> 'Instant':
         """Return zeros for a number of legs, with an array for ``scale``."""
-        return cls(np.zeros(7), np.zeros(2, dtype=np.int64), np.zeros(3), scale, np.zeros(legs))
+        return cls(np.zeros(ROLL + 3), np.zeros(2, dtype=np.int64), np.zeros(3), scale,
+                   np.zeros(legs))
 
 
 @jit
@@ -279,7 +280,8 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
     planned.gaits[0, 0], planned.gaits[0, 1], planned.mix[0] = old, new, numbers[MIX]
     planned.phase[0], turn, heading = numbers[PHASE], instant.command[2], planned.heading
     planned.velocity[0, 0], planned.velocity[0, 1] = instant.command[0], instant.command[1]
-    planned.turn[0], yaw = turn, sensors.rpy[0, 2]
+    planned.lean[0] = numbers[ROLL:]
+    planned.turn[0], yaw = turn, sensors.rpy[0, 2] - planned.lean[0, 2]
     if state[FRACTION] > 0.0 and level > 0.0:
         # Without a wanted turn the heading is kept; with one it advances.
         ahead = (heading[0] + turn * dt - yaw + math.pi) % (2.0 * math.pi) - math.pi

@@ -59,6 +59,7 @@ class PlannedMotion(NamedTuple):
         velocity: wanted forward and to the left, m/s, shape (runs, 2).
         heading: wanted, rad, shape (runs,).
         turn: wanted, rad/s, shape (runs,).
+        lean: wanted roll, pitch and yaw of the body against its feet, rad, shape (runs, 3).
 
     """
 
@@ -69,6 +70,7 @@ class PlannedMotion(NamedTuple):
     velocity: np.ndarray
     heading: np.ndarray
     turn: np.ndarray
+    lean: np.ndarray
 
 
 class Deviation(NamedTuple):
@@ -105,11 +107,11 @@ def _deviation(tables, memory, sensors, planned, run, level):
         expect(tables.speeds[new], tables.expected[new], phase, forward, mix, expected)
     for k in range(SIGNALS):
         expected[k] *= level
-    left = memory.wanted_velocity[run, 0, 1]
+    left, lean = memory.wanted_velocity[run, 0, 1], planned.lean[run]
     return Deviation(memory.velocity[run, 0] - expected[0],
                      memory.velocity[run, 1] - expected[1] - left,
                      turning[0] - expected[2], turning[1] - expected[3],
-                     rpy[0] - expected[4], rpy[1] - expected[5])
+                     rpy[0] - expected[4] - lean[0], rpy[1] - expected[5] - lean[1])
 
 
 @jit
@@ -273,4 +275,4 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory.frequency_scale[run] = max(scale, SLOWEST)
 
         _change_strides(tables, gains, memory, run, slot, -off.vx,
-                        (planned.heading[run], sensors.rpy[run, 2]), step)
+                        (planned.heading[run], sensors.rpy[run, 2] - planned.lean[run, 2]), step)

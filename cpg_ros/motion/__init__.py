@@ -17,5 +17,5 @@
 Imports ``dynamics``, ``networks`` and ``common``; knows nothing of ROS.
 """
 
-__all__ = ['body_file', 'core', 'description', 'export', 'meshes', 'pattern', 'phase_readout',
-           'plan', 'readout', 'robot', 'robot_file', 'rotations', 'strides']
+__all__ = ['body_file', 'body_pose', 'core', 'description', 'export', 'meshes', 'pattern',
+           'phase_readout', 'plan', 'readout', 'robot', 'robot_file', 'rotations', 'strides']

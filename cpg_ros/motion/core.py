@@ -59,12 +59,14 @@ Track = _struct(
     (_REAL, 'transition progress phase phase_carry settling calm still astray distance sum'),
     (_POINTER, 'angle rise reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
 Drive = _struct('Drive', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
+Body = _struct('Body', (Drive, 'pose'), (_REAL, 'pace'), (_POINTER, 'rate joints limbs'),
+               (_WHOLE, 'legs moving'))
 _RampPart = _struct('RampPart', (_REAL, 'start rate end time'))
 Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart, 'part'), (_REAL, 'end time'),
                (ctypes.c_uint8, 'parts'))
 Core = _struct(
     'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
-    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive offset'),
+    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive body offset'),
     (_POINTER * 3, 'limits'),
     (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
                'behind'), (Ramp, 'ramp lead'),
@@ -76,6 +78,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
     'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_lead_in': (_POINTER, _REAL),
     'cpg_take': (_POINTER,), 'cpg_report': (_POINTER,) * 3,
+    'cpg_feet': (_POINTER,) * 3, 'cpg_pose': (_POINTER, _POINTER, _POINTER, ctypes.c_int),
     'cpg_track_look': (_POINTER, _REAL),
     'cpg_track_advance': (_POINTER, _REAL), 'cpg_track_reseed': (_POINTER, _REAL),
     'cpg_steer': (_POINTER, _REAL),
@@ -85,8 +88,8 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 def _sources() -> dict[str, str]:
     """Return the files of the core, name -> text."""
     defines = f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_LEAD {TABLE}\n#define HOLD {HOLD!r}'
-    names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'host_track',
-             'pattern', 'host')
+    names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'body',
+             'host_track', 'pattern', 'host')
     # Both readouts stand in it.
     own = {'waveform': '#define look look_waveform\n', 'host_phases': '#undef look\n',
            'phase': '#define look look_phases\n'}
@@ -109,7 +112,7 @@ def core() -> ctypes.CDLL:
         function = getattr(library, name)
         function.argtypes = types
         if name not in ('cpg_track_advance', 'cpg_confine'):
-            function.restype = None
+            function.restype = _REAL if name == 'cpg_pose' else None
     return library
 
 

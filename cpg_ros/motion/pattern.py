@@ -26,7 +26,9 @@ import ctypes
 import math
 from typing import Any, NamedTuple
 
+from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.stepper import Stepper
+from cpg_ros.motion.body_pose import BodyPose
 from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
@@ -185,6 +187,7 @@ class Pattern:
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
         correct: takes and returns angles before limits hold them; None for the gait as it is.
+        body: the pose of the body, None for a robot of unknown geometry.
         frequency_scale: factor of the pattern's clock.
         substep: longest part of a tick while gaits fade or the ramp moves, s.
 
@@ -227,6 +230,11 @@ class Pattern:
             self._struct.limits[k] = row.ctypes.data
         self._run([GaitRunner(plan, 0.0, drive)])
         self.drive = drive
+        try:
+            self.body: BodyPose | None = BodyPose(robot)
+            self._struct.body = self.body.address
+        except InputError:
+            self.body = None
         self.restart(ramp, enabled)
 
     def _run(self, tracks: list[GaitRunner]) -> None:
@@ -417,7 +425,8 @@ class Pattern:
 
         Args:
             numbers: level, phase of the first leg, share of the gait that is entered, strides per
-                second (Hz), whether the gait changes, shape (5,).
+                second (Hz), whether the gait changes, roll, pitch and yaw of the body (rad),
+                shape (8,).
             gaits: addresses of GaitPlan.core of the gait left and of the entered one, (2,).
 
         """

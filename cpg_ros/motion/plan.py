@@ -371,6 +371,12 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
         raise PlanError(str(error)) from error
 
 
+def beyond_limits(joint: Joint, low: float, high: float) -> str:
+    """Return how a joint leaves its limits that moves from low to high, rad, '' if it does not."""
+    return next((message for excess, _, message in _beyond(
+        joint, low - joint.offset, high - joint.offset, 0.0) if excess > 1e-9), '')
+
+
 def _beyond(joint: Joint, low: float, high: float, fastest: float
             ) -> Iterator[tuple[float, str, str]]:
     """Yield for each limit how far a joint is beyond it, its name and the figure.

@@ -19,4 +19,4 @@ Imports every room; nothing imports it.
 
 __all__ = ['bag_recorder', 'bridges', 'cli', 'command_topics', 'feedback', 'generator',
            'generator_io', 'generator_parameters', 'inversion_node', 'joint_tracking', 'kernels',
-           'launch_arguments', 'node', 'panel', 'robot_sim']
+           'launch_arguments', 'node', 'panel', 'posture', 'robot_sim']

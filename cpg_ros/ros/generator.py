@@ -56,6 +56,7 @@ from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers, ST
 from cpg_ros.ros.node.node_base import Lifecycle, run, StartedNode, StartError
 from cpg_ros.ros.node.polled import latched, OVERRIDABLE
 from cpg_ros.ros.node.ticker import RealTime, SPECS, Ticker
+from cpg_ros.ros.posture import Posture
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
 from rcl_interfaces.msg import ParameterType, SetParametersResult
@@ -165,7 +166,7 @@ class Diagnostics:
         if self._ticker.waiting:
             return f'waiting for {self._awaited()}'
         if pattern.standing:
-            return 'standing'
+            return 'sitting' if pattern.body is not None and pattern.body.seated else 'standing'
         if pattern.level < 1.0:
             return 'ramping up' if pattern.enabled else 'ramping down'
         return 'changing gait' if pattern.in_transition else 'running'
@@ -260,6 +261,8 @@ class Generator(StartedNode):
         self._gait = self.create_publisher(String, '~/gait', latched(),
                                            qos_overriding_options=OVERRIDABLE)
         self.create_service(SetBool, '~/enable', self._enable)
+        self._posture = Posture(self, self.pattern, lambda: self._planner.plan(self._values()),
+                                self._walk, self._cannot_sit)
         real_time = RealTime.of(*map(self._value, SPECS))
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
                              self.pattern.resume, partial(real_time.request, self.get_logger()),
@@ -291,6 +294,7 @@ class Generator(StartedNode):
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
         """Return whether a batch can run as a whole; change nothing."""
+        plan = self.pattern.plan
         if any(p.name in self._planner.names for p in parameters):
             try:
                 plan = self._planner.plan(self._values(parameters))
@@ -298,7 +302,7 @@ class Generator(StartedNode):
                 return SetParametersResult(successful=False, reason=str(error))
             if reason := self._feedback.refuses(plan):
                 return SetParametersResult(successful=False, reason=reason)
-        reason = self._feedback.judge(parameters)
+        reason = self._posture.judge(parameters, plan) or self._feedback.judge(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
@@ -314,6 +318,7 @@ class Generator(StartedNode):
             if self._cmd_vel:
                 self._cmd_vel.set_plan(plan)
             self._announce()
+        self._posture.apply(parameters)
         if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
         if any(p.name in (ENABLED, f'{PREFIX}virtual_stiffness') for p in parameters):
@@ -412,9 +417,13 @@ class Generator(StartedNode):
         return '~/enable' if self._lifecycle is None else 'configure'
 
     def _walk(self, walking: bool) -> str:
-        """Ramp into the gait, or down to the stand; return ''."""
+        """Ramp into the gait, standing up first, or down to the stand; return ''."""
         if walking:
             self.ticker.stopping = False
+        self._posture.walks = False
+        if walking and self._posture.seated:
+            self._posture.rise(True)
+            return ''
         if self._cmd_vel:
             self._cmd_vel.enable(walking)
         else:
@@ -422,6 +431,13 @@ class Generator(StartedNode):
         if not walking:
             self.ticker.stop_moving()
         return ''
+
+    def _cannot_sit(self) -> str:
+        """Return why the robot can neither sit nor stand up now, or ''."""
+        if self.ticker.waiting or self.ticker.paused:
+            return 'nothing is published yet'
+        active = self._lifecycle is not None and self._lifecycle.active
+        return 'this node is managed: deactivate it first' if active else ''
 
     def _fall_silent(self) -> str:
         """Stop publishing; return why not, or ''."""
@@ -549,21 +565,25 @@ class Generator(StartedNode):
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.
 
-        A biped that balances goes into a crouch instead, within LAST_CROUCH; a second signal that
-        comes later than LAST_DEADLINE ends that at once.
+        A biped that balances goes into a crouch instead, and another robot sits down if it is to,
+        within LAST_CROUCH; a second signal that comes later than LAST_DEADLINE ends that at once.
         """
         began = time.monotonic()
         crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()
-        deadline = began + (LAST_CROUCH if crouches else LAST_DEADLINE)
-        if self.failure is None and self.ticker.ticks and not self.pattern.standing:
-            self.get_logger().info('coming to a stand and crouching before the end' if crouches
-                                   else f'ramping down over {LAST_RAMP:g} s before the end')
+        sits = self._value('end') == 'sit'
+        deadline = began + (LAST_CROUCH if crouches or sits else LAST_DEADLINE)
+        if self.failure is None and self.ticker.ticks and (sits or not self.pattern.standing):
+            self.get_logger().info(
+                'coming to a stand and crouching before the end' if crouches else
+                f'ramping down over {LAST_RAMP:g} s{", sitting down" if sits else ""} before the '
+                'end')
             if self._cmd_vel:
                 self._cmd_vel.end()
             self.pattern.enable(False, LAST_RAMP)
             self.ticker.stop_moving()
             early = 0
-            while not self.pattern.standing and time.monotonic() < deadline:
+            while time.monotonic() < deadline and not (
+                    self.pattern.standing and (not sits or self._posture.end())):
                 time.sleep(0.005)
                 # Launched from a terminal, a process gets the same Ctrl-C twice.
                 if time.monotonic() < began + LAST_DEADLINE:

@@ -31,6 +31,7 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
+from cpg_ros.ros import posture
 from cpg_ros.ros.node import ticker
 from cpg_ros.ros.node.parameters import as_doubles, one_of, PRESETS, Spec
 from rclpy.parameter import Parameter
@@ -92,7 +93,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                                 'geometry_msgs/Twist', read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'the robot stops if no cmd_vel arrives for this time [s]',
                                 0.05, 60.0),
-        **ticker.SPECS}
+        **posture.SPECS, **ticker.SPECS}
 
 
 def network_for(network: Any, robot: Any) -> Any:

@@ -74,10 +74,13 @@ class Patterns:
         self.planned = PlannedMotion(
             np.zeros((runs, len(first.robot.joints))), np.zeros(runs),
             np.zeros((runs, 2), dtype=np.int64), np.zeros(runs),
-            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs))
+            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs),
+            np.zeros((runs, 3)))
         self._position = self.planned.angles.copy()
         for run, (pattern, one) in enumerate(zip(self._patterns, scenarios, strict=True)):
             pattern.begin_at(one.phase)
+            if pattern.body is not None and any(one.pose):
+                pattern.body.go_to(one.pose, RAMP)
             if trimmed and pattern.drive is not None:
                 pattern.drive.trim = feedback.memory.stride[run]
             self._steer(run, first)
@@ -118,6 +121,8 @@ class Patterns:
                 pattern.frequency_scale = feedback.memory.frequency_scale[run]
             planned.angles[run] = pattern.plan_tick(self._dt)
             planned.phase[run] = pattern.phases[0]
+            if pattern.body is not None:
+                planned.lean[run] = pattern.body.now[1:]
             old, new, planned.mix[run] = pattern.fading
             planned.gaits[run] = feedback.slot(old), feedback.slot(new)
 

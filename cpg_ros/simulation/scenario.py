@@ -40,6 +40,7 @@ class Scenario:
         commands: later wishes, each (s, m/s forward, m/s to the left, rad/s of turning).
         switches: later gaits, each (s, name).
         payload: on the base, where its own mass is, kg; less than 0 for a lighter base.
+        pose: of the body above its feet: height, m, roll, pitch and yaw, rad.
 
     """
 
@@ -52,6 +53,7 @@ class Scenario:
     commands: tuple[tuple[float, float, float, float], ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
     payload: float = 0.0
+    pose: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def forces(self, steps: int, timestep: float) -> np.ndarray:
         """Return the forces of the pushes in each step of some s, N, shape (steps, 2)."""

@@ -212,7 +212,7 @@ def close(pattern, feedback, measure, velocity, heading):
         old, new, mix[0] = pattern.fading
         gaits[0] = feedback.slot(old), feedback.slot(new)
         planned = PlannedMotion(angles[None], pattern.phases[:1], gaits, mix, velocity, heading,
-                                np.zeros(1))
+                                np.zeros(1), np.zeros((1, 3)))
         corrected = feedback.advance(measure(), planned, DT, 1.0, pattern.level)
         pattern.frequency_scale = float(memory.frequency_scale[0])
         stride, pace = new.steer(float(velocity[0, 0]), 0.0)
@@ -232,7 +232,7 @@ def test_a_body_that_rolls_to_the_right_steps_to_the_right(loop):
     rolling.angular_velocity[0, 0] = 1.0
     angles, still, phase = GO2.column('offset')[None], np.zeros(1), np.zeros(1)
     planned = PlannedMotion(angles, phase, np.zeros((1, 2), dtype=np.int64), still,
-                            np.zeros((1, 2)), still, still)
+                            np.zeros((1, 2)), still, still, np.zeros((1, 3)))
     moved = []
     for phase[0] in np.arange(0.0, 1.0, 0.01):
         feedback.advance(rolling, planned, DT, 1.0, 1.0)

@@ -42,7 +42,8 @@ def corrected(gains):
         # Every foot on the ground in its swing as well, at times.
         sensors.foot_forces[0] = 0.0 if k % 3 == 0 else 40.0
         planned = PlannedMotion(stand[None], phase, np.full((1, 2), slot), np.zeros(1),
-                                np.array([[0.4, 0.1]]), np.zeros(1), np.full(1, 0.5))
+                                np.array([[0.4, 0.1]]), np.zeros(1), np.full(1, 0.5),
+                                np.zeros((1, 3)))
         found[k] = feedback.advance(sensors, planned, DT)[0]
     assert np.isfinite(feedback.memory.frequency_scale).all()
     assert np.isfinite(feedback.memory.stride).all()

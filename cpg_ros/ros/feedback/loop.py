@@ -113,7 +113,8 @@ class FeedbackLoop(SensorLoop):
         self._instant = Instant.empty(legs, scale)
         self._planned = PlannedMotion(self._wanted[None], np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
-                                      np.zeros((1, 2)), np.zeros(1), np.zeros(1))
+                                      np.zeros((1, 2)), np.zeros(1), np.zeros(1),
+                                      np.zeros((1, 3)))
         self._legs, self._rates = geometry.arrays, rates_memory(legs)
         self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
         self.odometry: Odometry | None = None

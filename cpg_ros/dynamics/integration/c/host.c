@@ -115,19 +115,23 @@ void cpg_plan(cpg *c, cpg_real dt)
     if (c->stall > 0.0) {
         clock = slowed_in(c, dt, &c->fraction);
     }
+    move_body(c, clock);
     clock *= c->frequency_scale;
     c->fraction *= c->frequency_scale;
     if (c->tracks == 1 && c->ramp.parts == 0 && c->lead.parts == 0 && !(c->absorbed < ABSORB)) {
         if (cruise(c, clock, c->wanted, c->rate)) {
+            carry(c, c->rate);
             return;
         }
         recover(c, c->track[0]);
         part_of_tick(c, 0.0, wanted, rate);
+        carry(c, rate);
         absorb(c, 0.0, wanted, rate);
     }
     const cpg_real parts = most(1.0, ceil(clock / c->substep - 1e-9));
     for (cpg_real n = 0.0; n < parts; n += 1.0) {
         part_of_tick(c, clock / parts, wanted, rate);
+        carry(c, rate);
         absorb(c, clock / parts, wanted, rate);
     }
 }
@@ -154,7 +158,8 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
 }
 
 /* Fill the inputs of a correction: level, phase of the first leg, share of the gait that is
- * entered, strides per second, whether the gait changes; keys of both gaits, the entered last. */
+ * entered, strides per second, whether the gait changes, roll, pitch and yaw of the body; keys of
+ * both gaits, the entered last. */
 void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
 {
     const cpg_track *newest = c->track[c->tracks - 1];
@@ -165,6 +170,9 @@ void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
     numbers[2] = fades ? smoothstep(newest->progress, &rate) : 0.0;
     numbers[3] = c->frequency;
     numbers[4] = fades || newest->settling > 0.0;
+    for (int16_t k = 0; k < 3; k++) {
+        numbers[5 + k] = c->body ? c->body->pose.now[1 + k] : 0.0;
+    }
     gaits[0] = (int64_t)(intptr_t)c->track[c->tracks - 1 - fades]->gait;
     gaits[1] = (int64_t)(intptr_t)newest->gait;
 }

@@ -60,12 +60,23 @@ typedef struct {
     int32_t legs, at_once;
 } cpg_drive;
 
+/* The pose of a body against its feet. */
+typedef struct {
+    cpg_drive pose;          /* height, m, roll, pitch, yaw, rad */
+    cpg_real pace, *rate;    /* factor of the time; of the joints in the stand, rad/s */
+    const int16_t (*joints)[3];          /* of each leg, -1 for none */
+    const cpg_real (*limbs)[8][3];       /* axes, links, hip, foot in the stand, m */
+    int32_t legs, moving;
+} cpg_body;
+
 @RAMP@
 typedef struct {
     int32_t joints, tracks, held, ticks_held, faults, followed, recovering, jumped;
     cpg_track *track[CPG_TRACKS];
     cpg_drive *drive;
-    const cpg_real *offset, *limits[3], *found;
+    cpg_body *body;
+    cpg_real *offset;
+    const cpg_real *limits[3], *found;
     cpg_real *position, *velocity, *wanted, *rate, *last_rate, *goal, *correction;
     cpg_real *jump, *jump_rate;
     uint8_t *behind;

@@ -275,6 +275,8 @@ const stop = () => {
 at('generators').onchange = () => send({ do: 'choose', node: at('generators').value });
 at('stop').onclick = stop;
 at('enable').onclick = () => send({ do: 'enable', on: true });
+at('sit').onclick = () => send({ do: 'seat', on: true });
+at('stand').onclick = () => send({ do: 'seat', on: false });
 at('reset').onclick = at('stand-up').onclick = () => send({ do: 'reset' });
 at('fit').onclick = () => send({ do: 'fit' });
 at('record').onclick = () => send({ do: 'record', on: !state.recording });

@@ -1,0 +1,178 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pose of a body above its feet, which keep their places on the ground.
+
+A pose is the height above the stand, m, and roll, pitch and yaw, rad, about the base's origin:
+the yaw turns first, then the pitch (positive: nose down), then the roll (positive: to the right).
+"""
+
+from collections.abc import Sequence
+import ctypes
+from functools import cached_property
+import math
+
+from cpg_ros.common.errors import InputError
+from cpg_ros.motion.body_file import leg_axes
+from cpg_ros.motion.core import Body, core, Drive
+from cpg_ros.motion.plan import beyond_limits, GaitPlan
+from cpg_ros.motion.robot import Robot
+import numpy as np
+
+#: POSE: names of a pose's numbers; UNITS: their units.
+POSE, UNITS = ('height', 'roll', 'pitch', 'yaw'), ('m', 'rad', 'rad', 'rad')
+#: REACHED: largest distance of a foot from its place, m.
+REACHED = 1e-5
+#: WAYPOINTS: number of poses on the way along which angles are followed; STEPS: of the search for
+#: each.
+WAYPOINTS, STEPS = 10, 20
+#: SEATED: least height of the base over its feet when it sits, as a share of the stand's.
+SEATED = 0.3
+#: QUICK: largest speed of a joint as the body moves, as a share of its limit.
+QUICK = 0.5
+#: FASTEST: largest speed of an approach, as a share of its way per time constant; CONSTANT: that
+#: time constant, s (``c/steering.c``).
+FASTEST, CONSTANT = 1.0 / math.e, 0.2
+
+
+class BodyPose:
+    """A robot's body on its way to a pose, and the angles of the stand in that pose.
+
+    ``go_to`` may be called from another thread than the ticks.
+
+    Attributes:
+        now: the present pose.
+        target: the pose that it goes to.
+        address: of its struct in the core.
+
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Begin in the stand.
+
+        Raises:
+            InputError: the robot file has no geometry of all legs, or the robot balances on soles.
+
+        """
+        if robot.biped is not None:
+            raise InputError(f"robot '{robot.name}' balances on its soles: its feedback moves the "
+                             'body')
+        legs = robot.geometry.legs if robot.geometry is not None else {}
+        if missing := [leg for leg in robot.legs if leg not in legs]:
+            raise InputError(f"robot file '{robot.name}' has no geometry of the leg {missing[0]} "
+                             '(part geometry: check_robot --make writes it, and tune)')
+        self._robot, self._stand = robot, robot.column('offset')
+        self._low, self._high, self._fast = (robot.column(key)
+                                             for key in ('lower', 'upper', 'velocity'))
+        names = [joint.name for joint in robot.joints]
+        joints, limbs = np.full((len(legs), 3), -1, np.int16), np.zeros((len(legs), 8, 3))
+        for row, limb, leg in zip(joints, limbs, map(legs.__getitem__, robot.legs), strict=True):
+            count = len(leg.joints)
+            row[:count] = [names.index(name) for name in leg.joints]
+            limb[:count] = (leg_axes(leg.yaw, leg.roll).T[[0, 1, 1][-count:]]
+                            * np.array(leg.turns)[:, None])
+            limb[3:3 + count] = [leg.thigh, leg.calf, leg.foot][-count:]
+            limb[6] = leg.hip if count == 3 else np.add(leg.hip, leg.thigh)
+        self.now, self.target, rate = np.zeros((3, len(POSE)))
+        #: Rates of the stand's angles, rad/s, and arrays that only the core uses.
+        self._kept = np.zeros(len(names)), rate, joints, limbs
+        self._struct = Body(Drive(self.now.ctypes.data, rate.ctypes.data, self.target.ctypes.data,
+                                  None, len(POSE) - 1, 0),
+                            1.0, self._kept[0].ctypes.data, joints.ctypes.data,
+                            limbs.ctypes.data, len(legs), 0)
+        self.address = ctypes.addressof(self._struct)
+        for limb, place in zip(limbs, self._feet(self._stand), strict=True):
+            limb[7] = place
+
+    def _feet(self, angles: np.ndarray) -> np.ndarray:
+        """Return the places of the feet, m, shape (legs, 3), for angles in rad, (joints,)."""
+        feet = np.empty((self._struct.legs, 3))
+        core().cpg_feet(self.address, angles.ctypes.data, feet.ctypes.data)
+        return feet
+
+    @property
+    def moving(self) -> bool:
+        """Whether the body is on its way to its target."""
+        return bool(self._struct.moving)
+
+    @property
+    def seated(self) -> bool:
+        """Whether the body is where the robot sits, or on its way there."""
+        return bool(self.target[0] < 0.0 and (self.target == self.seat).all())
+
+    def angles(self, pose: Sequence[float] | np.ndarray) -> np.ndarray:
+        """Return the angles of the joints in a pose, rad, shape (joints,).
+
+        Raises:
+            InputError: a foot does not reach the ground, or a joint would leave its limits.
+
+        """
+        angles, far = self._stand.copy(), 0.0
+        for share in np.arange(1, WAYPOINTS + 1) / WAYPOINTS:
+            wanted = share * np.asarray(pose, dtype=float)
+            far = core().cpg_pose(self.address, wanted.ctypes.data, angles.ctypes.data, STEPS)
+        if not far < REACHED:
+            raise InputError(f'{_text(pose)}: the feet do not reach their places on the ground')
+        for joint, angle in zip(self._robot.joints, angles, strict=True):
+            if message := beyond_limits(joint, angle, angle):
+                raise InputError(f'{_text(pose)} takes {message}')
+        return angles
+
+    def check(self, pose: Sequence[float] | np.ndarray, plan: GaitPlan) -> None:
+        """Check that a robot can stand in a pose and walk in it by a plan.
+
+        Raises:
+            InputError: it cannot; the message names the joint and the figure.
+
+        """
+        if not any(pose):
+            return
+        for joint, angle, low, high in zip(self._robot.joints, self.angles(pose), *plan.span,
+                                           strict=True):
+            if message := beyond_limits(joint, angle + low, angle + high):
+                raise InputError(f"{_text(pose)} in the gait '{plan.name}' takes {message}")
+
+    @cached_property
+    def seat(self) -> np.ndarray:
+        """The pose in which the robot sits: as low as its joints allow, down to SEATED."""
+        stand = -float(self._feet(self._stand)[:, 2].mean())
+        low, high = -(1.0 - SEATED) * stand, 0.0
+        tried = low
+        while high - low > 1e-3:
+            try:
+                self.angles((tried, 0.0, 0.0, 0.0))
+                high = tried
+            except InputError:
+                low = tried
+            tried = 0.5 * (low + high)
+        return np.array([high, 0.0, 0.0, 0.0])
+
+    def go_to(self, pose: Sequence[float] | np.ndarray, time: float) -> None:
+        """Go to a pose in about a time in s, or as slowly as the joints' speed limits ask.
+
+        Raises:
+            InputError: as of ``angles``.
+
+        """
+        way = np.abs(self.angles(pose) - self.angles(self.now))
+        constant = max(time * CONSTANT, float((way / self._fast).max()) * FASTEST / QUICK, 1e-3)
+        self._struct.pace = CONSTANT / constant
+        self.target[:] = pose
+        self._struct.moving = 1
+
+
+def _text(pose: Sequence[float] | np.ndarray) -> str:
+    """Return the numbers of a pose that are not 0, as 'body.height -0.1 m, body.roll 0.2 rad'."""
+    return ', '.join(f'body.{name} {value:g} {unit}' for name, value, unit
+                     in zip(POSE, pose, UNITS, strict=True) if value)
