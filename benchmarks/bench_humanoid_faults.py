@@ -20,7 +20,7 @@ begin in the walk do so at 3 s and a fifth of a stride later with each seed. A r
 the fault, or at 6.5 s if it lasts, in a 'walk', a 'stand', a 'crouch', or a 'fall':
 the base leans by more than 60 degrees or lies on the floor at any time.
 
-usage: bench_humanoid_faults.py [--seeds 5] [--only NAME] [--jobs 2]
+usage: bench_humanoid_faults.py [--robot humanoid] [--seeds 5] [--only NAME] [--jobs 2]
 """
 
 import argparse
@@ -41,22 +41,23 @@ from sensor_faults import FAULTS  # noqa: E402
 BEGINS, FIFTH, AFTER, LASTS = 3.0, 0.2 / 1.65, 2.5, 6.5
 
 
-def measure(job: tuple[str, int]) -> tuple[str, str, int]:
-    fault, seed = job
-    humanoid = HumanoidUnderFault(fault, seed, begins=BEGINS + seed % 5 * FIFTH)
+def measure(job: tuple[str, str, int]) -> tuple[str, str, int]:
+    robot, fault, seed = job
+    humanoid = HumanoidUnderFault(fault, seed, name=robot, begins=BEGINS + seed % 5 * FIFTH)
     ends = humanoid.faults.ends
     return fault, humanoid.run(LASTS if math.isinf(ends) else ends + AFTER), humanoid.crossed
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--robot', default='humanoid')
     parser.add_argument('--seeds', type=int, default=5)
     parser.add_argument('--only', default='', help='faults with this in their names')
     parser.add_argument('--jobs', type=int, default=2)
     given = parser.parse_args()
-    jobs = [(fault, seed) for fault in FAULTS if given.only in fault
+    jobs = [(given.robot, fault, seed) for fault in FAULTS if given.only in fault
             for seed in range(given.seeds)]
-    found: dict[str, Counter[str]] = {fault: Counter() for fault, _ in jobs}
+    found: dict[str, Counter[str]] = {fault: Counter() for _, fault, _ in jobs}
     crossed: Counter[str] = Counter()
     with ProcessPoolExecutor(given.jobs, multiprocessing.get_context('spawn')) as pool:
         for fault, end, count in pool.map(measure, jobs):
@@ -64,7 +65,7 @@ def main() -> None:
             crossed[fault] += count
             if sum(found[fault].values()) == given.seeds:
                 log(f'{fault}: {dict(found[fault])}, {crossed[fault]} limits crossed')
-    emit(benchmark='humanoid_faults', seeds=given.seeds,
+    emit(benchmark='humanoid_faults', robot=given.robot, seeds=given.seeds,
          **{fault: {**ends, 'crossed': crossed[fault]} for fault, ends in found.items()},
          passed=not any(crossed.values()))
 
