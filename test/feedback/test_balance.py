@@ -17,8 +17,10 @@
 import math
 
 from cpg_ros.common.errors import InputError
+from cpg_ros.feedback.biped import crouch
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
+from cpg_ros.feedback.biped.links import links_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.library.biped import Biped
@@ -221,6 +223,24 @@ def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed)
         walker.run.body.step()
     assert not walker.run.body.fallen
     assert math.acos(walker.run.body.axes[2, 2]) < 0.5
+
+
+def test_servos_that_give_way_hold_a_crouch_short_of_the_end_of_the_knees(walker, monkeypatch):
+    # As of a robot whose thighs would point downward at the end, such as the Unitree G1.
+    monkeypatch.setattr(crouch, 'BENT', np.array([0.75]))
+    walker.go(2.0)
+    assert walker.pattern.lower()
+    walker.go(3.0)
+    assert walker.pattern.crouching and not walker.run.body.fallen
+    assert math.acos(walker.run.body.axes[2, 2]) < 0.5
+
+
+def test_the_thighs_of_a_crouching_g1_are_at_most_level():
+    robot = load_robot('unitree_g1')
+    targets, depth = crouch.crouch_pose(robot, links_of(robot))
+    thigh = targets[[joint.name for joint in robot.joints].index('left_ankle_pitch_joint')] + (
+        targets[[joint.name for joint in robot.joints].index('left_knee_joint')])
+    assert depth > 0.2 and 0.8 < thigh < 0.5 * math.pi
 
 
 def test_a_run_ends_in_the_crouch_too(walker):

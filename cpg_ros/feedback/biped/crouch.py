@@ -15,11 +15,15 @@
 """The crouch of a biped: a pose in which servos alone hold it up, without any balance.
 
 A stand on servos falls: the ankles would have to be stiffer than the weight topples. In the crouch
-knees and ankles are at the ends of their ranges, so the ankles cannot give way forward, and the
-centre of mass is low and above the middle of the soles.
+the ankles are at the ends of their ranges, so they cannot give way forward, and the centre of mass
+is low and above the middle of the soles. Servos of hips and knees give way under the weight, and
+their targets make up for it: at rest each bears half of the potential energy's derivative.
 """
 
+from collections.abc import Sequence
+
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
+from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
@@ -27,13 +31,15 @@ import numpy as np
 LATERAL = 0.9
 #: HALVINGS: bisections of the range of the hips, which give 1e-6 rad.
 HALVINGS = 22
+#: STEP: of central differences, rad.
+STEP = 1e-5
 #: BENT: bends of the knees that are tried, as shares of their range, the most bent first.
 BENT = np.arange(1.0, 0.4, -0.05)
 
 
 def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
                 ) -> tuple[np.ndarray, float] | None:
-    """Return the angles of the crouch and how much lower the centre of mass is, or None.
+    """Return the target angles of the crouch and how much lower the centre of mass is, or None.
 
     Args:
         robot: whose legs each have three joints that pitch: hip, knee and ankle.
@@ -41,9 +47,9 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
         behind: how far the centre of mass is behind the middle of the soles, m.
 
     Returns:
-        Angles of the joints of the legs, leg by leg, rad, shape (joints,), and by how much the
+        Targets of the joints of the legs, leg by leg, rad, shape (joints,), and by how much the
         centre of mass is lower than in the stand, m. None if a leg has other joints, or if the
-        hips cannot bring the centre of mass above the soles.
+        hips cannot bring the centre of mass above the soles with thighs at most level.
 
     """
     assert robot.biped is not None
@@ -64,9 +70,15 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
     angles[ankles] = np.where(bent, lower[ankles], upper[ankles])
     for fraction in BENT:
         angles[knees] = fraction * np.where(bent, upper[knees], lower[knees])
-        if _centre(ahead_of_soles, angles, hips, lower[hips].max(), high):
+        if (_centre(ahead_of_soles, angles, hips, lower[hips].max(), high)
+                and ahead_of_soles.thighs_rise(angles)):
             order = [names.index(joint.name) for joint in robot.joints]
-            return angles[order], stand - ahead_of_soles.height(angles)
+            depth = stand - ahead_of_soles.height(angles)
+            kp = np.array([robot.biped.links[name].kp for name in names])
+            # At the end of its range a knee rests on its stop.
+            bearing = (hips, knees) if fraction < 1.0 else (hips,)
+            sag = ahead_of_soles.torques(angles, bearing) / kp
+            return np.clip(angles + sag, lower, upper)[order], depth
     return None
 
 
@@ -102,6 +114,22 @@ class _Ahead:
         """Return the height of the centre of mass above the soles, m."""
         self._place(angles)
         return float(self._center[2] - self._pose.soles[:, 2].mean())
+
+    def thighs_rise(self, angles: np.ndarray) -> bool:
+        """Tell whether the hips are above the knees."""
+        self._place(angles)
+        hip, knee = self._chain[:2]
+        return bool(self._pose.places[hip, 2] > self._pose.places[knee, 2])
+
+    def torques(self, angles: np.ndarray, pairs: Sequence[np.ndarray]) -> np.ndarray:
+        """Return what pairs of joints bear at rest on level soles, N m, (angles,), else 0."""
+        torques, weight = np.zeros_like(angles), GRAVITY * self._links.masses.sum()
+        for pair in pairs:
+            step = np.zeros_like(angles)
+            step[pair] = STEP
+            torques[pair] = 0.5 * weight / (2.0 * STEP) * (
+                self.height(angles + step) - self.height(angles - step))
+        return torques
 
     def _place(self, angles: np.ndarray) -> None:
         lean = -sum(self._links.axes[row, 1] * angles[row - 1] for row in self._chain)
