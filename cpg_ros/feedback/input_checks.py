@@ -282,8 +282,9 @@ def _contradicts(up, turning, memory):
 @jit
 def _is_off_gravity(up, acceleration, moving, dt, memory):
     """Tell whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
-    # No time is known before the first message.
-    memory[17] += min(dt, GAP)
+    # One message after a gap, such as the first, says no more than any other.
+    dt = min(dt, GAP)
+    memory[17] += dt
     fraction = min(dt / min(WALKING_MEAN if moving else STANDING_MEAN, memory[17]), 1.0)
     square = 0.0
     for k in range(3):

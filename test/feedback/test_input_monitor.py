@@ -100,6 +100,11 @@ def test_gravity_is_judged_by_a_quarter_of_a_second_and_not_by_the_first_message
     for k, dt in enumerate((1.0, *(100 * [0.002]))):
         message[27] = 9.81 * (k > 5)
         assert judge_imu(message, dt, False, mount, memory, *filled) == 0
+    # A walk's acceleration of an instant, after a second without messages.
+    message[27] = 9.81
+    for k, dt in enumerate((*(1000 * [0.002]), 1.0)):
+        message[27] = 9.81 + 8.0 * (k == 1000)
+        assert judge_imu(message, dt, True, mount, memory, *filled) == 0
     # Gravity removed by the driver is named once it has been seen for long enough.
     memory[:], message[27] = 0.0, 0.0
     verdicts = [judge_imu(message, dt, False, mount, memory, *filled)
