@@ -256,14 +256,16 @@ def test_silence_is_not_ok(start, seen):
 
 @pytest.mark.deep
 def test_a_first_start_announces_what_it_compiles_before_it_does(tmp_path):
-    generator = Process('-p', 'network:=hopf', environment={'NUMBA_CACHE_DIR': str(tmp_path)})
+    generator = Process('-p', 'robot:=unitree_go2', '-p', 'combined_topic:=""', '-p',
+                        'command:=forward_position', '-p', 'feedback.enabled:=true',
+                        environment={'NUMBA_CACHE_DIR': str(tmp_path)})
     watcher = Watcher(generator.domain)
     try:
-        generator.wait_for("compiling the network 'hopf': about 20 s, only at its first start")
+        generator.wait_for('compiling the feedback: about 25 s, only at its first start')
         assert 'compiled in' not in generator.log
         # And says so once a second to whoever looks.
         until(lambda: any(status.name == '/cpg_generator: start' and status.message.startswith(
-            "compiling the network 'hopf', ") for status in watcher.diagnostics), 'its progress')
+            'compiling the feedback, ') for status in watcher.diagnostics), 'its progress')
     finally:
         watcher.end()
         generator.end()
