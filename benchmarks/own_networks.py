@@ -140,12 +140,16 @@ class WilsonCowan(Network):
         return {'walk': Preset('walk', cls())}
 
 
+def tutorial_file(folder: str, name: str) -> str:
+    """Write a file of the tutorial about networks of one's own; return its path."""
+    page = (ROOT / 'docs' / 'tutorials' / 'own_network.md').read_text()
+    path = Path(folder) / name
+    path.write_text(re.search(rf':name: {re.escape(name)}\n\n(.*?)```', page, re.DOTALL)[1])
+    return str(path)
+
+
 @cache
 def half_centre() -> type[Network]:
     """Return the tutorial's network of Hodgkin-Huxley cells."""
-    page = (ROOT / 'docs' / 'tutorials' / 'own_network.md').read_text()
-    text = re.search(r':name: half_centre\.py\n\n(.*?)```', page, re.DOTALL)
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / 'half_centre.py'
-        path.write_text(text[1])
-        return find_network(str(path))
+        return find_network(tutorial_file(folder, 'half_centre.py'))
