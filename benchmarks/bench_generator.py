@@ -12,7 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generator at 1 kHz against a node that publishes constants on the same thread and topics.
+"""The generator, at 1 kHz if not told otherwise, against a node that publishes constants
+on the same thread and topics.
 
 The null node's messages are typed, the generator's serialised once and filled in place. CPU time
 of both without a subscriber; then, with one subscriber in another process, whether every period's
@@ -29,7 +30,6 @@ from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 from processes import enter_workspace, Listener, start_node
 
-RATE = 1000.0
 #: A network for eighteen joints.
 SIX = 'delayed6'
 SETTLE = 4.0
@@ -43,9 +43,9 @@ def tails(ns: np.ndarray) -> dict[str, float]:
             for level in (50, 99, 99.9)} | {'max': float(ns.max()) / 1e3}
 
 
-def judge(record: dict, health: list[dict]) -> dict[str, object]:
+def judge(record: dict, health: list[dict], rate: float) -> dict[str, object]:
     """Completeness, rate, drift and jitter of one window."""
-    period = 1e9 / RATE
+    period = 1e9 / rate
     # From half a second on: what was published before the connection stood is not counted.
     begin = np.searchsorted(record['arrival'], record['arrival'][0] + 500_000_000)
     arrival, source, stamp = (record[key][begin:] for key in ('arrival', 'source', 'stamp'))
@@ -60,7 +60,7 @@ def judge(record: dict, health: list[dict]) -> dict[str, object]:
         # Every stamp is to be one period after the one before it.
         'misstamped': int((np.abs(steps - 1.0) > 0.5).sum()),
         'stamp_error_us': tails(np.abs(steps - 1.0) * period),
-        'rate_error': abs((stamp.size - 1) / ((arrival[-1] - arrival[0]) * 1e-9) / RATE - 1.0),
+        'rate_error': abs((stamp.size - 1) / ((arrival[-1] - arrival[0]) * 1e-9) / rate - 1.0),
         'drift_periods': float(abs(periods[-1] - (stamp.size - 1))),
         'drift_ppm': float(1e6 * abs(np.polyfit(index, periods, 1)[0] - 1.0)),
         # Of the instants at which messages arrived and at which they were handed over.
@@ -69,11 +69,12 @@ def judge(record: dict, health: list[dict]) -> dict[str, object]:
         'behind_stamp_us': tails(source - stamp)}
 
 
-def measure(kind: str, network: str, seconds: float) -> dict[str, object]:
+def measure(kind: str, network: str, seconds: float, settings: dict[str, float]
+            ) -> dict[str, object]:
     """One start of a node: CPU without and with a subscriber, and what that one saw."""
     log(f'{kind} ({network}): {2 * (seconds + SETTLE):.0f} s')
     own = {'network': network} if kind == 'generator' else {}
-    with start_node(kind, rate=RATE, robot=NETWORKS[network].usual_robot, **own) as node:
+    with start_node(kind, robot=NETWORKS[network].usual_robot, **own, **settings) as node:
         def cpu_percent() -> float:
             before, began = node.cpu_s(), time.monotonic()
             time.sleep(seconds)
@@ -83,28 +84,31 @@ def measure(kind: str, network: str, seconds: float) -> dict[str, object]:
         with Listener(seconds + 2.0) as listener:
             time.sleep(1.0)
             heard = cpu_percent()
-            seen = judge(*listener.record())
+            seen = judge(*listener.record(), settings['rate'])
         return {'cpu_percent': alone, 'cpu_percent_with_subscriber': heard, **seen}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=30.0, help='length of each window')
+    parser.add_argument('--rate', type=float, default=1000.0, help='ticks per second')
+    parser.add_argument('--priority', type=int, default=0, help='thread_priority of both nodes')
     parser.add_argument('--network', choices=[*NETWORKS, SIX],
                         help='by default all, in turn, and that of the hexapod')
     arguments = parser.parse_args()
     enter_workspace()
-    found = {network: compare(network, arguments.seconds)
+    settings = {'rate': arguments.rate, 'thread_priority': arguments.priority}
+    found = {network: compare(network, arguments.seconds, settings)
              for network in ([arguments.network] if arguments.network else [*NETWORKS, SIX])}
-    emit(benchmark='generator', rate=RATE, seconds=arguments.seconds, networks=found,
+    emit(benchmark='generator', **settings, seconds=arguments.seconds, networks=found,
          targets=TARGETS, passed=all(each['passed'] for each in found.values()))
 
 
-def compare(network: str, seconds: float) -> dict[str, object]:
+def compare(network: str, seconds: float, settings: dict[str, float]) -> dict[str, object]:
     """Measure one network's generator against the null node with the same robot."""
     runs: dict[str, list] = {'null': [], 'generator': []}
     for kind in ('null', 'generator', 'generator', 'null'):
-        runs[kind].append(measure(kind, network, seconds))
+        runs[kind].append(measure(kind, network, seconds, settings))
         log(f'{runs[kind][-1]}')
 
     def mean(kind: str, key: str) -> float:

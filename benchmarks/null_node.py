@@ -30,7 +30,7 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.generator import Diagnostics
 from cpg_ros.ros.node.health import OtherPublishers
 from cpg_ros.ros.node.node_base import exit_code
-from cpg_ros.ros.node.ticker import Ticker
+from cpg_ros.ros.node.ticker import RealTime, Ticker
 import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -93,6 +93,7 @@ def main() -> int:
     node = Node('null_node')
     rate = node.declare_parameter('rate', 100.0).value
     node.declare_parameter('nothing', '')
+    real_time = RealTime(node.declare_parameter('thread_priority', 0).value)
     robot = load_robot(node.declare_parameter('robot', 'quadruped').value)
     outputs = TypedOutputs(node, robot)
     position, velocity = robot.column('offset'), np.zeros(len(robot.joints))
@@ -102,7 +103,8 @@ def main() -> int:
     def tick(dt: float, stamp: int) -> None:
         outputs.publish(stamp, position, velocity, phases)
 
-    ticker = Ticker(node, rate, tick, lambda: None, lambda error: stop.set())
+    ticker = Ticker(node, rate, tick, lambda: None, lambda error: stop.set(),
+                    begin=lambda: real_time.request(node.get_logger()))
     plan = SimpleNamespace(name='null', frequency=1.0, gain=1.0,
                               character='none', orbit=SimpleNamespace(
                                   period=1.0, network=SimpleNamespace(name='none')))
