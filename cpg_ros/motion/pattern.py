@@ -82,6 +82,24 @@ def _shared(name: str) -> Any:
     return property(read, write)
 
 
+def _steered(field: str, address: Callable[[StrideCommand], int]) -> Any:
+    """Return a property: the stride command that steers, None for none.
+
+    Args:
+        field: of the core's struct, that points to it.
+        address: returns where the field points.
+
+    """
+    def read(self: Any) -> StrideCommand | None:
+        drive: StrideCommand | None = self._drive
+        return drive
+
+    def write(self: Any, drive: StrideCommand | None) -> None:
+        self._drive = drive
+        setattr(self._struct, field, None if drive is None else address(drive))
+    return property(read, write)
+
+
 class GaitRunner:
     """A network running one plan, and the watchdog that compares it with the gait's orbit.
 
@@ -95,6 +113,7 @@ class GaitRunner:
     """
 
     phase, progress, settling = _shared('phase'), _shared('progress'), _shared('settling')
+    drive = _steered('stride', lambda drive: drive.stride.ctypes.data)
 
     def __init__(self, plan: GaitPlan, transition: float,
                  drive: StrideCommand | None = None) -> None:
@@ -113,16 +132,6 @@ class GaitRunner:
         self._track.follow(plan.core)
         self._track.run('seed', plan.seed)
         self._track.run('home', self._own)
-
-    @property
-    def drive(self) -> StrideCommand | None:
-        """The source of the stride lengths, None for the gait's own."""
-        return self._drive
-
-    @drive.setter
-    def drive(self, drive: StrideCommand | None) -> None:
-        self._drive = drive
-        self._struct.stride = None if drive is None else drive.stride.ctypes.data
 
     @property
     def stepper(self) -> Stepper:
@@ -195,6 +204,7 @@ class Pattern:
 
     faults, held = _shared('faults'), _shared('ticks_held')
     frequency_scale, substep = _shared('frequency_scale'), _shared('substep')
+    drive = _steered('drive', lambda drive: drive.address)
 
     def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,
                  drive: StrideCommand | None = None) -> None:
@@ -343,16 +353,6 @@ class Pattern:
         for track in self._tracks:
             track.drive = drive
         self.drive = drive
-
-    @property
-    def drive(self) -> StrideCommand | None:
-        """The stride command that steers, None for none."""
-        return self._drive
-
-    @drive.setter
-    def drive(self, drive: StrideCommand | None) -> None:
-        self._drive = drive
-        self._struct.drive = None if drive is None else drive.address
 
     @property
     def plan(self) -> GaitPlan:

@@ -23,10 +23,11 @@ from typing import Any
 
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import PlanError
+from cpg_ros.motion.plan import GaitPlan, PlanError
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.ros.feedback import switch
 from cpg_ros.ros.feedback.sensor_input import CONTACTS
@@ -200,56 +201,8 @@ class Generator(StartedNode):
         """
         super().__init__(NAME)
         joined = time.monotonic()
-        given = {name: override.value for name, override in self._parameter_overrides.items()}
-        self._parameter_overrides['network'] = Parameter('network', value=network_for(
-            given.get('network', NETWORK.default), given.get('robot')))
-        self._declare({'network': NETWORK})
-        try:
-            network = find_network(self._value('network'))
-        except NetworkError as error:
-            raise StartError(f'network {error}') from error
-        compile_kernels(self._value('network'), self)
-        self._declare(specs(network))
-        self._declare({'exclusive': exclusive(self._value('command'))})
-        presets = presets_of(network, self._value('presets'))
-        self._one_of('gait', tuple(presets))
-        self._one_of('command', COMMANDS)
-        robot = load_robot(self._value('robot'))
-        if network.name not in robot.networks:
-            raise StartError(f"robot file '{robot.name}' is for the network "
-                             f"{' or '.join(robot.networks)}, not '{network.name}'")
-        self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
-        # Its descriptor lists those of the file, too.
-        descriptor = gait_spec(network, self._planner.offered).descriptor()
-        descriptor.type = ParameterType.PARAMETER_STRING
-        self.set_descriptor('gait', descriptor)
-        self._declare(switch.specs(robot))
-        if FORMER in self._parameter_overrides:
-            raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
-        self._declare({ENABLED: default_enabled(self, robot, self._value('combined_topic'),
-                                      self._value('command') != 'none')})
-        self._one_of('feedback.contacts', CONTACTS)
-        for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
-            self._parameter_overrides[parameter.name] = parameter
-        self._declare(self._planner.specs(self._value('gait')))
-        plan = self._planner.plan(self._values())
-        self._planner.prepare()
-
-        steered, managed = self._value('cmd_vel'), self._value('managed')
-        autostart = self._value('autostart') and not managed
-        soled = robot.biped is not None
-        self.pattern = (BalancedPattern if soled else Pattern)(
-            plan, self._value('ramp'), autostart and not steered,
-            StrideCommand(len(robot.legs)) if steered and not soled else None)
-        self._cmd_vel = CmdVel(self, self.pattern, plan, autostart,
-                               lambda: self._value('cmd_vel_timeout'),
-                               lambda: self._value('ramp'),
-                               lambda: self._feedback.active) if steered else None
-        self._outputs = Outputs(self, robot, self._value('combined_topic'),
-                                self._value('command'))
-        self._feedback = (BalanceSwitch if soled else FeedbackSwitch)(
-            self, self.pattern, self._motion, self._outputs.topics)
-        self._cells = CellsPublisher(self, network)
+        network, robot = self._load()
+        self._create_pattern(network, self._first_plan(network, robot))
         self._measured = self._measured_pose(robot)
         #: Angles that the last tick sent, rad.
         self._sent: np.ndarray | None = None
@@ -280,7 +233,68 @@ class Generator(StartedNode):
         self._lifecycle = Lifecycle(self, {
             'configure': lambda: self._start_publishing()[0],
             'activate': lambda: self._walk(True), 'deactivate': lambda: self._walk(False),
-            'cleanup': self._fall_silent, 'shutdown': self._shut_down}) if managed else None
+            'cleanup': self._fall_silent, 'shutdown': self._shut_down
+        }) if self._value('managed') else None
+
+    def _load(self) -> tuple[type[Network], Robot]:
+        """Declare the parameters of every network; return network and robot."""
+        given = {name: override.value for name, override in self._parameter_overrides.items()}
+        self._parameter_overrides['network'] = Parameter('network', value=network_for(
+            given.get('network', NETWORK.default), given.get('robot')))
+        self._declare({'network': NETWORK})
+        try:
+            network = find_network(self._value('network'))
+        except NetworkError as error:
+            raise StartError(f'network {error}') from error
+        compile_kernels(self._value('network'), self)
+        self._declare(specs(network))
+        self._declare({'exclusive': exclusive(self._value('command'))})
+        robot = load_robot(self._value('robot'))
+        if network.name not in robot.networks:
+            raise StartError(f"robot file '{robot.name}' is for the network "
+                             f"{' or '.join(robot.networks)}, not '{network.name}'")
+        return network, robot
+
+    def _first_plan(self, network: type[Network], robot: Robot) -> GaitPlan:
+        """Declare the parameters of network and robot; return the plan of the first gait."""
+        presets = presets_of(network, self._value('presets'))
+        self._one_of('gait', tuple(presets))
+        self._one_of('command', COMMANDS)
+        self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
+        # Its descriptor lists those of the file, too.
+        descriptor = gait_spec(network, self._planner.offered).descriptor()
+        descriptor.type = ParameterType.PARAMETER_STRING
+        self.set_descriptor('gait', descriptor)
+        self._declare(switch.specs(robot))
+        if FORMER in self._parameter_overrides:
+            raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
+        self._declare({ENABLED: default_enabled(self, robot, self._value('combined_topic'),
+                                      self._value('command') != 'none')})
+        self._one_of('feedback.contacts', CONTACTS)
+        for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
+            self._parameter_overrides[parameter.name] = parameter
+        self._declare(self._planner.specs(self._value('gait')))
+        plan = self._planner.plan(self._values())
+        self._planner.prepare()
+        return plan
+
+    def _create_pattern(self, network: type[Network], plan: GaitPlan) -> None:
+        """Create the pattern, what steers and corrects it, and its publishers."""
+        robot, steered = plan.robot, self._value('cmd_vel')
+        autostart = self._value('autostart') and not self._value('managed')
+        soled = robot.biped is not None
+        self.pattern = (BalancedPattern if soled else Pattern)(
+            plan, self._value('ramp'), autostart and not steered,
+            StrideCommand(len(robot.legs)) if steered and not soled else None)
+        self._cmd_vel = CmdVel(self, self.pattern, plan, autostart,
+                               lambda: self._value('cmd_vel_timeout'),
+                               lambda: self._value('ramp'),
+                               lambda: self._feedback.active) if steered else None
+        self._outputs = Outputs(self, robot, self._value('combined_topic'),
+                                self._value('command'))
+        self._feedback = (BalanceSwitch if soled else FeedbackSwitch)(
+            self, self.pattern, self._motion, self._outputs.topics)
+        self._cells = CellsPublisher(self, network)
 
     # -- parameters -----------------------------------------------------------------------
 

@@ -68,8 +68,7 @@ class Pair:
         self.core = Pattern(first, ramp, drive=StrideCommand(legs) if steered else None)
         self.plain = PlainPattern(first, ramp, PlainDrive(legs) if steered else None)
         self.dt, self.time = draws.choice([0.001, 0.004, 0.02]), 0.0
-        # A steep retiming enlarges what phases differ by.
-        self.alike = 1e-12 if duty == 0.0 else 1e-11
+        self.alike = 1e-12
         if draws.random() < 0.5:
             found = self.plain.offset + draws.uniform(-0.2, 0.2, self.plain.offset.size)
             self.core.start_from(found, 0.2)
@@ -109,6 +108,9 @@ class Pair:
         elif what == 'scale':
             core.frequency_scale = plain.scale = draws.uniform(0.5, 1.2)
         elif what in ('push', 'nan'):
+            # A push can bring a cell near the origin of its plane, where the angle of its state,
+            # and so phase, retiming and fast joints, enlarge roundings of the state by 1 / radius.
+            self.alike = 1e-11 if what == 'push' else self.alike
             stepper = plain.tracks[-1].stepper
             offset = np.full(stepper.network.components, np.nan) if what == 'nan' else \
                 draws.uniform(-0.1, 0.1, stepper.network.components) * np.abs(stepper.now[0]).max()
@@ -124,8 +126,7 @@ class Pair:
             assert np.abs(core.position - plain.position).max() <= self.alike
             assert np.abs(core.velocity - plain.velocity).max() <= 1e3 * self.alike
             late = core.phases - plain.tracks[-1].legs
-            # A phase is an angle in the plane of a state, which may be near its origin.
-            assert np.abs(late - np.round(late)).max() <= 1e-11
+            assert np.abs(late - np.round(late)).max() <= self.alike
             assert core.faults == plain.faults and core.plan is plain.tracks[-1].plan
 
 
@@ -147,7 +148,10 @@ def tell(network, duty, story):
 @pytest.mark.parametrize('duty', [0.0, *in_depth(0.55)])
 @pytest.mark.parametrize('network', PRESETS)
 def test_core_and_plain_python_do_the_same(network, duty, request):
-    """In depth, 10,000 requests of all networks together; with duty factors, half of them."""
+    """In depth, 10,000 requests of all networks together; with duty factors, half of them.
+
+    Angles and phases agree within 1e-12, and within 1e-11 once a network has been pushed.
+    """
     deep = request.config.option.hypothesis_profile == 'deep'
     for story in range(1 + deep * (10000 // (REQUESTS * len(PRESETS) * 2))):
         tell(network, duty, story)

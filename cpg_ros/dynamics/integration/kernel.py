@@ -97,20 +97,18 @@ def _field_code():
     return kernel_source
 
 
-def _compiled(numba, network):
-    """Return restart and steps_of of a network, compiled; numba is the module machine_code."""
-    equations = equations_of(network)
+class _Sizes(NamedTuple):
+    """Sizes of a network's arrays: components, and rows of m = n / variables, or of lanes."""
 
-    def own(function):
-        return numba.jit(numba.renamed(function, equations.key))
+    components: int
+    variables: int
+    driven: int
+    work: int
+    extra: int
 
-    code = generated.load(equations.key, 'kernel',
-                          lambda: _field_code().kernel_source(equations))
-    drive, rates = code.compiled(own)
-    delays = drive is not None
-    driven_rows, work_rows, extra = max(code.DRIVEN, 1), max(code.WORK, 1), code.EXTRA + 1
-    variables, components = network.variables, network.cells * network.variables
 
+def _field(own, rates, components):
+    """Return the right-hand side of a network, compiled by ``own``, from its rates."""
     @own
     def field(n, system, driven, x, weight, k, work, out):
         """Return the right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
@@ -141,19 +139,21 @@ def _compiled(numba, network):
                     for cell in range(basis.shape[1]):
                         for lane in range(lanes):
                             out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
+    return field
 
+
+def _past(own):
+    """Return the interpolation of the delayed states of all lanes, compiled by ``own``."""
     @own
     def past_state(n, ring, head, back, first, stride, out):
-        """Return the state ``back`` steps before the head node, by the cubic Hermite interpolant.
-
-        Only every stride-th component from first on is filled in.
-        """
+        """Fill in every stride-th component of the state ``back`` steps before the head node."""
         step, x, after, before = ring
         nodes = max(1, math.ceil(back))
         start = head - nodes
         if start < 0:
             start += x.shape[0]
         end = start + 1 if start + 1 < x.shape[0] else 0
+        # The cubic Hermite interpolant.
         s = nodes - back
         h11 = s * s * (s - 1.0) * step
         h10 = s * (s - 1.0) * (s - 1.0) * step
@@ -180,6 +180,13 @@ def _compiled(numba, network):
         else:
             for lane in range(lanes):
                 past_state(n, ring, head, tau[lane] / step - c, lane, lanes, out)
+    return past_states
+
+
+def _stepping(own, field, past_states, drive, sizes):
+    """Return restart and steps_of, compiled by ``own``; drive is None without a delay."""
+    delays = drive is not None
+    components, variables, driven_rows, work_rows, extra = sizes
 
     @own
     def steps_of(system, ring, head, steps, noise, record, row):
@@ -238,8 +245,23 @@ def _compiled(numba, network):
             past_states(n, system.tau, ring, head, 0.0, past)
             drive(n, past, system.p, lanes, work, driven)
         field(n, system, driven, ring.x[head], 0.0, ring.x[head], work, ring.after[head])
-
     return restart, steps_of
+
+
+def _compiled(numba, network):
+    """Return restart and steps_of of a network, compiled; numba is the module machine_code."""
+    equations = equations_of(network)
+
+    def own(function):
+        return numba.jit(numba.renamed(function, equations.key))
+
+    code = generated.load(equations.key, 'kernel',
+                          lambda: _field_code().kernel_source(equations))
+    drive, rates = code.compiled(own)
+    components = network.cells * network.variables
+    sizes = _Sizes(components, network.variables, max(code.DRIVEN, 1), max(code.WORK, 1),
+                   code.EXTRA + 1)
+    return _stepping(own, _field(own, rates, components), _past(own), drive, sizes)
 
 
 # Names that the entry points below use; ``numba_kernels`` replaces them.
