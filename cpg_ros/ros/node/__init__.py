@@ -17,5 +17,5 @@
 Imports ``common`` only.
 """
 
-__all__ = ['client', 'console', 'health', 'logging', 'message_block', 'native', 'node_base',
+__all__ = ['client', 'console', 'health', 'message_block', 'native', 'node_base',
            'parameters', 'polled', 'ticker']
