@@ -355,7 +355,7 @@ class PlainPattern:
 
     def strides(self, frequency, dt, clock):
         if self.drive is not None:
-            self.drive.advance(dt)
+            self.drive.advance(clock)
             frequency = frequency * self.drive.now[-1]
         before, self.frequency = self.frequency, frequency
         return 0.5 * (before + frequency) * clock, frequency

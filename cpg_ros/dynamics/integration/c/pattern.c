@@ -110,7 +110,8 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
         frequency += share[n] * (gait_of(t)->frequency - frequency);
     }
 #ifdef CPG_STEERING
-    frequency *= steered(c, dt);
+    /* Strides change by the slowed clock, as all that makes up the rates does. */
+    frequency *= steered(c, clock);
 #endif
 #ifdef CPG_HOST
     leading = c->lead.parts > 0;
