@@ -55,18 +55,27 @@ def quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="20"', axis='0 1 0',
     return robot_of(*joints, joint_of('neck_joint'))
 
 
-def biped_of(left, right, *more):
-    """Return a URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
+#: CHAIN: a biped's leg: names of joints, axes and places in their parents, m.
+CHAIN = (('HIP_Y', '0 0 1', '0 0 0'), ('HIP_P', '0 1 0', '0 0 0'), ('KNEE', '0 1 0', '0 0 -.3'),
+         ('ANKLE_P', '0 1 0', '0 0 -.3'), ('ANKLE_R', '1 0 0', '0 0 0'))
+
+
+def biped_of(left, right, *more, chain=CHAIN, limit='lower="-2" upper="2" velocity="20"',
+             turned='0 0 0'):
+    """Return a URDF of two legs, with hip, knee and ankle each; more joints hang on the base.
+
+    The feet are turned about their last joint by ``turned``, roll, pitch and yaw in rad.
+    """
     joints = []
     for side, y in ((left, 0.1), (right, -0.1)):
         parent = ''
-        for name, axis, at in (('HIP_Y', '0 0 1', f'0 {y} 0'), ('HIP_P', '0 1 0', '0 0 0'),
-                               ('KNEE', '0 1 0', '0 0 -.3'), ('ANKLE_P', '0 1 0', '0 0 -.3'),
-                               ('ANKLE_R', '1 0 0', '0 0 0')):
+        for name, axis, at in chain:
+            origin = f'<origin xyz="{at}" rpy="{turned if name == chain[-1][0] else "0 0 0"}"/>'
             joints.append(joint_of(
-                f'{side}_{name}', limit='lower="-2" upper="2" velocity="20"', axis=axis, at=at,
+                f'{side}_{name}', limit=limit, axis=axis,
+                more=origin if parent else f'<origin xyz="0 {y} 0"/>',
                 parent=f'{side}_{parent}_l' if parent else 'base',
-                shape=foot_at(0.05, 'box size=".2 .1 .02"') if name == 'ANKLE_R' else ''))
+                shape=foot_at(0.05, 'box size=".2 .1 .02"') if name == chain[-1][0] else ''))
             parent = name
     return robot_of(*joints, *(joint_of(name, axis='1 0 0', parent=parent, at='0 0 -.02')
                                for name, parent in more))

@@ -39,6 +39,7 @@ from cpg_ros.simulation.robot_model import find_model, SimulationError
 from cpg_ros.simulation.robot_setup.description_match import (
     checked,
     RobotCheck,
+    sole_up,
     walking_faults,
 )
 from cpg_ros.simulation.robot_setup.first_robot import robot_from
@@ -47,7 +48,6 @@ from cpg_ros.simulation.robot_setup.model_reading import (
     geometry_from,
     load_mjcf,
     read_biped,
-    soled,
     SolesError,
 )
 
@@ -158,7 +158,7 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
     if faults := walking_faults(robot, description):
         raise DescriptionError(f'nothing is written, as what would be does not walk: {faults[0]}')
     if len(robot.legs) == 2:
-        robot, feet = _biped(args, robot)
+        robot, feet = _biped(args, robot, description)
     else:
         geometry = geometry_from(robot, description)
         others = [leg for leg in robot.legs if leg not in geometry.legs]
@@ -183,13 +183,13 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
     return load_robot(str(args.make.absolute()))
 
 
-def _biped(args: Namespace, robot: Robot) -> tuple[Robot, str]:
+def _biped(args: Namespace, robot: Robot, description: RobotDescription) -> tuple[Robot, str]:
     """Return a biped with its links and soles, and a line on its feedback."""
-    if not soled(robot):
-        joints = next(iter(robot.legs.values()))
-        raise DescriptionError(
-            f'legs of {len(joints)} joints ({", ".join(joint.name for joint in joints)}): on two '
-            'legs a robot needs five or six in each, to step aside and to keep its soles level')
+    last = max((joint.name for joint in next(iter(robot.legs.values()))),
+               key=lambda name: len(description.chain(name)))
+    if sole_up(description, last)[2] < 1.0:
+        return robot, ('feedback: none, as the soles are not level with all joints at 0: turn the '
+                       'feet in the description so that they are')
     try:
         return (replace(robot, biped=read_biped(args.mjcf or str(args.urdf), robot)),
                 'feedback: of a biped with soles')

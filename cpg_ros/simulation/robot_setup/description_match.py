@@ -23,7 +23,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import combinations
-from math import inf, nan
+from math import acos, inf, nan
 from typing import Any
 
 from cpg_ros.common.command_line import table
@@ -40,6 +40,7 @@ from cpg_ros.motion.robot import Joint, Motion, Robot
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 #: ROUNDING: difference of limits, rad or rad/s, that is ignored, as files have rounded limits.
 ROUNDING = 1e-4
@@ -55,6 +56,9 @@ LONGEST_LEG, DENSITIES = 5.0, (5.0, 6000.0)
 FORWARD, LEAST = 0.25, 0.002
 #: LEVEL: largest tilt of a sole in the stand, rad.
 LEVEL = 0.1
+#: A flat foot. PLANE: least cosine between normals on one face; FLAT: least area of its face over
+#: that of its shadow; PARTLY: the same of a foot with a heel and toes, from below.
+PLANE, FLAT, PARTLY = 0.98, 0.5, 0.2
 #: FORWARD_GAITS: gaits in which a robot walks forward, with alternating legs.
 FORWARD_GAITS = ('walk', 'trot', 'pace', 'tripod', 'run')
 #: USUAL_FREQUENCY: default stride frequency, Hz.
@@ -269,10 +273,37 @@ def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
         if high > 0.0:
             yield (f'{leg}: in the stand its foot is {high:.3g} m above its lowest joint: its '
                    f"joints' limits, axes or offsets do not let it stand")
-        tilt = float(np.arccos(np.clip(turn[2, 2], -1.0, 1.0)))
-        if len(robot.legs) == 2 and len(chain.joints) > 4 and tilt > LEVEL:
-            yield (f'{leg}: in the stand its sole is {tilt:.2g} rad off level, if it is level '
-                   'with all joints at 0')
+        if len(robot.legs) == 2 and len(chain.joints) > 4:
+            up = sole_up(known, chain.joints[-1])
+            if (tilt := acos(min(1.0, float((turn @ up)[2])))) > LEVEL:
+                yield f'{leg}: in the stand its sole is {tilt:.2g} rad off level'
+
+
+def sole_up(known: RobotDescription, last: str) -> np.ndarray:
+    """Return which way is up from the sole below a joint with all joints at 0, shape (3,).
+
+    It is the base's, unless the foot is flat on another side only.
+    """
+    points, up = known.shapes(last), np.array([0.0, 0.0, 1.0])
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        return up
+    ankle = known.frame(last)[0]
+    normals, areas = hull.equations[:, :3], np.array([
+        0.5 * np.linalg.norm(np.cross(points[b] - points[a], points[c] - points[a]))
+        for a, b, c in hull.simplices])
+
+    def flat(down: np.ndarray) -> float:
+        """Return the area of the face on a side over that of the shadow on its plane."""
+        return float(2.0 * areas[normals @ down > PLANE].sum()
+                     / max(np.abs(normals @ down) @ areas, 1e-12))
+
+    # Of the top and the bottom, the one that is further from the ankle.
+    down = max(normals, key=lambda normal: (
+        round(areas[normals @ normal > PLANE].sum() / areas.sum(), 2),
+        np.max((points - ankle) @ normal)))
+    return up if flat(-up) > PARTLY or flat(down) < FLAT else -down
 
 
 def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator[str]:

@@ -34,10 +34,9 @@ from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import HARMONICS, Joint, Robot
 from cpg_ros.motion.robot_file import LIMITS
 from cpg_ros.networks.registry import NETWORKS, numbered
-from cpg_ros.simulation.robot_setup.description_match import unlimited
+from cpg_ros.simulation.robot_setup.description_match import sole_up, unlimited
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.spatial import ConvexHull, QhullError
 
 #: Height of the stand over the length of the stretched leg. UPRIGHT: on two legs, to the ankle;
 #: CROUCHED: on more.
@@ -56,12 +55,12 @@ MARGIN, USED = 0.1, 0.8
 #: STARTS: poses from which a stand is searched; MIDDLE: weight of the distance from the middle of
 #: the joints' ranges; OTHER_WAY, STRAIGHT: price of a knee that is bent the unusual way or not.
 STARTS, MIDDLE, OTHER_WAY, STRAIGHT = 8, 1e-3, 0.3, 1.0
+#: NARROW: width of the ranges from which the first of them are drawn, rad.
+NARROW = 1.5
 #: NEAR: price of a stand up to which no other is searched.
 NEAR = 1e-5
 #: BENT: least distance of a bent knee from the line from hip to foot, over the leg's length.
 BENT = 0.03
-#: FLAT: least area of the face of a flat foot over that of its shadow on the face's plane.
-FLAT = 0.5
 
 
 def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
@@ -73,10 +72,16 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
         legs: its legs, as of ``legs_in``.
 
     Raises:
-        DescriptionError: the links make no tree, a leg cannot be bent, or a joint has no room to
-            move.
+        DescriptionError: the links make no tree, a leg cannot be bent, a joint has no room to
+            move, or two legs have not five or six joints.
 
     """
+    counts = {len(legs[leg]) for leg in legs}
+    if len(legs) == 2 and not counts <= {5, 6}:
+        joints = next(legs[leg] for leg in legs)
+        raise DescriptionError(
+            f'legs of {len(joints)} joints ({", ".join(joints)}): on two legs a robot needs five '
+            'or six in each, to step aside and to keep its soles level')
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
@@ -148,7 +153,8 @@ class _StandingLeg:
                  and (k or abs(axes[k, 2]) < 0.7)]
         biped, count = len(legs) == 2, len(axes)
         if not pairs or (chain.lengths[-1] < 1e-3 and not biped):
-            why = ('no two joints in a row turn about parallel axes, so that it cannot be bent'
+            why = ('no two joints in a row turn about parallel axes: legs whose knee has no such '
+                   'neighbour are not supported'
                    if not pairs else f'nothing is known of what is below {chain.joints[-1]}, not '
                    'where its foot is: give it a <collision> shape, or install the package of '
                    'its meshes')
@@ -164,10 +170,15 @@ class _StandingLeg:
             aside += tibia * (np.cos(LOWERED) * out - [0.0, 0.0, np.sin(LOWERED)])
         level = bend + 2 < count and aside is None
         if level:
-            end = count - 1
-        top = 0 if abs(chain.axes[0, 1]) > 0.7 else bend
+            # The ankle, where it pitches: the last of the parallel joints.
+            end = bend + 1
+            while end + 1 < count and abs(axes[end] @ axes[end + 1]) > 0.99:
+                end += 1
+        # Where only knee and ankle are in a row, the hip that pitches is further up.
+        hips = range(bend if end == bend + 1 else min(bend, 1))
+        top = next((k for k in hips if abs(chain.axes[k, 1]) > 0.7), bend)
         return cls(chain, low, high, bend, top, end,
-                   _up(known, chain.joints[-1]) if level else None, aside, biped)
+                   sole_up(known, chain.joints[-1]) if level else None, aside, biped)
 
     @property
     def height(self) -> float:
@@ -188,6 +199,9 @@ class _StandingLeg:
         middle, length = 0.5 * (self.low + self.high), float(sum(self.chain.lengths))
         wide = self.high - self.low
         draws = np.random.default_rng(0).uniform(0.1, 0.9, (STARTS - 1, len(middle)))
+        # Of joints that turn almost anywhere, first a part of the range.
+        width = np.where(np.arange(STARTS - 1)[:, None] < STARTS // 2, np.minimum(wide, NARROW),
+                         wide)
 
         def off(angles: np.ndarray) -> np.ndarray:
             axes, points, turn = self.chain.posed(angles)
@@ -200,7 +214,7 @@ class _StandingLeg:
                              *axes[self.bend, ::2], *tilt, *rest])
 
         best, price = middle, inf
-        for start in (middle, *(self.low + draw * wide for draw in draws)):
+        for start in (middle, *(middle + (draws - 0.5) * width)):
             if price > NEAR:
                 found = least_squares(off, start, bounds=(self.low, self.high), x_scale=wide)
                 if (cost := 2.0 * float(found.cost) + self._way(found.x)) < price:
@@ -246,28 +260,6 @@ class _StandingLeg:
                         'keeps the foot level' if k > self.bend + 1 or k == self.end
                         else 'bends in swing')
         return weights, roles
-
-
-def _up(known: RobotDescription, last: str) -> np.ndarray:
-    """Return which way is up from the sole below a joint with all joints at 0, shape (3,).
-
-    It is the base's, unless the foot is flat on another side.
-    """
-    points, up = known.shapes(last), np.array([0.0, 0.0, 1.0])
-    try:
-        hull = ConvexHull(points)
-    except (QhullError, ValueError):
-        return up
-    ankle = known.frame(last)[0]
-    normals, areas = hull.equations[:, :3], np.array([
-        0.5 * np.linalg.norm(np.cross(points[b] - points[a], points[c] - points[a]))
-        for a, b, c in hull.simplices])
-    faces = [(float(areas[normals @ normal > 0.995].sum()), normal) for normal in normals]
-    # Of the top and the bottom, the one that is further from the ankle.
-    area, down = max(faces, key=lambda face: (round(face[0] / max(areas.sum(), 1e-12), 2), float(
-        np.max((points - ankle) @ face[1]))))
-    shadow = 0.5 * float(np.abs(normals @ down) @ areas)
-    return up if area < FLAT * shadow or -down @ up > 0.99 else -down
 
 
 def _fitting(robot: Robot) -> Robot:

@@ -45,6 +45,8 @@ UNLIKE = 0.2
 SHORTER, HIGHER = 0.35, 0.4
 #: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
 CROSSWISE = 1.3
+#: ENDLESS: range of a joint from which on it counts as unlimited, rad.
+ENDLESS = 100.0
 #: MOST_JOINTS: largest number of driven joints of a leg.
 MOST_JOINTS = 6
 
@@ -171,6 +173,9 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
              if 1 < len(limb.joints) <= MOST_JOINTS]
     why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
            'images of each other')
+    lowest = min(_limbs(description, paths, np.array([0.0, 1.0, 0.0])), key=_bottom, default=None)
+    if lowest is not None and len(lowest.joints) > MOST_JOINTS:
+        why += f' (the lowest limb, from {lowest.joints[0]} on, has {len(lowest.joints)})'
     limbs.sort(key=lambda limb: float(limb.anchors[0, 0]))
     left, right = ([limb for limb in limbs if sign * limb.anchors[0, 1] > 0.0]
                    for sign in (1.0, -1.0))
@@ -267,7 +272,8 @@ def _held(description: RobotDescription, leg: Sequence[str], name: str) -> str:
 
 def _wheel(description: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
     """Return whether a joint is a wheel: unlimited, below two limited, parallel to the last."""
-    before = [name for name in leg if description.joints[name].kind == 'revolute']
-    if joint.kind != 'continuous' or joint.name != leg[-1] or len(before) < 2:
+    before = [name for name in leg[:-1] if description.joints[name].kind == 'revolute']
+    endless = joint.kind == 'continuous' or joint.upper - joint.lower > ENDLESS
+    if not endless or joint.name != leg[-1] or len(before) < 2:
         return False
     return bool(abs(description.direction(joint.name) @ description.direction(before[-1])) > 0.7)

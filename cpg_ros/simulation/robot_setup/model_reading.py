@@ -283,11 +283,6 @@ def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
                    gains={'height': round(height, 4), 'step_width': round(wide, 4)})
 
 
-def soled(robot: Robot) -> bool:
-    """Return whether a robot has two legs whose feet can be kept level: of five or six joints."""
-    return len(robot.legs) == 2 and all(len(leg) in (5, 6) for leg in robot.legs.values())
-
-
 def _rounded(values: np.ndarray) -> tuple[float, ...]:
     return tuple(float(value) for value in np.round(values, 12) + 0.0)
 

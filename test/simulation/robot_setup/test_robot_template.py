@@ -95,6 +95,40 @@ def test_a_biped_is_made(tmp_path):
     assert pitch.weights[0] < 0.0 < knee.weights[1]
 
 
+@pytest.mark.parametrize(('chain', 'limit'), [
+    # As an H1-2: the hip pitches above its roll, whose range is far from symmetric.
+    ((('HIP_Y', '0 0 1', '0 0 0'), ('HIP_P', '0 1 0', '0 0 0'), ('HIP_R', '1 0 0', '0 0 0'),
+      ('KNEE', '0 1 0', '0 0 -.4'), ('ANKLE_P', '0 1 0', '0 0 -.4'),
+      ('ANKLE_R', '1 0 0', '0 0 -.02')), 'lower="-0.43" upper="2.6" velocity="20"'),
+    # As a Sigmaban: joints without limits, and an ankle that rolls beside where it pitches.
+    ((('HIP_Y', '0 0 1', '0 0 0'), ('HIP_R', '1 0 0', '.02 0 -.06'),
+      ('HIP_P', '0 1 0', '-.02 0 0'), ('KNEE', '0 1 0', '0 0 -.14'),
+      ('ANKLE_P', '0 1 0', '0 0 -.14'), ('ANKLE_R', '1 0 0', '.02 .016 0')),
+     'lower="-3.14" upper="3.14" velocity="20"')])
+def test_bipeds_stand_with_bent_knees_and_level_soles(tmp_path, chain, limit):
+    urdf = biped_of('left', 'right', chain=chain, limit=limit)
+    if chain[2][0] == 'HIP_R':
+        # Of those joints only the roll has that range.
+        for name in ('HIP_Y', 'HIP_P', 'KNEE', 'ANKLE_P', 'ANKLE_R'):
+            for side in ('left', 'right'):
+                head, tail = urdf.split(f'name="{side}_{name}"', 1)
+                urdf = f'{head}name="{side}_{name}"' + tail.replace(
+                    limit, 'lower="-1.5" upper="2" velocity="20"', 1)
+    angles = {joint.name[6:]: joint.offset for joint in made(tmp_path, urdf).legs['right']}
+    assert angles['KNEE'] == pytest.approx(0.49, abs=0.02)
+    assert angles['HIP_P'] + angles['KNEE'] + angles['ANKLE_P'] == pytest.approx(0.0, abs=5e-3)
+    assert [angles[name] for name in ('HIP_Y', 'HIP_R', 'ANKLE_R')] == pytest.approx(
+        [0.0] * 3, abs=5e-3)
+
+
+def test_soles_that_are_not_level_at_zero_have_no_balance(tmp_path, capsys):
+    robot = made(tmp_path, biped_of('left', 'right', turned='0 0.5 0'))
+    assert robot.biped is None
+    assert 'feedback: none, as the soles are not level with all joints' in capsys.readouterr().err
+    _, pitch, knee, ankle, _ = robot.legs['left']
+    assert pitch.offset + knee.offset + ankle.offset == pytest.approx(-0.5, abs=5e-3)
+
+
 def test_a_biped_that_cannot_step_aside_is_refused_by_its_joints(tmp_path, capsys):
     path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
     path.write_text(biped_of('left', 'right').replace('left_ANKLE_R" type="revolute"',
