@@ -14,9 +14,9 @@
 
 """The core of the pattern in C: structs of ``c/host.h`` and functions of ``c/host.c``.
 
-It is compiled of the parts that an export is made of, once for all robots and networks; each
-network's own library steps it (integration.c_kernel). Arrays here own all memory. Functions
-hold the interpreter's lock: they take some microseconds, and other threads write what they read.
+The parts of an export, compiled once for all robots and networks; each network has a library of
+its own (integration.c_kernel). Arrays here own all memory. Functions hold the interpreter's lock:
+they take microseconds, and other threads write what they read.
 """
 
 import ctypes
@@ -134,8 +134,7 @@ def confine(target: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt:
             position: np.ndarray, velocity: np.ndarray, behind: np.ndarray) -> int:
     """Move joints to the wanted positions within their limits; count those held back.
 
-    Where a limit bites, and where a joint catches up, velocity is the difference quotient, so that
-    it stays the derivative of what is published.
+    Where a limit acts, and where a joint catches up, velocity is the difference quotient.
 
     Args:
         target: positions, rad, shape (joints,).

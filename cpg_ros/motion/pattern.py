@@ -14,10 +14,9 @@
 
 """The moving pattern: from plans to joint positions and velocities, tick by tick.
 
-A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
-pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
-network with its orbit. All three run on the pattern's own clock, which is slowed while they
-move whenever a joint would exceed the speed that the gaits themselves reach, and after a stall.
+A gait switch cross-fades two networks whose legs share one phase; a ramp scales the pattern
+between the stand and the gait; a watchdog compares the network with its orbit. The pattern's clock
+slows where a joint would exceed the speed of the gaits, and after a stall.
 """
 
 from collections import deque

@@ -14,19 +14,14 @@
 
 """From cells to joints by the cells' phase: for relaxation oscillators.
 
-A Morris-Lecar cell jumps: its potential crosses most of its range within a few per cent of a
-stride, and on the way it may double back so that neither variable gives the phase. No joint can
-follow that. Instead every cell is followed as a lock-in amplifier follows a signal: a phase and an
-amplitude run with the strides and are drawn to what the cell does, by what its two variables and
-the gait's orbit at that phase differ by, along the first harmonic of that orbit and across it. On
-the orbit there is no difference and they run evenly; elsewhere the mean pull over a stride is the
-sine of the phase error, whatever the waveform.
+The potential of a Morris-Lecar cell jumps, and no joint can follow it. A phase and an amplitude
+follow the cell as a lock-in amplifier follows a signal: the difference between the cell's two
+variables and the gait's orbit at that phase pulls them, along the first harmonic of the orbit and
+across it. The mean pull over a stride is the sine of the phase error.
 
 A joint is a smooth function of that phase: x is the cell's waveform up to a few harmonics, y the
-derivative of x by phase in radians, both scaled by ``1 - (1 - a^2)^3``, a the amplitude over the
-orbit's, at most 1: a cell that comes to rest moves its joints less. Phase and amplitude change at
-rates that are continuous in time, and velocities are made of those rates: they are the
-derivatives of the positions whatever the network does, and whatever is done to it.
+derivative of x by phase in radians, both scaled by ``1 - (1 - a^2)^3`` with the amplitude a, at
+most 1. Phase and amplitude have continuous rates, of which the joints' velocities are made.
 """
 
 from functools import lru_cache

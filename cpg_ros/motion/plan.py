@@ -245,8 +245,8 @@ class GaitPlan(ShortRepr):
 def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     """Solve for a preset's gait with parameters of its own, and judge its stability.
 
-    Of several orbits it is one that attracts within the gait's class, if any does; of those, the
-    one reached from the preset or else that whose period is nearest to the preset's.
+    Of several orbits it takes one that attracts within the gait's class, if any does; of those,
+    the one reached from the preset, or else that of the period nearest to the preset's.
 
     Raises:
         CpgError: bad parameters, or no such orbit (NoOrbit).
@@ -265,8 +265,6 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
 
 def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
     """Return why the generator would reject a gait, whatever the robot, or ''.
-
-    It knows the parameters only, and comes to the gait from the shipped preset.
 
     Args:
         orbit: the gait's.
@@ -293,7 +291,7 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         robot: legs, joints and limits.
         name: what to call it, the preset's name or the gait's.
         preset: the gait and parameters near which it is known.
-        network: parameters.
+        network: its parameters.
         frequency: strides per second (Hz); 0 takes one model time unit as a second.
         amplitude: factor on every joint's readout weights.
         gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.

@@ -15,11 +15,10 @@
 """A robot as the generator sees it: legs, joints, which cell drives each joint and how, limits.
 
 A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
-Morris-Lecar cell: the first harmonics of it), y the derivative of that by phase (in radians),
-psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout). On every gait x runs from -1 to
-1, so weights are in radians. A gait can have offsets and weights of its own, its motion. Where
-legs take strides of different lengths the weights are ``in_place + stride (w - in_place)``, stride
-from -1 to 1.
+Morris-Lecar cell: the first harmonics of it), from -1 to 1, y the derivative of that by phase (in
+radians), psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout), and weights are in
+rad. A gait's motion can replace offsets and weights. Strides from -1 to 1 make the weights
+``in_place + stride (w - in_place)``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -62,7 +61,7 @@ class Joint:
 class SteeringTable:
     """Measured speed and yaw rate of a robot by stride: the strides for a commanded speed.
 
-    Four columns of one table, its rows by rising speed.
+    Rows are by rising speed.
 
     Attributes:
         speed: forward, m/s.

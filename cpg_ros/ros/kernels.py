@@ -130,8 +130,7 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
 def compile_apart(node: Any, part: str, seconds: float) -> None:
     """Compile in a process of its own, whose results this one then loads from the disk.
 
-    The compiler keeps the interpreter's lock for up to seconds, and the ticks of a robot that
-    moves would wait for it.
+    The compiler keeps the interpreter's lock for up to seconds, for which a tick would wait.
 
     Args:
         node: a StartedNode that moves a robot meanwhile.

@@ -14,9 +14,8 @@
 
 """The exported C as the kernels of a process, in place of those that numba compiles.
 
-The equations and their steps are those that an export has (field_source, ``c/network.c``), in
-float64 and for histories of any length; the system's compiler makes a library of them, which is
-kept on disk. A step takes about as long as numba's; lanes are stepped one by one.
+Equations and steps are those of an export (field_source, ``c/network.c``) in float64. The system's
+compiler makes a library of them, which is kept on disk. Lanes are stepped one by one.
 """
 
 from collections.abc import Iterator, Sequence

@@ -14,8 +14,8 @@
 
 """Compilation of the numerical kernels, and the elementary functions that they share.
 
-By numba, which is loaded when the first of them runs: what the generator needs without feedback is
-C. Where numba is missing they are plain Python, which is too slow for feedback and simulation.
+numba is loaded when the first of them runs; the generator needs none without feedback. Without
+numba they are plain Python, which is too slow for feedback and simulation.
 """
 
 from contextlib import AbstractContextManager, nullcontext
@@ -76,9 +76,8 @@ def jit_entry(function):
 def specialised(kernel: Kernel, *arguments):
     """Return a kernel's machine code for arguments like these, to be called as it is.
 
-    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
-    than a small kernel does. The machine code does not look: the arguments it is called with must
-    be of these types, arrays of these numbers of dimensions and orders in memory.
+    It saves the look at the type of every argument, which takes longer than a small kernel. The
+    arguments must be of the same types, dimensions and orders in memory.
     """
     return _numba().specialised(kernel.code, *arguments) if COMPILED else kernel
 
@@ -117,9 +116,8 @@ def _reduced(z):
 def tanh(x):
     """Hyperbolic tangent, within 4 units in the last place, without a branch.
 
-    libm's tanh cannot be vectorised; this one runs over the cells of a network several at a
-    time. expm1 by reduction and a Taylor polynomial of degree 13, then
-    tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
+    It can be vectorised, unlike libm's: expm1 by reduction and a Taylor polynomial of degree 13,
+    then tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
     """
     z = abs(x)
     power, rest = _reduced(2.0 * (20.0 if z > 20.0 else z))

@@ -14,17 +14,12 @@
 
 """Fixed-step RK4 integration over a history of nodes, for real time and simulation.
 
-A history is three arrays of shape (nodes, components), used as a ring: the state x at each
-node and its slope on either side (``after`` for the interval that starts there, ``before`` for
-the one that ends there). The two differ only where the right-hand side jumps: at the start of
-a simulation and where parameters are changed. Delayed values come from the cubic Hermite
-interpolant of their interval, so the method is of fourth order in the step for any delay of at
-least one step.
+A history is a ring of nodes: the state x and the slopes that arrive there (``before``) and leave
+(``after``), which differ where parameters change. Delayed values come from the cubic Hermite
+interpolant, so the method is of fourth order for any delay of at least one step.
 
-Components are those of the network (cells, or cells times their variables) times lanes: several
-copies of the network (lanes) with their own coefficients and delays advance together in vector
-registers. In real time there is one lane. For networks without delay the ring only serves the
-interpolation between nodes.
+Lanes are copies of the network with their own coefficients and delays, which advance together in
+vector registers: an array has components times lanes numbers. In real time there is one lane.
 """
 
 from collections.abc import Callable

@@ -14,9 +14,8 @@
 
 """Kernel code of a network's right-hand side, in Python and C: loops over all cells and lanes.
 
-A function of what another cell has is worked out where it is and then fetched, so that it is
-worked out once. Loops are short: one for every elementary function and one for every result, which
-compilers turn into vector instructions.
+A function of another cell's variables is computed at that cell, once, and then fetched. Each
+elementary function and each result has a loop of its own, which compilers vectorise.
 """
 
 from collections.abc import Sequence

@@ -94,9 +94,8 @@ def bound_by_first_call(kernel):
 def renamed(function, key: str):
     """Give a function that is compiled once for each network a name of its own for this one.
 
-    numba names machine code by the function's qualified name and a running number. Code that two
-    processes have put into the disk cache under one name is taken for the same when a third one
-    loads both: a network would run another's equations, on arrays of another length.
+    numba takes two functions of the same qualified name in its disk cache for one and the same: a
+    network would run another's equations.
 
     Args:
         function: to be renamed.

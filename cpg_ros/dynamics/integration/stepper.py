@@ -30,8 +30,8 @@ import numpy as np
 class Stepper:
     """One network advancing in model time, evaluated between its nodes.
 
-    The parameters, the delay among them, can be changed while it runs: the history is kept,
-    and the next step starts with the slope of the new parameters.
+    Parameters can be changed while it runs: the history stays, and the next step starts with the
+    slope of the new ones.
 
     Attributes:
         now: x, x', x'' at the output instant, shape (3, components), overwritten by ``advance``.
@@ -143,11 +143,9 @@ class Stepper:
                   slope: Callable[[np.ndarray], np.ndarray]) -> None:
         """Add a motion to the newest state and to all of the history before it.
 
-        Unlike an offset to the newest state alone, it leaves no step that a delay brings back.
-
         Args:
-            motion: of model times up to 0, that of the newest node; (n,) to (n, components).
-            slope: its derivative, per model time, likewise.
+        motion: of model times up to 0, that of the newest node; (n,) to (n, components).
+        slope: its derivative, per model time, likewise.
 
         """
         nodes, newest = len(self._x), int(self.clock[0])

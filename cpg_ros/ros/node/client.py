@@ -14,7 +14,7 @@
 
 """Services and parameters of other nodes, called from asyncio.
 
-Responses are polled: the calling node need not be spun; if it is, its executor ignores them.
+Responses are polled: nobody has to spin the calling node.
 """
 
 import asyncio

@@ -109,6 +109,7 @@ def library() -> ctypes.CDLL:
     loaded.publish.argtypes, loaded.publish.restype = (ctypes.c_void_p, whole, whole), whole
     loaded.run.argtypes, loaded.run.restype = (ctypes.c_void_p,), whole
     loaded.wait_until.argtypes, loaded.wait_until.restype = (whole,), whole
+    loaded.system_offset.argtypes, loaded.system_offset.restype = (), whole
     loaded.sense.argtypes, loaded.tick.argtypes = (ctypes.c_void_p,), (ctypes.c_void_p, whole)
     loaded.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
     return loaded

@@ -63,8 +63,7 @@ def termination_signals() -> list[signal.Signals]:
 def exit_code(code: int, *threads: threading.Thread | None) -> int:
     """Return the exit code once the threads have ended; if one does not, end the process with it.
 
-    An interpreter that winds up under a thread which then returns from compiled C++ code is
-    aborted by the C++ runtime.
+    The C++ runtime aborts a process whose thread returns from C++ to an ended interpreter.
     """
     for thread in filter(None, threads):
         thread.join(PATIENCE)
@@ -89,14 +88,11 @@ LOCALHOST = Path(__file__).with_name('localhost.xml')
 def leave_shared_memory() -> None:
     """Make this process use UDP alone, also on this computer; call it before rclpy.init.
 
-    A participant that joins the graph on the same computer has a port of shared memory, and the
-    first to send there checks whether it is alive. If its listener is not waiting at that instant,
-    Fast DDS sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every
-    publisher of the process needs: a robot would be without commands for that time.
-
-    With the discovery range LOCALHOST the middleware of ROS adds shared memory itself. A profile
-    of Fast DDS then restricts the process to the loopback interface in its place. A transport,
-    profiles or static peers that the user has chosen stay.
+    When a participant joins on the same computer, Fast DDS checks its port of shared memory, and
+    may sleep for 333 ms (a third of healthy_check_timeout_ms) with the lock that every publisher
+    needs. With the discovery range LOCALHOST the middleware adds shared memory itself; a profile
+    that restricts the process to the loopback interface takes its place. A transport, profiles and
+    static peers of the user stay.
     """
     environment = os.environ
     name, udp = TRANSPORT
@@ -114,8 +110,7 @@ def leave_shared_memory() -> None:
 class Lifecycle(LifecycleNodeMixin):
     """The states and services of https://design.ros2.org/articles/node_lifecycle.html.
 
-    rclpy decides at the creation of a node whether it is managed, before there are parameters:
-    this takes of a node what the mixin needs, so that a parameter can decide it.
+    A parameter can decide whether a node is managed; rclpy decides before there are parameters.
     """
 
     def __init__(self, node: Node, steps: Mapping[str, Callable[[], str]]) -> None:

@@ -191,10 +191,8 @@ class StrictParameterService(ParameterService):
     """rclpy's services in a callback group of their own, with changes applied in a thread.
 
     The executor stays free for what must not wait, such as a stop. Of several waiting changes of
-    the same parameters, only the last one that is valid is applied. Values of no known type,
-    unknown names and more than MOST of them are rejected with a reason: in rclpy 7.1 a value of no
-    known type raises an exception in the executor, so that one request ends the node, and an
-    unknown name is rejected without naming it.
+    the same parameters, only the last valid one is applied. Values of no known type, unknown names
+    and more than MOST parameters are rejected with a reason; rclpy 7.1 raises in the executor.
 
     Attributes:
         thread: applies the changes, once it is started.
@@ -354,9 +352,9 @@ class StrictParameterService(ParameterService):
 def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:
     """Return the changes that still have to be made, in order; drop those that are superseded.
 
-    A change is superseded by a later one that sets all of its parameters, and joins ``replaced``
-    of that one. Parameters in ``barriers`` may set others: no change is superseded across a
-    change that sets a barrier, and such a change only by the one right after it.
+    A later change that sets all parameters of an earlier one supersedes it, and lists it in
+    ``replaced``. Parameters in ``barriers`` may set others: none is superseded across a change
+    that sets a barrier, and such a change only by the one right after it.
     """
     remaining: list[_Change] = []
     for change in reversed(changes):

@@ -216,8 +216,9 @@ typedef struct {
     output *outputs[OUTPUTS];          /* NULL behind the last one */
 } loop;
 
-/* System time minus steady time, ns, of the narrowest of some readings. */
-static int64_t system_offset(void)
+/* Return system time minus steady time, ns, of the narrowest of some readings: a thread switch in
+ * between would add its length. */
+int64_t system_offset(void)
 {
     int64_t narrowest = INT64_MAX, offset = 0;
     for (int n = 0; n < 5 && narrowest > 20000; n++) {

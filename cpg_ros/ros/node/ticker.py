@@ -118,8 +118,7 @@ class RealTime:
 def _raise_others() -> None:
     """Schedule the other threads before all ordinary processes, and after the calling one.
 
-    Any of them may hold the interpreter lock or one of the middleware's, and would keep it while
-    an ordinary process runs in its place. Stops are served by one of them, too.
+    Any of them may hold a lock of the interpreter or the middleware; one of them serves stops.
     """
     own = threading.get_native_id()
     # Once more for what has been started meanwhile by one that was still an ordinary thread.
@@ -153,24 +152,6 @@ MOST_BEHIND = 1.0
 JITTER = 0.1
 #: STOPPED: time of the steady clock, s, after which a stop no longer waits for a still /clock.
 STOPPED = 0.2
-
-
-def system_offset() -> int:
-    """Return system time minus steady time, ns.
-
-    It is read between two readings of the steady clock, and again if they are far apart: a thread
-    switch in between would add its length to the offset.
-    """
-    narrowest, offset = 1 << 62, 0
-    for _ in range(5):
-        before = time.monotonic_ns()
-        system = time.time_ns()
-        width = time.monotonic_ns() - before
-        if width < narrowest:
-            narrowest, offset = width, system - before
-        if width < 20_000:
-            break
-    return offset
 
 
 class TickThread(threading.Thread):
@@ -228,12 +209,11 @@ class TickThread(threading.Thread):
 class Ticker(TickThread):
     """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
 
-    The deadlines stay on their grid, so the rate has no drift. A tick that is late by less than
-    a period is made up for at once; after a stall the periods that have passed are left out,
-    ``resume`` gets its length in s, and the next tick is at the next deadline. The stamp is that
-    of the deadline. With simulated time the deadlines are instants of ``/clock``: the ticker
-    pauses with the clock, and a jump back calls ``restart``; but after ``stop_moving`` it
-    continues by the steady clock if ``/clock`` stands still for STOPPED s or jumps back.
+    Deadlines stay on their grid, and stamps are deadlines. A tick that is late by less than a
+    period is made up for at once; after a stall the periods that have passed are left out, and
+    ``resume`` gets its length in s. With simulated time the deadlines are instants of ``/clock``,
+    and a jump back calls ``restart``; after ``stop_moving`` the ticker continues by the steady
+    clock if ``/clock`` stands still for STOPPED s or jumps back.
 
     Attributes:
         jumps: of simulated time back.
@@ -296,7 +276,11 @@ class Ticker(TickThread):
         if self._clock.ros_time_is_active:
             self._run_simulated()
         else:
-            self._run_steady(time.monotonic_ns(), lambda deadline: deadline + system_offset())
+            self._run_steady(time.monotonic_ns(), self._system_time)
+
+    def _system_time(self, deadline: int) -> int:
+        """Return a time of the steady clock by the system clock, ns."""
+        return deadline + int(self._library.system_offset())
 
     def _period(self) -> int:
         return round(1e9 / self.rate)
@@ -338,8 +322,7 @@ class Ticker(TickThread):
     def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
         """Return how far the deadline must leap, ns, and whether to leave out its tick, too.
 
-        Leaving it out keeps ticks apart after a stall; but where every sleep is longer than a
-        stall, some ticks must remain.
+        Leaving it out keeps ticks apart; where every sleep is longer than a stall, some remain.
         """
         resume = self._resume
         if resume is None:
