@@ -117,23 +117,6 @@ def test_whatever_is_asked_the_joints_move_smoothly(robot, asked, dt):
     assert (error <= (0.02 + 10.0 * dt) * fastest + 1e-9).all()
 
 
-@pytest.mark.parametrize('transition', [0.05, 0.3])
-def test_velocities_are_derivatives_where_strides_change_in_a_slowed_ramp(robot, transition):
-    trot, walk = (gait_plan(robot, gait, frequency=3.0) for gait in ('trot', 'walk'))
-    pattern, draws, rows = Pattern(trot, ramp=0.05, drive=StrideCommand(4)), np.random.default_rng(
-        31), []
-    for k in range(12):
-        pattern.steer(draws.uniform(-1.0, 1.0, 4), draws.uniform(0.6, 1.0))
-        # Short ramps and transitions would move joints too fast: the clock slows.
-        pattern.enable(bool(k % 3), 0.05)
-        pattern.apply((walk, trot)[k % 2], transition)
-        rows.append(run(pattern, 0.1, 0.001))
-    position, velocity, _ = (np.concatenate(row) for row in zip(*rows, strict=True))
-    steps = np.diff(position, axis=0) / 0.001
-    error = np.abs(steps - (velocity[1:] + velocity[:-1]) / 2.0)
-    assert error.max() < 0.05 * np.abs(velocity).max() and pattern.held == 0
-
-
 def test_strides_are_at_once_what_is_asked_while_nothing_moves(robot):
     pattern = Pattern(gait_plan(robot), enabled=False, drive=StrideCommand(4))
     pattern.steer(np.array([0.2, 0.4, 0.6, 0.8]), 0.7)

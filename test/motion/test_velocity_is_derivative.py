@@ -27,8 +27,9 @@ from pathlib import Path
 
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, PlanError
-from cpg_ros.motion.robot_file import read_robot
+from cpg_ros.motion.plan import plan, plan_gait, PlanError
+from cpg_ros.motion.robot_file import load_robot, read_robot
+from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth, spread
 import numpy as np
@@ -120,6 +121,28 @@ def check_own(rows, dt, plan):
     mean = (13.0 * (velocity[1:-2] + velocity[2:-1]) - velocity[:-3] - velocity[3:]) / 24.0
     step = (position[2:-1] - position[1:-2]) / dt
     assert (np.abs(step - mean) <= 0.005 * plan.speed + 1e-9).all()
+
+
+def test_where_strides_change_while_a_ramp_is_slowed():
+    robot, rate = load_robot('unitree_go2'), 2000.0
+    gaits = [plan_gait(robot, gait, frequency)
+             for gait, frequency in (('trot', 2.2), ('walk', 1.3), ('trot', 0.5), ('walk', 0.5))]
+    pattern, draws, rows = Pattern(gaits[0], 0.2, drive=StrideCommand(4)), np.random.default_rng(
+        5), []
+    for _ in range(60):
+        draw = draws.random()
+        if draw < 0.3:
+            # The network's own way to another gait is faster than the joints: the clock slows.
+            pattern.apply(gaits[draws.integers(4)], 0.0)
+        elif draw < 0.6:
+            pattern.enable(bool(draws.random() < 0.7), 0.2)
+        pattern.steer(draws.uniform(-1.0, 1.0, 4), draws.uniform(0.6, 1.3))
+        rows.append(run(pattern, 0.05, rate))
+    position, velocity = np.concatenate(rows).swapaxes(0, 1)
+    steps = np.diff(position, axis=0) * rate
+    beside = np.maximum(np.minimum(velocity[:-1], velocity[1:]) - steps,
+                        steps - np.maximum(velocity[:-1], velocity[1:]))
+    assert beside.max() < 0.02
 
 
 @EACH
