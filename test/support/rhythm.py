@@ -69,19 +69,6 @@ class Rhythm:
         return np.stack(columns, axis=1)
 
 
-@st.composite
-def recordings(draw, noise=0.0):
-    """Return times, a period and a generator of noise: even and uneven, short and long."""
-    period = 10.0 ** draw(st.floats(-3.0, 3.0))
-    cycles = draw(st.floats(2.1, 14.0))
-    random = np.random.default_rng(draw(st.integers(0, 2 ** 32)))
-    t = np.arange(int(cycles * draw(st.integers(30, 80))) + 1.0)
-    if draw(st.booleans()):
-        t += random.uniform(-0.4, 0.4, t.size)
-    t = (t - t[0]) * cycles * period / (t[-1] - t[0]) + draw(st.floats(-50.0, 50.0)) * period
-    return t, period, lambda x: x + noise * x.std() * random.standard_normal(x.shape)
-
-
 def around(phases):
     """Distances from whole cycles."""
     return np.abs((np.asarray(phases) + 0.5) % 1.0 - 0.5)

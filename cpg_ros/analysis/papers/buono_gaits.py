@@ -86,7 +86,7 @@ def _table_13(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 13'), gait.name
     couplings = ', '.join(PRINTED['table_13'][name])
     yield at.word(f'gait that is found with the couplings {couplings}', name, gait.rhythm.kind,
-                  note=f'period {gait.rhythm.end.period:.4f}; phases measured')
+                  note=f'period {gait.rhythm.cycle.period:.4f}; phases measured')
     yield at.stable(f'the {name} that is found',
                     multipliers(solve_orbit(gait.network, name)).leading)
 
@@ -139,7 +139,7 @@ def _figure_2(gait: SolvedGait) -> Iterator[ReproducedRow | Picture]:
     if gait.name == 'walk':
         yield Citation(AUTHORS, 'Figure 2').word('order in which the cells peak in the walk',
                                                  'u_1 u_3 u_2 u_4', order)
-    run, period = gait.rhythm.run, gait.rhythm.end.period
+    run, period = gait.rhythm.run, gait.rhythm.cycle.period
     drawn = run.t >= run.t[-1] - 4.0 * period
     cells = gait.network.cells
     yield Picture(AUTHORS, f'Figure 2, {where}', f'The {gait.name} of Table 13, four periods.',

@@ -32,7 +32,6 @@ from cpg_ros.analysis.papers.row import (
 )
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.solve_orbit import solve_orbit
-from cpg_ros.fitting.gaits.mean_cycle import mean_cycle
 from cpg_ros.fitting.gaits.recognition import lag, shape_difference
 from cpg_ros.networks.library.biped import Biped, GAITS, PRIMARY
 from cpg_ros.networks.symmetry import admissible_pairs, D2, Symmetry
@@ -48,7 +47,6 @@ PRINTED = printed_values('rashidi')
 SETTLING, CLOSE = 1500.0, 1.0
 #: SAME: difference in shape, over the RMS, up to which two waveforms are one.
 SAME = 0.02
-POINTS = 512
 
 
 @cache
@@ -85,9 +83,7 @@ def signals(seen: Rhythm) -> list[str]:
 
     Measured on the mean cycle: cells whose waveforms agree after the best shift have one name.
     """
-    run, period = seen.run, seen.end.period
-    late = run.t >= run.t[-1] - 10.0 * period
-    cycle = mean_cycle(run.t[late], run.x[late, :4], period)(np.arange(POINTS) / POINTS)
+    cycle = seen.cycle.signals[:, :4]
     first: list[int] = []
     names = []
     for cell in range(4):
@@ -152,7 +148,7 @@ def primary() -> Iterator[ReproducedRow | Picture]:
         name, phases = named(gait), seen.end.phases
         at = Citation(AUTHORS, 'Table 2')
         yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
-                      note=f'period {seen.end.period:.4f}')
+                      note=f'period {seen.cycle.period:.4f}')
         yield at.stable(f'the {name} attracts',
                         multipliers(solve_orbit(printed(gait), gait)).leading)
         at = Citation(AUTHORS, 'Figure 2')
@@ -188,7 +184,7 @@ def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
 
 def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
     run = seen.run
-    late = run.t >= run.t[-1] - 5.0 * seen.end.period
+    late = run.t >= run.t[-1] - 5.0 * seen.cycle.period
     shapes = [int(signal[1]) - 1 for signal in signals(seen)]
     return Picture(AUTHORS, figure, caption, trajectories(
         f'{AUTHORS}, {figure}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,

@@ -22,8 +22,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TYPE_CHECKING
 
+from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.floquet import stable, VERDICTS
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
+from cpg_ros.dynamics.settling import last_cycle, LimitCycle
 from cpg_ros.fitting.gaits.recognition import recognise, Recognition
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -332,8 +334,6 @@ def _bend(fraction: np.ndarray) -> tuple[float, float]:
 
 #: Fraction of a simulation, from its end, on which the rhythm is measured.
 SETTLED = 0.15
-#: Samples from which a rhythm is measured, at most.
-SAMPLES = 4000
 #: DISTURBANCE: standard deviation of a disturbed start, in the units of the cells.
 DISTURBANCE = 0.01
 
@@ -363,11 +363,13 @@ class Rhythm:
 
     Attributes:
         run: from the start on.
-        end: phases, period, symmetries and gait.
+        cycle: its last one.
+        end: phases, symmetries and gait.
 
     """
 
     run: Trajectory
+    cycle: LimitCycle
     end: Recognition
 
     @property
@@ -393,11 +395,11 @@ def rhythm(network: Network, start: Sequence[float] | np.ndarray, t_end: float, 
         gaits: to choose from.
 
     Raises:
-        InputError: it comes to rest, or is not periodic.
+        InputError: it ends at rest, or does not repeat.
 
     """
     run = simulate(network, np.asarray(start, dtype=float), t_end, network.step, progress=False)
-    first = int((1.0 - SETTLED) * run.t.size)
-    every = max(1, (run.t.size - first) // SAMPLES)
-    gait = recognise(run.t[first::every], run.x[first::every, :network.cells], group, gaits)
-    return Rhythm(run, gait)
+    cycle = last_cycle(run, network.cells, int((1.0 - SETTLED) * run.t.size))
+    if cycle is None:
+        raise InputError('the simulation ends at rest, or does not repeat')
+    return Rhythm(run, cycle, recognise(cycle.signals[:, :network.cells], group, gaits))

@@ -28,7 +28,7 @@ from typing import Any
 
 from cpg_ros.fitting.gaits.foot_contacts import FootContacts, NEVER, OFTEN
 from cpg_ros.fitting.gaits.leg_names import HEXAPOD, role_of
-from cpg_ros.fitting.gaits.mean_cycle import blocks, PhaseAverage
+from cpg_ros.fitting.gaits.mean_cycle import blocks, evaluate_coefficients, PhaseAverage
 from cpg_ros.fitting.gaits.recognition import best_shift, recognise
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
@@ -332,7 +332,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             mirrored.append(other)
         total = total + sense * terms
     assert total is not None
-    return best_shift(total)[0], mirrored, sense_known
+    return float(best_shift(total)[0]), mirrored, sense_known
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
@@ -417,11 +417,8 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
 
     """
     table = {gait: _symmetry(network, gait) for gait in network.gaits()}
-    places = np.arange(2 * SAMPLES + 1) / SAMPLES
-    turned = np.exp(2j * np.pi * np.outer(places, np.arange(len(c))))
-    turned[:, 1:] *= 2.0
-    group = next(iter(table.values())).group
-    recognised = recognise(places, (turned @ c).real, group, table, 1.0, BY_CELLS)
+    cycle = evaluate_coefficients(c, np.arange(SAMPLES) / SAMPLES).T
+    recognised = recognise(cycle, next(iter(table.values())).group, table, BY_CELLS)
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
                         for size in (recognised.distance, recognised.distance + recognised.margin))

@@ -12,13 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Mean cycles of recordings, by period or by known phase, and the exact period of a recording.
-
-The first guess is the lag at which the recording repeats (the normalised square difference of
-McLeod & Wyvill, 2005, "A smarter way to find pitch"). The period is then fitted together with
-the harmonics (variable projection, Gauss-Newton), first to a few cycles, then to ever more of
-them, so that it never slips by one.
-"""
+"""The mean cycle of a motion whose phase is known: a harmonic series fitted to all its samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,7 +21,7 @@ from itertools import pairwise
 from cpg_ros.common.errors import InputError, ShortRepr
 import numpy as np
 
-# The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
+# A harmonic series, its rows and its least-squares fit.
 
 #: HARMONICS: most harmonics of a mean cycle.
 HARMONICS = 32
@@ -36,29 +30,6 @@ HARMONICS = 32
 DETERMINED = 0.1
 #: BINS: phases of the cycle that are distinguished for that; many more than harmonics.
 BINS = 4096
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class HarmonicCycle(ShortRepr):
-    """The mean cycle of a recording.
-
-    Attributes:
-        period: in the unit of the recording's times.
-        coefficients: c_n of ``x(t) = Re(c_0 + 2 sum_n c_n exp(2 pi i n (t - start) / period))``,
-            complex, shape (harmonics + 1, channels).
-        start: where the cycle begins.
-        residual: RMS of the residual, over the RMS of the signals about their means.
-
-    """
-
-    period: float
-    coefficients: np.ndarray
-    start: float
-    residual: float
-
-    def __call__(self, phases: np.ndarray) -> np.ndarray:
-        """Return the signals at phases in cycles, shape (m,), as an array (m, channels)."""
-        return evaluate_coefficients(self.coefficients, np.asarray(phases, dtype=float)).T
 
 
 def weights_of(c: np.ndarray) -> np.ndarray:
@@ -150,30 +121,7 @@ def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return weights_of(c)
 
 
-def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> HarmonicCycle:
-    """Fold a recording onto one cycle of the period given.
-
-    Args:
-        t: increasing times, evenly or unevenly spaced, shape (m,).
-        signals: one channel per column, shape (m, channels).
-        period: in the unit of t.
-
-    Raises:
-        InputError: the samples do not even determine the first harmonic.
-
-    """
-    harmonics = resolvable_harmonics(t, period)
-    if harmonics < 1:
-        raise InputError(f'the samples, folded onto one period of {period:g}, leave too much of '
-                         f'it empty')
-    rows = rows_of((t - t[0]) / period, harmonics)
-    weights = fit_series(signals.T, rows)
-    left = signals.T - evaluate_series(weights, rows)
-    return HarmonicCycle(period, coefficients_of(weights), float(t[0]),
-                         float(np.sqrt(np.mean(left * left) / signals.var(axis=0).mean())))
-
-
-# The mean cycle of a motion whose phase is known, and how far each cycle is from it.
+# The mean cycle, and how far each cycle is from it.
 
 #: AVERAGE_HARMONICS: most harmonics of a mean cycle.
 AVERAGE_HARMONICS = 24
@@ -320,164 +268,3 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
     centres = (np.arange(bins) + 0.5) / bins
     return (np.interp(theta % 1.0, centres, spread, period=1.0),
             np.interp(theta % 1.0, centres, error, period=1.0))
-
-
-#: NEGLIGIBLE: deviation, over the signals' RMS, up to which a period is not told from its half.
-NEGLIGIBLE = 0.005
-#: REPEATS: normalised square difference at a lag, 1 for unrelated signals, below which they
-#: repeat.
-REPEATS = 0.5
-#: GRID: most points of the even grid on which a recording is compared with itself.
-GRID = 1 << 17
-#: LONGEST: most samples that are used for the period, one of each stretch of a longer recording.
-LONGEST = 1 << 15
-#: CANDIDATES: most lags that are tried as the period.
-CANDIDATES = 12
-
-#: Residual of a period, as a share of the signals' power; the period; its series' weights.
-Trial = tuple[float, float, np.ndarray]
-
-
-def _refined(t: np.ndarray, x: np.ndarray, period: float) -> tuple[float, np.ndarray, float]:
-    """Fit period and harmonics to all of x, shape (channels, m), from a guess near enough.
-
-    Returns:
-        The period, the series' weights (2 harmonics + 1, channels), and the mean square left.
-
-    """
-    centred = t - 0.5 * (t[0] + t[-1])
-    span = t[-1] - t[0]
-    # Well below the sampling rate: at a period of whole samples higher ones are aliases.
-    usual = int(0.4 * period / np.median(np.diff(t)))
-    harmonics = min(usual, resolvable_harmonics(t, period))
-
-    def fit(rate: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-        rows = rows_of(centred * rate, harmonics)
-        weights = fit_series(x, rows)
-        left = x - evaluate_series(weights, rows)
-        return float(np.mean(left * left)), rows, weights, left
-
-    rate = 1.0 / period
-    error, rows, weights, left = fit(rate)
-    for _ in range(20):
-        by_rate = 2.0 * np.pi * centred * evaluate_series(slopes_of(weights), rows)
-        by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
-        step = float(np.sum(by_rate * left) / max(np.sum(by_rate * by_rate), 1e-300))
-        step = float(np.clip(step, -0.1 / span, 0.1 / span))
-        while abs(step) * span > 1e-8:
-            trial = fit(rate + step)
-            if trial[0] < error:
-                break
-            step *= 0.25
-        else:
-            break
-        rate += step
-        error, rows, weights, left = trial
-    return 1.0 / rate, weights, error
-
-
-def _tracked_period(t: np.ndarray, x: np.ndarray,
-                    period: float) -> tuple[float, np.ndarray, float]:
-    """Refine a rough period on three of its cycles, then on four times as many, up to all."""
-    reach = 3.0 * period
-    while t[0] + reach < t[-1]:
-        head = np.searchsorted(t, t[0] + reach)
-        if head > 8:
-            period = _refined(t[:head], x[:, :head], period)[0]
-        reach *= 4.0
-    return _refined(t, x, period)
-
-
-def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
-    """Return lags at which the recording repeats, each better than all shorter ones."""
-    from scipy.interpolate import PchipInterpolator
-
-    m = min(4 * t.size, GRID)
-    even = PchipInterpolator(t, x)(np.linspace(t[0], t[-1], m))
-    energy = np.concatenate([[0.0], np.cumsum(np.sum(even * even, axis=1))])
-    lags = np.arange(int(0.6 * m))
-    product = np.zeros(m)
-    for channel in even.T:
-        spectrum = np.fft.rfft(channel, 2 * m)
-        product += np.fft.irfft(spectrum * spectrum.conj(), 2 * m)[:m]
-    both = energy[m - lags] + energy[m] - energy[lags]
-    far = 1.0 - 2.0 * product[lags] / both
-    # Up to a lag of one period the mean of this is 1, so the first rise is within it.
-    risen = np.argmax(far > REPEATS)
-    candidates, best = [], 2.0 * REPEATS
-    for low in 1 + np.flatnonzero((far[1:-1] < far[:-2]) & (far[1:-1] < far[2:])):
-        if low > risen and far[low] < 0.5 * best:
-            before, at, after = far[low - 1:low + 2]
-            candidates.append((low + 0.5 * (before - after) / (before - 2.0 * at + after))
-                         * (t[-1] - t[0]) / (m - 1))
-            best = far[low]
-    return candidates[:CANDIDATES]
-
-
-def _span(t: np.ndarray) -> float:
-    """Return how long a recording lasts, its last sample included."""
-    return float(t[-1] - t[0] + np.median(np.diff(t)))
-
-
-def holds_two(t: np.ndarray, period: float) -> bool:
-    """Tell whether a recording holds two periods, to 0.1 %."""
-    return 2.0 * period <= 1.001 * _span(t)
-
-
-def find_period(t: np.ndarray, signals: np.ndarray) -> float:
-    """Find the period that all channels share.
-
-    The shortest one that explains the recording as well as any: neither half of it, however
-    like the two halves of a cycle are (down to differences of 0.5 % RMS), nor a multiple.
-
-    Args:
-        t: increasing times, evenly or unevenly spaced, shape (m,).
-        signals: one channel per column, shape (m, channels).
-
-    Raises:
-        InputError: the recording does not repeat, or holds less than two periods.
-
-    """
-    if t.size > LONGEST:
-        # At random, as sampling that stays regular would hide harmonics.
-        edges = np.linspace(0, t.size, LONGEST + 1).astype(int)
-        indices = np.random.default_rng(0).integers(edges[:-1], edges[1:])
-        t, signals = t[indices], signals[indices]
-    x = signals - signals.mean(axis=0)
-    channels, power = np.ascontiguousarray(x.T), float(np.mean(x * x))
-
-    def tried(guess: float) -> Trial:
-        period, weights, error = _tracked_period(t, channels, guess)
-        if not holds_two(t, period):
-            return np.inf, period, weights
-        # Longer cycles leave less merely because fewer of them are averaged.
-        return error / power / (1.0 - min(period / _span(t), 0.5)), period, weights
-
-    best: Trial = (np.inf, 1.0, np.empty(0))
-
-    def better(longer: Trial) -> bool:
-        # Its gain must exceed the effect of irregular strides, which average out the less, the
-        # fewer the cycles they are cut into.
-        return best[0] > (1.0 + longer[1] / best[1]) * longer[0] + NEGLIGIBLE ** 2
-
-    for lag in _lags(t, x):
-        best = longer if better(longer := tried(lag)) else best
-        if best[0] <= NEGLIGIBLE ** 2:
-            break
-    if best[0] > REPEATS:
-        raise InputError(f'no period found: the signals do not repeat steadily within half of '
-                         f'the {_span(t):g} recorded; at least two periods are needed')
-    # Where samples are few, lags separate a cycle from its like halves less well than this does.
-    for fraction in (2, 3):
-        if best[0] > NEGLIGIBLE ** 2 and holds_two(t, fraction * best[1]):
-            best = longer if better(longer := tried(fraction * best[1])) else best
-    score, period, weights = best
-    # And if only every share-th harmonic is there, it is so much shorter.
-    harmonics = len(weights) // 2
-    strength = 0.5 * np.sum(weights[1:].reshape(2, harmonics, -1) ** 2, axis=(0, 2))
-    n = np.arange(1, harmonics + 1)
-    for fraction in range(harmonics, 1, -1):
-        others = strength[n % fraction > 0].sum() / power / x.shape[1]
-        if others <= NEGLIGIBLE ** 2 + min(2.0 * score, 0.01):
-            return tried(period / fraction)[1]
-    return period

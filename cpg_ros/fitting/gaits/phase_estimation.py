@@ -29,6 +29,7 @@ from cpg_ros.fitting.gaits.mean_cycle import (
     fit_series,
     mean_weights,
     rows_of,
+    slopes_of,
 )
 from cpg_ros.fitting.gaits.steady_stretch import longest_run, resample_evenly, Stretch
 import numpy as np
@@ -238,9 +239,7 @@ def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: floa
 def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit the mean cycle; return what it leaves, and its slope by phase."""
     weights = mean_weights(x, phases, HARMONICS)
-    n = 2.0 * np.pi * np.arange(1, HARMONICS + 1)[:, None]
-    turned = np.vstack([0.0 * weights[:1], n * weights[1 + HARMONICS:],
-                        -n * weights[1:1 + HARMONICS]])
+    turned = 2.0 * np.pi * slopes_of(weights)
     left, slope = np.empty_like(x), np.empty_like(x)
     for part in blocks(phases):
         rows = rows_of(phases[part], HARMONICS)

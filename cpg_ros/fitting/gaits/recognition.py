@@ -15,8 +15,8 @@
 """Gait recognition: the spatio-temporal symmetry of a recorded or simulated rhythm.
 
 A symmetry g with shift theta means ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono &
-Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
-mean cycle; H and K are the symmetries whose violation is below the tolerance, as a homomorphism.
+Golubitsky 2001, section 2.1). Its violation is measured for every g and theta on one cycle; H
+and K are the symmetries whose violation is below the tolerance, as a homomorphism.
 """
 
 from collections.abc import Mapping, Sequence
@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.fitting.gaits.mean_cycle import find_period, HarmonicCycle, holds_two, mean_cycle
 from cpg_ros.networks.symmetry import Group, Permutation, symmetries, Symmetry
 import numpy as np
 
@@ -32,16 +31,40 @@ import numpy as np
 
 TURN = 2.0 * np.pi
 #: GRID: number of shifts of a cycle that are tried; a mean cycle has far fewer harmonics.
-GRID = 1024
+#: NEWTON: steps of Newton's method from the best of them.
+GRID, NEWTON = 1024, 6
 #: CENTRES: centres of a closed curve that are tried in each direction, over half its extent.
 CENTRES = np.linspace(-0.6, 0.6, 13)
 
 
+def best_shift(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the shift of the largest cross-correlation, cycles, and the correlation there.
+
+    Newton's method refines the best place of an even grid: no single harmonic or extreme decides.
+
+    Args:
+        terms: of the cross-correlation by order, complex, shape (..., n + 1): those of the first
+            signal times the conjugate ones of the second, the constant 0. The first is ahead by
+            the shift.
+
+    Returns:
+        Two arrays of shape (...).
+
+    """
+    k = np.arange(terms.shape[-1])
+    start = np.fft.fft(terms, GRID).real.argmax(axis=-1) / GRID
+    theta = start
+    for _ in range(NEWTON):
+        turned = terms * np.exp(-TURN * 1j * k * theta[..., None])
+        slope, bend = turned.imag @ k, -TURN * (turned.real @ (k * k))
+        peak = bend < 0.0
+        theta = np.clip(theta - np.where(peak, slope / np.where(peak, bend, 1.0), 0.0),
+                        start - 1.0 / GRID, start + 1.0 / GRID)
+    return theta, np.sum(terms * np.exp(-TURN * 1j * k * theta[..., None]), axis=-1).real
+
+
 def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
-
-    The largest circular cross-correlation, refined by Newton's method on its Fourier series: no
-    single harmonic or extreme decides.
 
     Args:
         a: waveforms on even points of a cycle, shape (..., m).
@@ -51,40 +74,9 @@ def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         The shifts, shape (...).
 
     """
-    m = a.shape[-1]
     cross = np.fft.rfft(a) * np.fft.rfft(b).conj()
     cross[..., 0] = 0.0
-    k = np.arange(cross.shape[-1])
-    theta = -np.fft.irfft(cross, m).argmax(axis=-1) / m
-    for _ in range(4):
-        turned = cross * np.exp(-TURN * 1j * k * theta[..., None])
-        slope, bend = turned.imag @ k, -TURN * (turned.real @ (k * k))
-        peak = bend < 0.0
-        step = np.clip(slope / np.where(peak, bend, 1.0), -0.5 / m, 0.5 / m)
-        theta = theta - np.where(peak, step, 0.0)
-    return (theta + 0.5) % 1.0 - 0.5
-
-
-def best_shift(terms: np.ndarray) -> tuple[float, float]:
-    """Return the shift of the largest cross-correlation, in cycles, and the correlation there.
-
-    Refined by Newton's method from the best place of an even grid.
-
-    Args:
-        terms: of the cross-correlation by order, complex, shape (n + 1,): those of the first
-            signal times the conjugate ones of the second, the constant 0. The first is ahead by
-            the shift.
-
-    """
-    turn = 2j * np.pi * np.arange(terms.size)
-    theta = float(np.argmax(np.fft.fft(terms, GRID).real)) / GRID
-    at = theta
-    for _ in range(8):
-        there = terms * np.exp(-turn * theta)
-        slope, bend = -np.sum(turn * there).real, np.sum(turn * turn * there).real
-        if bend < 0.0:
-            theta = float(np.clip(theta - slope / bend, at - 1.0 / GRID, at + 1.0 / GRID))
-    return theta, float(np.sum(terms * np.exp(-turn * theta)).real)
+    return (best_shift(cross)[0] + 0.5) % 1.0 - 0.5
 
 
 def shifted(a: np.ndarray, theta: float) -> np.ndarray:
@@ -134,13 +126,9 @@ def steadiness(v: np.ndarray, w: np.ndarray) -> float:
     return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TURN
 
 
-#: FEWEST: smallest number of samples of a rhythm.
-FEWEST = 8
-#: MOST: upper bound of the tolerance that noise may widen, as a distance (see Recognition).
-#: NONE: distance, in units of tolerance and noise, at which "no named gait" is as likely as a
-#: gait.
-#: LARGER: factor of the noise in the tolerance, for the largest of several noisy distances.
-MOST, NONE, LARGER = 0.3, 3.0, 1.25
+#: FEWEST: smallest number of points of a cycle.
+#: NONE: distance, in units of the tolerance, at which "no named gait" is as likely as a gait.
+FEWEST, NONE = 8, 3.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,9 +147,7 @@ class Recognition(ShortRepr):
             if it fits better with a smaller H.
         second: the best of the named gaits whose symmetry is not part of the nearest one's, or
             None if there is none.
-        noise: what noise alone makes of a distance, by what the mean cycle leaves.
         confidence: probability that it is the nearest gait, not another nor none of them.
-        period: in the unit of the times.
         phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
             correlation; between different waveforms it is no more than that. Cells to which H
             gives one waveform are compared with the first of them.
@@ -177,9 +163,7 @@ class Recognition(ShortRepr):
     distance: float
     margin: float
     second: str | None
-    noise: float
     confidence: float
-    period: float
     phases: np.ndarray
     h: tuple[str, ...]
     k: tuple[str, ...]
@@ -194,7 +178,7 @@ def _best_shift(ahead: np.ndarray, behind: np.ndarray) -> float:
     cross = np.sum(ahead * behind.conj(), axis=1)
     cross[0] = 0.0
     # A rounding error below 0 is 0, not 1.
-    return round(best_shift(cross)[0] % 1.0, 12) % 1.0
+    return round(float(best_shift(cross)[0]) % 1.0, 12) % 1.0
 
 
 class _Violations:
@@ -225,20 +209,16 @@ class _Violations:
         return max(self._known[element] for element in symmetry.shifts)
 
 
-def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
-             period: float | None, tolerance: float) -> None:
-    if t.ndim != 1 or signals.shape != (t.size, group.cells):
-        raise ValueError(f'signals have the shape {signals.shape}, times {t.shape}; '
-                         f'{group.cells} cells need (m, {group.cells}) and (m,)')
-    if t.size < FEWEST:
-        raise InputError(f'{t.size} samples are not enough, at least {FEWEST} are needed')
-    for name, values in (('t', t), ('signals', signals)):
-        if not np.isfinite(values).all():
-            raise InputError(f'{name} holds {np.count_nonzero(~np.isfinite(values))} values '
-                             f'that are not finite')
-    if not (np.diff(t) > 0.0).all():
-        late = int(np.argmin(np.diff(t) > 0.0))
-        raise InputError(f't does not increase: {t[late]:g} is followed by {t[late + 1]:g}')
+def _check(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry], tolerance: float
+           ) -> None:
+    if signals.ndim != 2 or signals.shape[1] != group.cells:
+        raise ValueError(f'signals have the shape {signals.shape}; {group.cells} cells need '
+                         f'(m, {group.cells})')
+    if len(signals) < FEWEST:
+        raise InputError(f'{len(signals)} points are not enough, at least {FEWEST} are needed')
+    if not np.isfinite(signals).all():
+        raise InputError(f'signals holds {np.count_nonzero(~np.isfinite(signals))} values that '
+                         'are not finite')
     spread = signals.std(axis=0)
     still = np.flatnonzero(spread <= np.maximum(1e-6 * spread.max(),
                                                 1e-12 * np.abs(signals).max()))
@@ -251,45 +231,31 @@ def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[st
             raise ValueError(f'the gait {name!r} belongs to another group')
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f'tolerance is {tolerance}, it must be positive')
-    if period is not None and not (np.isfinite(period) and period > 0.0):
-        raise InputError(f'period is {period}, it must be positive')
-    if period is not None and not holds_two(t, period):
-        raise InputError(f'the recording lasts {t[-1] - t[0]:g}, less than two periods of '
-                         f'{period:g}')
 
 
-def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
-              period: float | None = None, tolerance: float = 0.05) -> Recognition:
-    """Find the symmetry of a rhythm, and the named gait that has it.
+def recognise(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
+              tolerance: float = 0.05) -> Recognition:
+    """Find the symmetry of one cycle of a rhythm, and the named gait that has it.
 
-    Of several gaits within the tolerance the one with the largest H is meant, and among those
-    the one that fits best: every walk is also a skip, which has fewer symmetries.
+    Of several gaits within the tolerance, it is the one with the largest H, and among those the
+    one that fits best: every walk is also a skip, which has fewer symmetries.
 
     Args:
-        t: increasing times, evenly or unevenly spaced, shape (m,).
-        signals: the first variable of each cell, shape (m, cells).
+        signals: the first variable of each cell on even points of one cycle, shape (m, cells).
         group: of the network.
         gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
             two gaits.
-        period: in the unit of t; found if not given.
-        tolerance: largest distance of a symmetry that holds; see Recognition. What noise makes
-            of a distance comes on top.
+        tolerance: largest distance of a symmetry that holds; see Recognition.
 
     Raises:
-        InputError: a value is not finite, t does not increase, a channel is constant, or there
-            are fewer than two periods or too few samples.
-        ValueError: shapes do not fit, or gaits do not belong to the group.
+        InputError: a value is not finite, or there are too few points.
+        ValueError: shapes do not fit, a channel is constant, or gaits do not belong to the group.
 
     """
-    t, signals = np.asarray(t, dtype=float), np.asarray(signals, dtype=float)
-    _checked(t, signals, group, gaits, period, tolerance)
-    if period is None:
-        period = find_period(t, signals)
-    whole = mean_cycle(t, signals, period)
-    cycle = whole.coefficients
-    violations, noise = _Violations(cycle, group), _noise(whole, t.size)
-    alone = tolerance
-    tolerance = min(float(np.hypot(alone, LARGER * noise)), max(MOST, alone))
+    signals = np.asarray(signals, dtype=float)
+    _check(signals, group, gaits, tolerance)
+    cycle = np.fft.rfft(signals, axis=0)[:(len(signals) + 1) // 2] / len(signals)
+    violations = _Violations(cycle, group)
     # Search all homomorphisms, so that the result is a group with consistent shifts.
     symmetry = max((candidate for candidate in symmetries(group)
                     if violations.of(candidate) <= tolerance),
@@ -306,12 +272,10 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     others = [name for name, gait in gaits.items()
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
     second = min(others, key=apart.__getitem__, default=None)
-    probability = _probability(apart[nearest], [apart[name] for name in others],
-                               float(np.hypot(alone, noise)))
+    probability = _probability(apart[nearest], [apart[name] for name in others], tolerance)
     return Recognition(nearest if recognised else None, nearest, apart[nearest],
                        apart[second] - apart[nearest] if second is not None else np.inf, second,
-                       noise, probability, period, _phases(cycle, symmetry), symmetry.h,
-                       symmetry.k,
+                       probability, _phases(cycle, symmetry), symmetry.h, symmetry.k,
                        {name: violations.best(element)
                         for name, element in group.elements.items()})
 
@@ -328,12 +292,6 @@ def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
               for cell, head in enumerate(first)]
     # As in _best_shift: a rounding error below 1 is 0.
     return np.round(phases, 12) % 1.0
-
-
-def _noise(cycle: HarmonicCycle, samples: int) -> float:
-    """Return the distance by noise alone if a symmetry holds: two cells have it, in each term."""
-    terms, left = 2 * len(cycle.coefficients) - 1, min(cycle.residual, 0.999)**2
-    return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))
 
 
 def _probability(nearest: float, others: Sequence[float], scatter: float) -> float:
