@@ -82,13 +82,13 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
         angles[~(np.abs(angles) <= FARTHEST)] = np.nan
         moving = [name for name, column in zip(names, angles.T, strict=True)
                   if not (column == column[0]).all()]
-    wanted = matching(joints, names, str(path)) if joints else moving
-    if not wanted:
+    selected = matching(joints, names, str(path)) if joints else moving
+    if not selected:
         raise RecordingError(f'{path}: no joint moves in {pluralize(len(rows), "frame")}')
     if not joints and len(moving) < len(names):
         notes.append(f'{pluralize(len(names) - len(moving), "channel")} left out: no motion')
     stamps = np.rint(np.arange(len(rows)) * interval * 1e9).astype(np.int64)
-    return recording_of(path, stamps, names, unwrapped(angles), notes, wanted)
+    return recording_of(path, stamps, names, unwrapped(angles), notes, selected)
 
 
 def _tree(text: str, path: Path) -> list[tuple[str, str]]:
@@ -121,8 +121,8 @@ def _motion(file: Iterator[str], path: Path, number: int) -> tuple[int, float, i
     for line in islice(file, 10):
         number += 1
         name, mark, value = line.partition(':')
-        if mark and (known := number_in(value)) is not None:
-            values[' '.join(name.lower().split())] = known
+        if mark and (header_value := number_in(value)) is not None:
+            values[' '.join(name.lower().split())] = header_value
         elif mark:
             raise RecordingError(f'{path}, line {number}: {value.strip()[:40]!r} is not a number')
         if 'frame time' in values:

@@ -13,18 +13,18 @@
 # limitations under the License.
 
 """Markers and joint angles out of C3D files, by the library ezc3d (Michaud & Begon 2021, Journal
-of Open Source Software 6(58), 2911), which runs in a process of its own (see c3d_process).
+of Open Source Software 6(58), 2911), which runs in a process of its own (see reader_process).
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+import json
 import math
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.common import files
 from cpg_ros.common.errors import needed
-from cpg_ros.fitting.recordings.c3d_process import read_apart, UnreadableC3D
 from cpg_ros.fitting.recordings.markers import (
     body_of,
     joint_recording,
@@ -34,6 +34,7 @@ from cpg_ros.fitting.recordings.markers import (
     SEGMENTS,
     UNITS,
 )
+from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLES,
@@ -80,6 +81,31 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
         return recording
     return replace(recording, loads=loads, notes=(*recording.notes, 'which foot is on the ground '
                                                   "is taken from the file's events"))
+
+
+def _point(parameters: Any, first: int) -> dict[str, Any]:
+    """Return the values of the parameters of points and events that are used."""
+    keys = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS', 'UNITS')
+    found: dict[str, Any] = {
+        key: [value if isinstance(value, str) else float(value) for value in entry['value']]
+        for key, entry in parameters['POINT'].items() if key.startswith(keys)}
+    if 'EVENT' in parameters:
+        known = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
+                 if key in parameters['EVENT']}
+        minutes, seconds = np.asarray(known.pop('TIMES', np.zeros((2, 0)))).reshape(2, -1)
+        found['EVENT'] = {**known, 'TIMES': (60.0 * minutes + seconds
+                                             - first / found['RATE'][0]).tolist()}
+    return found
+
+
+def c3d_arrays(path: str) -> dict[str, Any]:
+    """Return the parameters of points as JSON, points and residuals, as the library has them."""
+    import ezc3d
+    file: Any = ezc3d.c3d(path)
+    first = int(file['header']['points']['first_frame'])
+    return {'point': json.dumps(_point(file['parameters'], first)),
+            'points': np.asarray(file['data']['points'], float),
+            'residuals': np.asarray(file['data']['meta_points']['residuals'], float)[0]}
 
 
 #: STRIKE, OFF: events of a foot that lands, and of one that leaves the ground.
@@ -145,9 +171,11 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
     stated = _stated(path)
     needed('ezc3d')
     try:
-        point, points, residuals = read_apart(path, path.stat().st_size)
+        arrays = read_apart(c3d_arrays, path)
+        point, points, residuals = (json.loads(str(arrays['point'])), arrays['points'],
+                                    arrays['residuals'])
         rate = float(point['RATE'][0])
-    except (UnreadableC3D, LookupError, TypeError, ValueError, OSError) as error:
+    except (UnreadableFile, LookupError, TypeError, ValueError, OSError) as error:
         why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise RecordingError(f'{path}: no C3D file that can be read: {why[:200]}') from error
     labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))

@@ -189,18 +189,18 @@ def load_segments(name: str | Path) -> Segments:
     if not path.exists():
         raise RecordingError(f'{path}: there is no such file of segments; shipped are '
                              f'{abbreviate(shipped())}')
-    found = reader.record(Segments, reader.tree(), 'file',
+    listed = reader.record(Segments, reader.tree(), 'file',
                           segments=lambda value, where: reader.mapping(value, where, reader.ends),
                           joints=lambda value, where: reader.mapping(value, where, reader.joint))
-    for key, entries in (('segments', found.segments), ('joints', found.joints)):
+    for key, entries in (('segments', listed.segments), ('joints', listed.joints)):
         if not entries:
             raise reader.fail(key, 'must be a mapping with at least one entry')
-    for key, joint in found.joints.items():
+    for key, joint in listed.joints.items():
         for name in (*joint.between, *[joint.axis] * bool(joint.axis)):
-            if name not in found.segments:
+            if name not in listed.segments:
                 raise reader.fail(f'joints.{key}', f'there is no segment {name!r}, only '
-                                  f'{abbreviate(list(found.segments), 20)}')
-    return found
+                                  f'{abbreviate(list(listed.segments), 20)}')
+    return listed
 
 
 #: SHORTEST: share of a segment's length across the axis below which it has no direction.

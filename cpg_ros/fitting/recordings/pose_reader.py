@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import islice
+import json
 from pathlib import Path
 import pickle
 import re
@@ -31,6 +32,7 @@ from typing import Any
 
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
+from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     JOINTS,
@@ -148,26 +150,40 @@ def pose_markers(path: str | Path, fps: str | float | None, individual: str | No
 
 def _poses_of_hdf5(path: Path) -> _Poses:
     needed('h5py')
-    import h5py
     try:
-        with h5py.File(path) as file:
-            table = next((one['table'] for one in file.values()
-                          if isinstance(one, h5py.Group) and 'table' in one), None)
-            if table is None and {'tracks', 'node_names'} <= set(file):
-                return _poses_of_sleap(path, file)
-            if table is None or 'values_block_0' not in table.dtype.names:
-                raise RecordingError(f'neither poses of DeepLabCut nor an analysis of SLEAP: it '
-                                     f'has {abbreviate(list(file))}')
-            UnpackedSize(path.stat().st_size).add(table.size * table.dtype.itemsize)
-            names = _Names(BytesIO(bytes(table.attrs['values_block_0_kind']))).load()
-            # Scorer, individual where there are several animals, body part, coordinate.
-            columns = [(one[1] if len(one) == 4 else '', *one[-2:]) for one in names]
-            return _Poses(path, columns, table['values_block_0'].astype(float), table['index'])
-    # The library lists nothing of what damaged files make it raise.
-    except Exception as error:
+        arrays = read_apart(hdf5_arrays, path)
+    except (UnreadableFile, OSError) as error:
         why = ' '.join(str(error).split()) or type(error).__name__
         raise RecordingError(f'{path}: no HDF5 file of poses that can be read: {why[:200]}'
                              ) from error
+    columns = [tuple(column) for column in json.loads(str(arrays['columns']))]
+    return _Poses(path, columns, arrays['rows'], arrays['frames'])
+
+
+def hdf5_arrays(path: str) -> dict[str, Any]:
+    """Return animal, marker and coordinate of the columns as JSON, rows and frames of a file.
+
+    Raises:
+        RecordingError: it has no poses, and whatever the library raises.
+
+    """
+    import h5py
+    size = UnpackedSize(Path(path).stat().st_size)
+    with h5py.File(path) as file:
+        table = next((one['table'] for one in file.values()
+                      if isinstance(one, h5py.Group) and 'table' in one), None)
+        if table is None and {'tracks', 'node_names'} <= set(file):
+            columns, rows = _sleap(file, size)
+            return {'columns': json.dumps(columns), 'rows': rows, 'frames': np.arange(len(rows))}
+        if table is None or 'values_block_0' not in table.dtype.names:
+            raise RecordingError('neither poses of DeepLabCut nor an analysis of SLEAP: it has '
+                                 f'{abbreviate(list(file))}')
+        size.add(table.size * table.dtype.itemsize)
+        names = _Names(BytesIO(bytes(table.attrs['values_block_0_kind']))).load()
+        # Scorer, individual where there are several animals, body part, coordinate.
+        columns = [(one[1] if len(one) == 4 else '', *one[-2:]) for one in names]
+        return {'columns': json.dumps(columns), 'rows': table['values_block_0'].astype(float),
+                'frames': table['index']}
 
 
 class _Names(pickle.Unpickler):
@@ -177,10 +193,10 @@ class _Names(pickle.Unpickler):
         raise RecordingError(f'{module}.{name} among the names of columns')
 
 
-def _poses_of_sleap(path: Path, file: Any) -> _Poses:
+def _sleap(file: Any, size: UnpackedSize) -> tuple[list[tuple[str, str, str]], np.ndarray]:
     """Return SLEAP's arrays, of shapes (animals, coordinates, markers, frames), as columns."""
     arrays = [file['tracks'], *[file[name] for name in ('point_scores',) if name in file]]
-    UnpackedSize(path.stat().st_size).add(sum(one.size * 8 for one in arrays))
+    size.add(sum(one.size * 8 for one in arrays))
     tracks = np.concatenate([one[:] if one.ndim == 4 else one[:][:, None] for one in arrays],
                             axis=1)
     nodes = [name.decode() for name in file['node_names']]
@@ -191,7 +207,7 @@ def _poses_of_sleap(path: Path, file: Any) -> _Poses:
     rows = tracks.reshape(-1, tracks.shape[-1]).T
     if rows.shape[1] != len(columns):
         raise RecordingError(f'{rows.shape[1]} columns, where {len(columns)} have names')
-    return _Poses(path, columns, rows, np.arange(len(rows)))
+    return columns, rows
 
 
 def recognises(path: Path) -> bool:

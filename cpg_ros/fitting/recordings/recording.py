@@ -198,11 +198,11 @@ def joint_list(joints: Sequence[str]) -> str:
     return f'joint{"" if len(joints) == 1 else "s"} {abbreviate(joints)}'
 
 
-def matching(wanted: Sequence[str], names: Sequence[str], source: str) -> list[str]:
+def matching(patterns: Sequence[str], names: Sequence[str], source: str) -> list[str]:
     """Return the names that are asked for, each once, in the order in which they are.
 
     Args:
-        wanted: names, or patterns such as 'left*'; all names, if empty.
+        patterns: names, or patterns such as 'left*'; all names, if empty.
         names: that are there.
         source: what to call the file in messages.
 
@@ -210,14 +210,14 @@ def matching(wanted: Sequence[str], names: Sequence[str], source: str) -> list[s
         RecordingError: nothing fits one of them.
 
     """
-    found: list[str] = []
-    for pattern in wanted:
+    matches: list[str] = []
+    for pattern in patterns:
         fitting = [name for name in names if pattern == name or fnmatchcase(name, pattern)]
         if not fitting:
             raise RecordingError(f'{source}: no joint {pattern!r}; there are '
                                  f'{abbreviate(names, 40)}')
-        found += fitting
-    return list(dict.fromkeys(found if wanted else names))
+        matches += fitting
+    return list(dict.fromkeys(matches if patterns else names))
 
 
 def unwrapped(angles: np.ndarray) -> np.ndarray:
@@ -248,13 +248,13 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
 
     """
     require(names, names, str(path))
-    found = merged([(stamps, names, angles)], printable(str(path)),
+    recording = merged([(stamps, names, angles)], printable(str(path)),
                    matching(joints, names, str(path)))
     if body is not None and (there := np.isfinite(body).all(axis=1)).any():
-        times = 1e-9 * stamps[there] - found.start
-        body = np.column_stack([np.interp(found.times, times, one) for one in body[there].T])
-        found = replace(found, body=body)
-    return replace(found, notes=(*map(printable, notes), *found.notes))
+        times = 1e-9 * stamps[there] - recording.start
+        body = np.column_stack([np.interp(recording.times, times, one) for one in body[there].T])
+        recording = replace(recording, body=body)
+    return replace(recording, notes=(*map(printable, notes), *recording.notes))
 
 
 def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:

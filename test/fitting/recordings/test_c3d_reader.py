@@ -17,7 +17,7 @@
 import sys
 
 from cpg_ros.common.errors import MissingLibraryError
-from cpg_ros.fitting.recordings import c3d_process
+from cpg_ros.fitting.recordings import reader_process
 from cpg_ros.fitting.recordings.c3d_reader import c3d_markers, read_c3d
 from cpg_ros.fitting.recordings.recording import RecordingError
 from depth import in_full
@@ -96,7 +96,7 @@ def test_what_the_library_does_ends_nothing_but_its_process(path, tmp_path, monk
                                                             words):
     (tmp_path / 'ezc3d.py').write_text(library)
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.setattr(c3d_process, 'TIME', 1.0)
+    monkeypatch.setattr(reader_process, 'TIME', 1.0)
     with pytest.raises(RecordingError, match=words) as error:
         read_c3d(path)
     assert str(error.value).startswith(f'{path}: ') and '\n' not in str(error.value)

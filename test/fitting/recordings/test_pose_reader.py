@@ -20,6 +20,7 @@ import pickle
 
 import cpg_ros
 from cpg_ros.common import errors
+from cpg_ros.fitting.recordings import reader_process
 from cpg_ros.fitting.recordings.formats import format_of
 from cpg_ros.fitting.recordings.pose_reader import pose_markers
 from cpg_ros.fitting.recordings.recording import RecordingError
@@ -223,3 +224,17 @@ def test_a_project_of_sleap_and_a_missing_library_are_said(tmp_path, monkeypatch
     monkeypatch.setattr(errors, 'find_spec', lambda name: None)
     with pytest.raises(errors.MissingLibraryError, match=r'needs h5py, .*/pip install h5py'):
         pose_markers(tmp_path / 'pose.h5', 25)
+
+
+@pytest.mark.parametrize(('library', 'words'), [
+    ('import os, signal; os.kill(os.getpid(), signal.SIGSEGV)', 'ended with SIGSEGV'),
+    ('while True: pass', 'not read within 1 s of processor time')], ids=['crash', 'hang'])
+def test_what_h5py_does_ends_nothing_but_its_process(tmp_path, monkeypatch, library, words):
+    (tmp_path / 'h5py.py').write_text(library)
+    path = tmp_path / 'pose.h5'
+    path.write_bytes(b'no poses')
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.setattr(reader_process, 'TIME', 1.0)
+    with pytest.raises(RecordingError, match=words) as error:
+        pose_markers(path, 25)
+    assert str(error.value).startswith(f'{path}: ') and '\n' not in str(error.value)
