@@ -21,6 +21,8 @@ starts from other values than the truth. By chance 95 of 100 intervals hold it.
 Then networks with parameters drawn within a tenth of a drawn gait's preset, from which the fit
 starts, with noise of 1 %; and the same as whole recordings of 14 s, 1 to 5 % of whose samples are
 missing, or repeat the pose in which a generator was held up, 30 to 250 ms at a time.
+``--readouts`` makes mean cycles of drawn parameters with more noise or by other readouts than the
+fit's: three harmonics without Lanczos' factors, legs retimed to a duty, or another order.
 
 Last, what the generator publishes of every shipped robot, network and gait, 14 s of it with noise
 of 1 %, fitted with the robot file as ``inversion`` does, five seeds each.
@@ -28,11 +30,13 @@ of 1 %, fitted with the robot file as ``inversion`` does, five seeds each.
 
 import argparse
 from collections.abc import Iterator
+from functools import partial
 import sys
 import time
 
 from common import emit, log, ROOT
 import numpy as np
+from scipy.stats import binomtest
 
 sys.path.append(str(ROOT / 'test' / 'support'))
 
@@ -42,13 +46,16 @@ from cpg_ros.fitting.gaits.stride import find_stride  # noqa: E402
 from cpg_ros.fitting.inversion.free_parameters import free_numbers, with_values  # noqa: E402
 from cpg_ros.fitting.inversion.invert import invert  # noqa: E402
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY  # noqa: E402
-from cpg_ros.fitting.inversion.recording_fit import fit_recording  # noqa: E402
+from cpg_ros.fitting.inversion.recording_fit import (  # noqa: E402
+    fit_recording,
+    fit_with_fallbacks,
+)
 from cpg_ros.motion.plan import gait_of, refusal  # noqa: E402
 from cpg_ros.motion.robot import HARMONICS  # noqa: E402
 from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.networks.registry import NETWORKS, PRESETS  # noqa: E402
 from generated import generated, walks  # noqa: E402
-from made_up import joint_angles, record, weights_of  # noqa: E402
+from made_up import joint_angles, plain_readout, record, weights_of  # noqa: E402
 from motion import Driven, noisy, Recorded, stamps  # noqa: E402
 
 SEEDS, GOAL, GENERATED = 100, 0.9, 5
@@ -65,6 +72,11 @@ CASES = (('delayed', 'trot', 3, QUADRUPED, {'c': 1.05, 'tau': 1.1}),
          ('matsuoka', 'walk', 3, LEGS, {'beta': 1.05, 'a': 0.97}))
 #: Networks whose parameters are drawn, and noise of them, over each joint's range.
 DRAWN, NOISE = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka'), 0.01
+#: Noise, readout of the recordings, and order of the fit.
+READOUTS = {'exact': (0.01, joint_angles, 3), 'noise of 3 %': (0.03, joint_angles, 3),
+            'no Lanczos factors': (0.01, plain_readout, 3),
+            'duty 0.65': (0.01, partial(joint_angles, duty=0.65), 3),
+            'order 2': (0.01, joint_angles, 2)}
 #: Samples a second, share of them that are stalled, and how long one stall lasts, s.
 RATE, STALLED, STALL = 200.0, (0.01, 0.05), (0.03, 0.25)
 #: Gaits whose phases are read off the legs, recorded for so long (s) at so many strides a second.
@@ -180,6 +192,33 @@ def random_covered(name: str, runs: int, seed: int, stalls: str = '') -> dict[st
             'inside': {key: count / max(fitted, 1) for key, count in inside.items()}}
 
 
+def misread_covered(name: str, which: str, runs: int, seed: int) -> dict[str, object]:
+    """Count the truths inside of recordings that are made otherwise than the fit assumes."""
+    noise, angles, order = READOUTS[which]
+    inside = total = open_ends = none = 0
+    began = time.process_time()
+    for rng, preset, numbers, values, orbit in drawn(name, runs, seed):
+        joints = JOINTS.get(name, QUADRUPED)
+        try:
+            cycle, cells = record(orbit, joints, weights_of(len(joints), 3, int(
+                rng.integers(1 << 30))), rng, noise=noise, jitter=0.0, dropouts=0.0, angles=angles)
+            fit, _ = fit_with_fallbacks(cycle, cells, preset.network, preset.gait, order=order)
+        except CpgError:
+            none += 1
+            continue
+        for one, value in zip(numbers, values, strict=True):
+            if one.name in fit.parameters:
+                found = fit.parameters[one.name]
+                total += 1
+                inside += found.low <= value <= found.high
+                open_ends += not found.bounded
+    low, high = binomtest(inside, max(total, 1)).proportion_ci(0.95, 'wilson')
+    log(f'{name} {which}: {inside} of {total} inside ({low:.0%} to {high:.0%}), {open_ends} not '
+        f'bounded, {none} not fitted, {time.process_time() - began:.1f} s')
+    return {'inside': inside, 'intervals': total, 'wilson': [low, high], 'unbounded': open_ends,
+            'not_fitted': none}
+
+
 def generated_covered(seeds: range, only: str = '') -> dict[str, object]:
     """Count the truths inside of what the generator publishes of everything shipped."""
     inside = total = unbounded = none = 0
@@ -223,7 +262,14 @@ def main() -> None:
     parser.add_argument('--seeds', type=int, nargs=2, default=(0, GENERATED),
                         metavar=('FROM', 'TO'),
                         help='of the noise of what the generator publishes')
+    parser.add_argument('--readouts', nargs='*', metavar='NETWORK', help='only drawn parameters '
+                        'read otherwise than the fit does, of these networks or all')
     given = parser.parse_args()
+    if given.readouts is not None:
+        emit(benchmark='truth', seed=given.seed, readouts={
+            f'{name} {which}': misread_covered(name, which, given.runs, given.seed)
+            for which in READOUTS for name in given.readouts or DRAWN})
+        return
     seeds = range(*given.seeds)
     if given.generator is not None:
         emit(benchmark='truth', generator=generated_covered(seeds, given.generator))

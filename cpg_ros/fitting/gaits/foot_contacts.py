@@ -18,13 +18,12 @@ A stride is from touchdown to touchdown; duty is the share of it in stance. In a
 the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
 """
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError
-from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike
+from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike, true_runs
 import numpy as np
 
 #: LOADED: a foot is on the ground above this share of the span from its least to its largest load.
@@ -194,8 +193,10 @@ def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end
     # A foot that bounces touches down once.
     for state in (False, True):
         for column in down.T:
-            for first, last in _short(column == state, times, BOUNCE * period):
-                column[first:last] = not state
+            for first, last in true_runs(column == state):
+                inner = first > 0 and last + 1 < len(times)
+                if inner and times[last + 1] - times[first] < BOUNCE * period:
+                    column[first:last + 1] = not state
     return FootContacts(named, times, down)
 
 
@@ -210,11 +211,3 @@ def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] 
     if set(by_leg) != set(legs) or any(len(by_leg[leg]) != 1 for leg in legs) or by_leg.unassigned:
         return None
     return tuple(next(leg for leg in legs if name in by_leg[leg]) for name in names)
-
-
-def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:
-    """Yield begin and end indices of inner runs of True that last less than shortest, s."""
-    edges = np.flatnonzero(np.diff(there)) + 1
-    for first, last in pairwise(edges.tolist()):
-        if there[first] and times[last] - times[first] < shortest:
-            yield first, last

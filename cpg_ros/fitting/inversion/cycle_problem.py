@@ -16,7 +16,7 @@
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
@@ -78,6 +78,22 @@ class ReadoutFit(ShortRepr):
     jacobian: np.ndarray
 
 
+@dataclass
+class Orbits:
+    """Orbits that fits of the same free parameters of a network share, by the parameters' values.
+
+    Attributes:
+        solved: the last ones.
+        held: those that are kept as starts.
+        missing: why there is none.
+
+    """
+
+    solved: dict[bytes, tuple[Orbit, Signals]] = field(default_factory=dict)
+    held: dict[bytes, tuple[Orbit, Signals]] = field(default_factory=dict)
+    missing: dict[bytes, str] = field(default_factory=dict)
+
+
 class CycleProblem:
     """Values are those of the free numbers, then the phase of the orbit where theta is 0.
 
@@ -92,7 +108,7 @@ class CycleProblem:
 
     def __init__(self, joints: Joints, sizes: np.ndarray, network: Network, gait: str,
                  free: Sequence[Free], order: int, readout: GaitReadout,
-                 period: Period | None = None) -> None:
+                 period: Period | None = None, orbits: Orbits | None = None) -> None:
         self.joints, self.sizes, self.free = joints, sizes, tuple(free)
         self.network, self.gait, self._period = network, gait, period
         self._symmetry = network.symmetry(gait)
@@ -116,9 +132,7 @@ class CycleProblem:
         #: Whether a joint is the first, second, ... of its leg, (joints,).
         self.kinds = np.array([np.count_nonzero(leading[:j] == lead)
                                for j, lead in enumerate(leading)])
-        self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
-        self._held: dict[bytes, tuple[Orbit, Signals]] = {}
-        self._without: dict[bytes, str] = {}
+        self._orbits = orbits or Orbits()
         self._placed: tuple[bytes, ReadoutFit] | None = None
 
     def duty(self, values: np.ndarray) -> float | None:
@@ -137,7 +151,7 @@ class CycleProblem:
             NoOrbit: there is none, or none was found.
 
         """
-        if values[:self._own].tobytes() not in self._solved:
+        if values[:self._own].tobytes() not in self._orbits.solved:
             self._keep(values, solve_orbit(self._network(values), self.gait))
 
     def _network(self, values: np.ndarray) -> Network:
@@ -147,15 +161,16 @@ class CycleProblem:
         return network
 
     def _keep(self, values: np.ndarray, orbit: Orbit) -> tuple[Orbit, Signals]:
-        while len(self._solved) >= KEPT:
-            del self._solved[next(iter(self._solved))]
-        numbers = np.array(values[:self._own])
-        self._solved[numbers.tobytes()] = orbit, signals(orbit, self.readout.harmonics)
-        return self._solved[numbers.tobytes()]
+        solved = self._orbits.solved
+        while len(solved) >= KEPT:
+            del solved[next(iter(solved))]
+        key = values[:self._own].tobytes()
+        solved[key] = orbit, signals(orbit, self.readout.harmonics)
+        return solved[key]
 
     def hold(self, values: np.ndarray) -> None:
         """Keep the orbit at these values as a start: it may be out of reach from later ones."""
-        self._held[values[:self._own].tobytes()] = self._solve(values)
+        self._orbits.held[values[:self._own].tobytes()] = self._solve(values)
 
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
         """Solve for an orbit, from the nearest one known, and for the signals of the joints.
@@ -165,31 +180,32 @@ class CycleProblem:
 
         """
         key = values[:self._own].tobytes()
-        if key in self._held:
-            return self._held[key]
-        if key not in self._solved:
+        solved, held, missing = vars(self._orbits).values()
+        if key in held:
+            return held[key]
+        if key not in solved:
             network = self._network(values)
             near = self._nearest(values)
             if near is None or network.delay_parameter:
                 # With a delay the way from the onset is as short as that from a neighbour.
                 return self._keep(values, solve_orbit(network, self.gait, near))
-            if key in self._without:
-                raise NoOrbit(self._without[key])
+            if key in missing:
+                raise NoOrbit(missing[key])
             try:
                 # A step too long for Newton's method is one too long for the trust region.
                 return self._keep(values, solve_beside(network, near))
             except NoOrbit as error:
-                self._without[key] = str(error)
+                missing[key] = str(error)
                 raise
-        return self._solved[key]
+        return solved[key]
 
     def _nearest(self, values: np.ndarray) -> Orbit | None:
-        if not self._solved:
+        if not self._orbits.solved:
             return None
-        solved = np.array([np.frombuffer(key) for key in self._solved])
+        solved = np.array([np.frombuffer(key) for key in self._orbits.solved])
         size = np.abs(solved).max(axis=0) + 1e-12
         gaps = np.sum(((solved - values[:self._own]) / size)**2, axis=1)
-        return list(self._solved.values())[int(gaps.argmin())][0]
+        return list(self._orbits.solved.values())[int(gaps.argmin())][0]
 
     def best_readouts(self, values: np.ndarray) -> ReadoutFit:
         """Return the best readouts; raises NoOrbit as ``begin`` does."""
@@ -283,8 +299,8 @@ class CycleProblem:
             An array of shape (residuals, n), with an entry of 0 for a period that is data.
 
         """
-        found = (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
-        return found if self._period is None else np.vstack([found, np.zeros(found.shape[-1])])
+        rows = (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
+        return rows if self._period is None else np.vstack([rows, np.zeros(rows.shape[-1])])
 
     def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual over its standard errors, joint by joint within each instant, and derivative.

@@ -17,9 +17,8 @@
 The residual of a model that is not the truth is no noise: it is larger than the standard errors
 of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
 leaves where that is more, and variances are inflated by how far the residual is correlated along
-the cycle. Intervals are those of the profile of the cost. A residual that noise does not explain
-widens them: the model's waveforms are taken to be off by as much as explains it, and so are the
-numbers that such waveforms move.
+the cycle. A residual that noise does not explain widens the intervals: the model's waveforms are
+taken to be off by as much as explains it, and so are the numbers that such waveforms move.
 """
 
 from dataclasses import dataclass, replace
@@ -41,18 +40,11 @@ QUANTILE = 1.959964
 #: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; SHARE:
 #: component of a number in such a direction above which the number is not determined.
 ZERO, SHARE = 1e-7, 1e-3
-#: STEPS: most steps of a profile on either side; CLOSE: its tolerance, standard errors; FURTHER:
-#: length of a step over that of the last one, at most; SHORT: what a step that meets the edge of
-#: where there is an orbit misses of its length, at least.
-STEPS, CLOSE, FURTHER, SHORT = 10, 0.03, 3.0, 0.2
-#: NEGLIGIBLE: distance from a bound, as a share of a step, up to which a number is at the bound.
-NEGLIGIBLE = 1e-6
-#: Descents of a profile. TOLERANCE: at which they stop; MOST: most evaluations; DRAWN: width, over
-#: its size, of the residual that draws the profile's number to its place.
-TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
-
+#: CURVED: half width of an interval, over the value, above which costs are not taken for
+#: quadratic; STEPS: most steps to the end of such an interval; CLOSE: relative tolerance there.
+CURVED, STEPS, CLOSE = 0.05, 8, 0.03
 #: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
-EXPLAINED = 1.2
+EXPLAINED = 1.1
 
 
 @dataclass(frozen=True)
@@ -196,112 +188,80 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
                       / np.where(size > 0.0, size, 1.0), float(stdtrit(max(freedom, 1.0), 0.975)))
 
 
-def estimates(problem: CycleProblem, values: np.ndarray, known: Spread, model: ModelError,
-              profiles: bool) -> dict[str, Estimate]:
-    """Estimate the free numbers with intervals, by the profile of the cost if that is asked for.
-
-    Where errors of the model count, which are as uncertain, and where a number is not determined,
-    intervals are quadratic.
+def estimates(problem: CycleProblem, values: np.ndarray, uncertainty: Spread,
+              model: ModelError, straight: bool = False) -> dict[str, Estimate]:
+    """Estimate the free numbers, with intervals by noise and by errors of the model.
 
     Args:
         problem: the fit.
         values: where its cost is least, shape (n,).
-        known: their covariance.
+        uncertainty: their covariance.
         model: errors of the model.
-        profiles: whether intervals are those of the profile.
+        straight: whether costs are taken for quadratic however wide an interval is.
 
     """
-    found = {}
-    for k, one in enumerate(problem.free):
-        value, noise, by_model = (float(each[k]) for each in (values, known.errors, model.errors))
-        error = float(np.hypot(noise, by_model))
-        if not np.isfinite(error):
-            found[one.name] = Estimate(value, error, one.low, one.high, False)
-        elif not profiles or model.size > 0.0 or noise <= 0.0:
-            half = float(np.hypot(QUANTILE * noise, model.quantile * by_model))
-            low, high = value - half, value + half
-            found[one.name] = Estimate(value, error, max(one.low, low), min(one.high, high),
-                                       one.low <= low and high <= one.high)
-        else:
-            (low, below), (high, above) = (_end(problem, values, known, k, side)
-                                           for side in (-1.0, 1.0))
-            found[one.name] = Estimate(value, error, low, high, below and above)
-    return found
+    result, count = {}, len(problem.free)
+    halves = np.hypot(QUANTILE * uncertainty.errors, model.quantile * model.errors)[:count]
+    wide = bool((halves > CURVED * np.abs(values[:count])).any())
+    curved = wide and not (straight or model.size)
+    for k, (free, half) in enumerate(zip(problem.free, halves.tolist(), strict=True)):
+        value = float(values[k])
+        ends = [value - half, value + half]
+        if curved and half < np.inf:
+            ends = [_end(problem, values, uncertainty, k, side * half) for side in (-1.0, 1.0)]
+        low, high = max(free.low, ends[0]), min(free.high, ends[1])
+        result[free.name] = Estimate(
+            value, float(np.hypot(uncertainty.errors[k], model.errors[k])), low, high,
+            free.low < low and high < free.high)
+    return result
 
 
-def _end(problem: CycleProblem, values: np.ndarray, known: Spread, k: int, side: float
-         ) -> tuple[float, bool]:
-    """Follow the least cost for given values of number k to the end of its interval.
+def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int, half: float
+         ) -> float:
+    """Return where the least cost for given values of number k has risen enough.
 
-    Returns:
-        Number k there, and whether the cost has risen enough: not at a bound of the number, or the
-        edge of where there is an orbit.
+    The other numbers take linear steps, a Gauss-Newton step each time; where that leads to no
+    orbit, the interval ends at the edge.
+
+    Args:
+        problem: the fit.
+        values: where its cost is least.
+        uncertainty: their covariance.
+        k: index of the number.
+        half: distance to begin with, its sign that of the side.
 
     """
-    limit = problem.free[k].high if side > 0.0 else problem.free[k].low
-    least, step = problem.cost(values), QUANTILE * float(known.errors[k])
-    low, high = (0.0, values), (np.inf, values)
-    place = float(values[k]) + side * step
+    free, least = problem.free[k], problem.cost(values)
+    begin, target, end = values, float(values[k]) + half, float(values[k])
     for _ in range(STEPS):
-        place = limit if side * (place - limit) >= 0.0 else place
-        at = low[1]
-        if abs(place - at[k]) <= NEGLIGIBLE * step:
-            return float(at[k]), False
-        there, cost = _least(problem, known, k, place, at)
-        rise = float(np.sqrt(max(0.0, 2.0 * (cost - least) / known.inflation)))
-        if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
-            return float(there[k]), True
-        if rise > QUANTILE:
-            high = rise, there
-        elif place == limit or abs(there[k] - place) > SHORT * abs(place - at[k]):
-            return float(there[k]), False
-        else:
-            further = (QUANTILE - rise) / max(rise - low[0], 0.1 * (QUANTILE - rise))
-            place = float(there[k] + min(FURTHER, 1.05 * further) * (there[k] - low[1][k]))
-            low = rise, there
-        if np.isfinite(high[0]):
-            fraction = np.clip((QUANTILE - low[0]) / (high[0] - low[0]), 0.1, 0.9)
-            place = float(low[1][k] + fraction * (high[1][k] - low[1][k]))
-    return (float(low[1][k]), False) if np.isinf(high[0]) else (float(high[1][k]), True)
+        target = float(np.clip(target, free.low, free.high))
+        try:
+            there = problem.rephased(problem.coordinates.moved(
+                begin, (target - begin[k]) * uncertainty.covariance[:, k]
+                / uncertainty.covariance[k, k]))
+            left, slopes = problem(there)
+        except NoOrbit:
+            target = 0.5 * (target + end)
+            continue
+        others = np.delete(slopes * uncertainty.scale, k, axis=1)
+        step = np.linalg.lstsq(others, left, ZERO)[0]
+        rest = left - others @ step
+        rise = float(np.sqrt(max(float(rest @ rest) - 2.0 * least, 0.0) / uncertainty.inflation))
+        end = float(there[k])
+        if abs(rise - QUANTILE) <= CLOSE * QUANTILE or target in (free.low, free.high):
+            break
+        begin = there - np.insert(step, k, 0.0) * uncertainty.scale
+        target = float(values[k]) + (end - float(values[k])) * float(np.clip(
+            QUANTILE / max(rise, 1e-9), 0.5, 2.0))
+    return end
 
-
-def _least(problem: CycleProblem, known: Spread, k: int, place: float, at: np.ndarray
-           ) -> tuple[np.ndarray, float]:
-    """Values of least cost with number k about at a place, and that cost; from values.
-
-    Number k is drawn there by a residual of its own, so that no step need start from where there
-    is no orbit.
-    """
-    row = (np.arange(at.size) == k) / (DRAWN * CLOSE * abs(place - at[k]))
-
-    def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left, slopes = problem(values)
-        return np.append(left, row @ values - row[k] * place), np.vstack([slopes, row])
-
-    try:
-        begin = problem.rephased(problem.coordinates.moved(
-            at, (place - at[k]) * known.covariance[:, k] / known.covariance[k, k]))
-        left, slopes = problem(begin)
-        others = np.delete(slopes * known.scale, k, axis=1)
-        rest = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
-        cost, least = 0.5 * float(left @ left), 0.5 * float(rest @ rest)
-        # A linear step of the others leaves little to be gained: none need be taken.
-        if cost - least < CLOSE * known.inflation:
-            return begin, least
-    except NoOrbit:
-        begin = at
-    there = problem.coordinates.descend(evaluate, begin, TOLERANCE, MOST).values
-    return there, problem.cost(there)
-
-
-# A gait fitted to a recording: parameters, readouts, errors and uncertainties.
 
 #: STANDS: range of the mean cycle below which a joint stands, rad.
 STANDS = 0.01
 
 
-def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
-    """Return the mean of RMS error over range over the joints that move; 0 if none does.
+def rms_shares(recorded: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Return RMS error over range of each joint, nan for one that stands, shape (joints,).
 
     Args:
         recorded: rad, shape (joints, m).
@@ -309,9 +269,13 @@ def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
 
     """
     spans = np.ptp(recorded, axis=1)
-    moving = spans > STANDS
-    fractions = np.sqrt(np.mean(errors[moving]**2, axis=1)) / spans[moving]
-    return float(fractions.sum() / max(fractions.size, 1))
+    return np.sqrt(np.mean(errors**2, axis=1)) / np.where(spans > STANDS, spans, np.nan)
+
+
+def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
+    """Return the mean of the same over the joints that move; 0 if none does."""
+    shares = rms_shares(recorded, errors)
+    return float(np.nansum(shares) / max(np.isfinite(shares).sum(), 1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -413,9 +377,8 @@ class Fit(ShortRepr):
     @property
     def rms_share(self) -> dict[str, float]:
         """RMS error over the joint's range; 0 for a joint that stands."""
-        spans = np.ptp(self.recorded, axis=1)
-        return {name: rms / span if span > STANDS else 0.0
-                for (name, rms), span in zip(self.rms.items(), spans.tolist(), strict=True)}
+        shares = np.nan_to_num(rms_shares(self.recorded, self.errors))
+        return dict(zip(self.readouts, shares.tolist(), strict=True))
 
     @property
     def mean_rms_share(self) -> float:

@@ -135,8 +135,8 @@ class Signals(ShortRepr):
         """
         k = np.arange(self.terms.shape[1])
         terms = self.terms[waves]
-        found = _turns(theta, k.size) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=-1)
-        return found[..., 0].real, found[..., 1].real, found[..., 2].real
+        series = _turns(theta, k.size) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=-1)
+        return series[..., 0].real, series[..., 1].real, series[..., 2].real
 
     def derivatives(self, theta: np.ndarray, waves: np.ndarray, members: np.ndarray) -> np.ndarray:
         """Return the derivatives of x and y by numbers that move the parameters.
@@ -157,10 +157,10 @@ class Signals(ShortRepr):
 
 def _turns(theta: np.ndarray, count: int) -> np.ndarray:
     """``exp(2 pi i k theta)``, shape (..., count)."""
-    found = np.empty((*theta.shape, count), dtype=complex)
-    found[..., 0] = 1.0
-    found[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
-    return np.cumprod(found, axis=-1)
+    turns = np.empty((*theta.shape, count), dtype=complex)
+    turns[..., 0] = 1.0
+    turns[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
+    return np.cumprod(turns, axis=-1)
 
 
 def signals(orbit: Orbit, harmonics: int) -> Signals:

@@ -33,9 +33,6 @@ from scipy.optimize import least_squares
 # Numbers of a network that a fit may move, and their bounds.
 
 N = TypeVar('N', bound=Network)
-#: PLACES: places between a value and a bound at which the edge of the Hopf set is searched for;
-#: HALVINGS: halvings that then locate it.
-PLACES, HALVINGS = 64, 40
 #: APART: relative distance above which two minima are distinct; TINY: scale of a number near 0, in
 #: its unit, for relative distances.
 APART, TINY = 0.03, 1e-3
@@ -120,38 +117,6 @@ def with_values(network: N, free: Sequence[Free], values: Sequence[float] | np.n
         member: float(value) for parameter, value in zip(free, values, strict=True)
         for member in parameter.members})
 
-
-def within_hopf_set(network: Network, gait: str, parameter: Free) -> Free:
-    """Narrow the bounds of a single free number to where its gait is born before the delay.
-
-    The bounds of networks without a delay stay.
-    """
-    if not network.delay_parameter:
-        return parameter
-
-    def excess(value: float) -> float:
-        there = with_values(network, (parameter,), (value,))
-        if there.delay <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
-            return -1.0
-        point = first_hopf(there, gait)
-        return -1.0 if point is None or point.drifts else there.delay - point.value
-
-    here, ends = parameter.value(network), []
-    for end in (parameter.low, parameter.high):
-        inside = here
-        for outside in np.linspace(here, end, PLACES)[1:]:
-            if excess(float(outside)) <= 0.0:
-                for _ in range(HALVINGS):
-                    middle = 0.5 * (inside + outside)
-                    inside, outside = ((middle, outside) if excess(middle) > 0.0
-                                       else (inside, middle))
-                break
-            inside = float(outside)
-        ends.append(inside)
-    return Free(parameter.name, parameter.members, *ends)
-
-
-# A trust region from one start, with a record of its path.
 
 #: Values -> residual (n,) and its derivative (n, values); NoOrbit where there is none.
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -309,17 +274,13 @@ class Coordinates:
         return self.values(np.clip(begin + np.linalg.solve(self.slopes(begin), step), low, high))
 
     def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the coordinates; a single number's are those of its Hopf set, too."""
-        free = self.free
-        if len(free) == 1 and self.straight and free[0].members:
-            there = with_values(self._network, free, values[:1])
-            free = (within_hopf_set(there, self._gait, free[0]),)
-        low = np.array([*(one.low for one in free), -np.inf])
-        high = np.array([*(one.high for one in free), np.inf])
+        """Bounds of the coordinates."""
+        low = np.array([*(one.low for one in self.free), -np.inf])
+        high = np.array([*(one.high for one in self.free), np.inf])
         if not self.straight:
             low[self.delay], high[self.delay] = 1.0 + ABOVE, np.inf
         # Beyond 0, where there is no gait, the same waveform may have another sign and delay.
-        for k, one in enumerate(free):
+        for k, one in enumerate(self.free):
             if one.name in self._network.needed:
                 low[k], high[k] = ((max(low[k], 0.0), high[k]) if values[k] > 0.0
                                    else (low[k], min(high[k], 0.0)))

@@ -26,7 +26,7 @@ from dataclasses import replace
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Period
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Orbits, Period
 from cpg_ros.fitting.inversion.fit import (
     correlation_length,
     Estimate,
@@ -161,7 +161,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            free: Sequence[str] = (), order: int = 3,
            starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
            bounds: Mapping[str, tuple[float, float]] | None = None,
-           time_scale: float = 0.0, profiles: bool = True,
+           time_scale: float = 0.0, orbits: Orbits | None = None,
+           straight: bool = False,
            done: Callable[[float], None] = lambda fraction: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
 
@@ -179,8 +180,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         bounds: free number -> lower and upper bound, where narrower than the range.
         time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
             as the generator's frequency does.
-        profiles: whether intervals are those of the profile of the cost; otherwise they are
-            quadratic.
+        orbits: of earlier fits of the same parameters, gait and readout.
+        straight: whether intervals are quadratic however wide they are, which is quicker.
         done: called with the share of the work that is done, 0 to 1.
 
     Raises:
@@ -191,7 +192,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     """
     numbers = _numbers(network, gait, free or network.free, bounds)
     problem = _problem(cycle, joints_of(cycle, cells, network), network, gait, numbers, order,
-                       readout or GaitReadout.of(type(network), gait), time_scale)
+                       readout or GaitReadout.of(type(network), gait), time_scale, orbits)
     trials = _trials(problem, starts, done)
     best = min(trials, key=lambda trial: trial.cost)
     values = _weighed(problem, best.values)
@@ -208,14 +209,14 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             '' if runs is None else '; using the best fit that the generator can run')]
     done(0.6)
     fit = _judged(problem, trials, others, values if runs is None else runs,
-                  profiles and not flaw, warnings)
+                  straight or bool(flaw), warnings)
     done(1.0)
     return fit
 
 
 def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
-             numbers: tuple[Free, ...], order: int, readout: GaitReadout, time_scale: float
-             ) -> CycleProblem:
+             numbers: tuple[Free, ...], order: int, readout: GaitReadout, time_scale: float,
+             orbits: Orbits | None) -> CycleProblem:
     """Return what is to be solved, checked; arguments as of ``invert``."""
     if order not in WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
@@ -228,7 +229,8 @@ def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
         value = 1.0 / (cycle.frequency * time_scale)
         fraction = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
         period = Period(value, value * fraction)
-    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period)
+    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period,
+                        orbits)
 
 
 def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],
@@ -407,18 +409,18 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
     return here, first
 
 
-def _estimates(problem: CycleProblem, values: np.ndarray, profiles: bool
+def _estimates(problem: CycleProblem, values: np.ndarray, straight: bool
                ) -> tuple[dict[str, Estimate], Spread, ModelError]:
     """Return the estimates at values, and what they are made from."""
     left, slopes = problem(values)
-    known = spread(slopes, correlation_length(
+    uncertainty = spread(slopes, correlation_length(
         problem.best_readouts(values).residual / problem.sizes))
     model = model_error(left, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
-    return estimates(problem, values, known, model, profiles), known, model
+    return estimates(problem, values, uncertainty, model, straight), uncertainty, model
 
 
 def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping[str, Estimate],
-                   known: Spread) -> list[str]:
+                   uncertainty: Spread) -> list[str]:
     """Name numbers beyond their intervals that fit as well if joints lag their cells.
 
     The generator's do not; a free readout nearly hides it of those of other robots and animals.
@@ -434,36 +436,37 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
         return sum(by_joint[problem.kinds == kind].sum(axis=0).max()
                    for kind in range(problem.kinds.max() + 1)) >= enough
 
-    found = []
+    lines = []
     for k, (name, one) in enumerate(estimated.items()):
         ends = [one.low, one.high]
         for side, half in ((0, one.low - one.value), (1, one.high - one.value)):
             with suppress(NoOrbit):
                 for times in BEYOND if one.bounded else ():
                     there = problem.coordinates.moved(
-                        values, times * half * known.covariance[:, k] / known.covariance[k, k])
+                        values, times * half * uncertainty.covariance[:, k]
+                        / uncertainty.covariance[k, k])
                     if not fits(there):
                         break
                     ends[side] = float(there[k])
         if ends != [one.low, one.high]:
-            found.append(f'{name} from {ends[0]:.4g} to {ends[1]:.4g} fits as well if joints of a '
+            lines.append(f'{name} from {ends[0]:.4g} to {ends[1]:.4g} fits as well if joints of a '
                          'leg lag one another: the interval is that of joints which move with '
                          "their cells, as the generator's do")
-    return found
+    return lines
 
 
 def _judged(problem: CycleProblem, trials: Sequence[Minimisation], others: Sequence[np.ndarray],
-            values: np.ndarray, profiles: bool, warnings: Sequence[str]) -> Fit:
+            values: np.ndarray, straight: bool, warnings: Sequence[str]) -> Fit:
     """Return the fit at values, with its uncertainties."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.best_readouts(values)
-    estimated, spread, model = _estimates(problem, values, profiles)
+    estimated, spread, model = _estimates(problem, values, straight)
     for other in others:
         if problem.cost(other) < problem.cost(values) + _as_good(problem, values):
             # Another minimum explains the recording as well: the intervals hold both.
-            estimated = {name: parameter.together(_estimates(problem, other, profiles)[0][name])
+            estimated = {name: parameter.together(_estimates(problem, other, straight)[0][name])
                          for name, parameter in estimated.items()}
-    if profiles and not model.size:
+    if not (straight or model.size):
         warnings = [*warnings, *_if_joints_lag(problem, values, estimated, spread)]
     fractions = {}
     for order in WEIGHTS:

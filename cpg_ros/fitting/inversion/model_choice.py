@@ -26,7 +26,7 @@ from dataclasses import dataclass, field, replace
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.fitting.gaits.mean_cycle import average_cycles
 from cpg_ros.fitting.gaits.stride import Stride
-from cpg_ros.fitting.inversion.fit import STANDS
+from cpg_ros.fitting.inversion.fit import rms_shares
 from cpg_ros.fitting.inversion.fit_data import WEIGHTS
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout
 from cpg_ros.fitting.inversion.recording_fit import (
@@ -111,7 +111,9 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
-        fractions = _shares(fit.joints, fit.fitted - others[rows], others[rows])
+        shares = rms_shares(others[rows], fit.fitted - others[rows])
+        fractions = {name: share for name, share in zip(fit.joints, shares.tolist(), strict=True)
+                     if np.isfinite(share)}
         comparisons.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
             free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=fractions))
@@ -155,14 +157,6 @@ def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndar
                               range(len(stride.joints)))
         means.append((part.mean(stride.theta - part.zero), part.error))
     return replace(stride, mean=means[0][0], error=means[0][1]), means[1][0]
-
-
-def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
-            ) -> dict[str, float]:
-    """RMS errors of the joints that move over their ranges."""
-    spans, sizes = np.ptp(recorded, axis=1), np.sqrt(np.mean(errors**2, axis=1))
-    return {name: float(size / span) for name, size, span in
-            zip(joints, sizes, spans, strict=True) if span > STANDS}
 
 
 def indistinguishable(comparisons: Sequence[NetworkComparison], order: int) -> str:

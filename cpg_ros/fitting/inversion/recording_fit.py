@@ -23,6 +23,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.fitting.gaits.leg_names import legs_of
 from cpg_ros.fitting.gaits.leg_phases import PhaseScatter
 from cpg_ros.fitting.gaits.stride import FEW_CYCLES, find_stride, NoSteadyGait, Stride
+from cpg_ros.fitting.inversion.cycle_problem import Orbits
 from cpg_ros.fitting.inversion.fit import Estimate, Fit
 from cpg_ros.fitting.inversion.fit_data import cells_of, MeanCycle
 from cpg_ros.fitting.inversion.invert import invert
@@ -92,21 +93,23 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
     """
     readout = readout or GaitReadout.of(type(network), gait)
     first, free_names = '', tuple(free) or network.free
+    orbits: dict[tuple[str, ...], Orbits] = {}
 
     def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]],
-               profiles: bool = True) -> tuple[Fit, tuple[str, ...]]:
+               straight: bool = False) -> Fit:
         if not names:
             # Phases are known beforehand, and no other parameter shows.
-            return _as_it_is(cycle, cells, network, gait, lower, readout, done), ()
+            return _as_it_is(cycle, cells, network, gait, lower, readout, done)
+        same = tuple(name for name in names if name != GAIT_DUTY)
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
-                      profiles=profiles, done=done), ()
+                      orbits=orbits.setdefault(same, Orbits()), straight=straight, done=done)
 
     for names, lower, begins, relaxation in _ways(free_names, order, starts):
+        notes: tuple[str, ...] = ()
         try:
-            if free or begins:
-                fit, notes = fitted(names, lower, begins)
-            elif readout.duty is not None:
-                fit, notes = fitted((*names, GAIT_DUTY), lower, begins)
+            if free or begins or readout.duty is not None:
+                duty = () if free or begins else (GAIT_DUTY,)
+                fit = fitted((*names, *duty), lower, begins)
             else:
                 fit, notes = _with_duty_if_told(names, lower, fitted)
         except NoOrbit as error:
@@ -125,21 +128,21 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
 
 
 def _with_duty_if_told(names: tuple[str, ...], order: int,
-                       fitted: Callable[..., tuple[Fit, tuple[str, ...]]]
+                       fitted: Callable[..., Fit]
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit without a duty, unless the recording shows that it differs from the cells'."""
     try:
-        other, _ = fitted((*names, GAIT_DUTY), order, (), False)
+        other = fitted((*names, GAIT_DUTY), order, (), True)
     except NoOrbit:
-        return fitted(names, order, ())
+        return fitted(names, order, ()), ()
     minima = [dict(zip(other.free, minimum.values.tolist(), strict=False))
               for minimum in other.minima]
-    own, _ = fitted(names, order, [{}, *({name: minimum[name] for name in names}
-                                         for minimum in minima[:2])])
+    own = fitted(names, order, [{}, *({name: minimum[name] for name in names}
+                                      for minimum in minima[:2])])
     sizes = np.array(list(other.sizes.values()))[:, None]
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
     if rise > 0.5 * ASKED**2 * other.sharing:
-        return fitted((*names, GAIT_DUTY), order, minima)
+        return fitted((*names, GAIT_DUTY), order, minima), ()
     error = other.parameters[GAIT_DUTY].stderr
     return own, () if error < KNOWN else (
         'the recording does not tell how long legs stand: they are taken to stand as the cells of '
@@ -154,7 +157,7 @@ def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait
     room = STAYS * max(abs(value), 1.0)
     bounds = {name: (max(kind.low, value - room), min(kind.high, value + room))}
     fit = invert(cycle, cells, network, gait, (name,), order, ({},), readout=readout,
-                 bounds=bounds, profiles=False, done=done)
+                 bounds=bounds, straight=True, done=done)
     # The parameter was never fitted: an interval would claim what is not known.
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())
 

@@ -32,7 +32,7 @@ from cpg_ros.networks.registry import PRESETS
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st
-from made_up import joint_angles, record, weights_of
+from made_up import joint_angles, plain_readout, record, weights_of
 from noisy_cycles import CASES, CELLS, TROT, trot, truth_of
 import numpy as np
 import pytest
@@ -104,24 +104,6 @@ def test_a_period_is_fitted_where_time_has_a_scale():
 
 
 # -- a model that is not the truth ---------------------------------------------------------------
-
-def plain_readout(orbit, cells, weights, theta):
-    """Joints by three harmonics of each cell's waveform as they are: no Lanczos factors."""
-    grid, k = np.arange(1024) / 1024, np.arange(4)[:, None]
-    found = []
-    for cell, row in zip(np.array(cells) - 1, weights, strict=True):
-        terms = np.fft.rfft(orbit.waveform(grid, 0, int(orbit.waves[cell])))[:4, None] / 512.0
-        terms[0] *= 0.5
-
-        def wave(at, power, terms=terms):
-            return np.sum((terms * (1j * k)**power) * np.exp(2j * np.pi * k * at), axis=0).real
-
-        high, low = wave(grid, 0).max(), wave(grid, 0).min()
-        at = theta + orbit.phases[cell]
-        x, y = (2.0 * wave(at, 0) - high - low) / (high - low), 2.0 * wave(at, 1) / (high - low)
-        found.append(row @ np.array([x, y, x * x, x * y, x**3, x * x * y]))
-    return np.array(found)
-
 
 @pytest.mark.parametrize(('name', 'gait'), [('matsuoka', 'trot'), ('quadruped', 'trot'),
                                             ('biped', 'run'), ('hopf', 'trot')])
