@@ -19,7 +19,7 @@ Golubitsky 2001, section 2.1). Its violation is measured for every g and theta o
 and K are the symmetries whose violation is below the tolerance, as a homomorphism.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -127,8 +127,7 @@ def steadiness(v: np.ndarray, w: np.ndarray) -> float:
 
 
 #: FEWEST: smallest number of points of a cycle.
-#: NONE: distance, in units of the tolerance, at which "no named gait" is as likely as a gait.
-FEWEST, NONE = 8, 3.0
+FEWEST = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,7 +146,6 @@ class Recognition(ShortRepr):
             if it fits better with a smaller H.
         second: the best of the named gaits whose symmetry is not part of the nearest one's, or
             None if there is none.
-        confidence: probability that it is the nearest gait, not another nor none of them.
         phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
             correlation; between different waveforms it is no more than that. Cells to which H
             gives one waveform are compared with the first of them.
@@ -163,7 +161,6 @@ class Recognition(ShortRepr):
     distance: float
     margin: float
     second: str | None
-    confidence: float
     phases: np.ndarray
     h: tuple[str, ...]
     k: tuple[str, ...]
@@ -272,10 +269,9 @@ def recognise(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
     others = [name for name, gait in gaits.items()
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
     second = min(others, key=apart.__getitem__, default=None)
-    probability = _probability(apart[nearest], [apart[name] for name in others], tolerance)
     return Recognition(nearest if recognised else None, nearest, apart[nearest],
                        apart[second] - apart[nearest] if second is not None else np.inf, second,
-                       probability, _phases(cycle, symmetry), symmetry.h, symmetry.k,
+                       _phases(cycle, symmetry), symmetry.h, symmetry.k,
                        {name: violations.best(element)
                         for name, element in group.elements.items()})
 
@@ -292,10 +288,3 @@ def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
               for cell, head in enumerate(first)]
     # As in _best_shift: a rounding error below 1 is 0.
     return np.round(phases, 12) % 1.0
-
-
-def _probability(nearest: float, others: Sequence[float], scatter: float) -> float:
-    """Return the probability of the nearest gait among the others and none, by distances."""
-    odds = [np.exp(-0.5 * (other**2 - nearest**2) / scatter**2) for other in others]
-    none = np.exp(min(0.5 * ((nearest / scatter)**2 - NONE**2), 30.0))
-    return float(1.0 / (1.0 + sum(odds) + none))

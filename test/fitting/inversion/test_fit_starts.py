@@ -18,7 +18,6 @@ from dataclasses import replace
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.solve_orbit import solve_orbit
-from cpg_ros.fitting.inversion.free_parameters import free_numbers
 from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.paper_fit import cycle_samples, fit_cycle
 from cpg_ros.networks.registry import PRESETS
