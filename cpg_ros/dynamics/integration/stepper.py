@@ -144,8 +144,8 @@ class Stepper:
         """Add a motion to the newest state and to all of the history before it.
 
         Args:
-        motion: of model times up to 0, that of the newest node; (n,) to (n, components).
-        slope: its derivative, per model time, likewise.
+            motion: of model times up to 0, that of the newest node; (n,) to (n, components).
+            slope: its derivative, per model time, likewise.
 
         """
         nodes, newest = len(self._x), int(self.clock[0])
