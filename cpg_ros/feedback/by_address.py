@@ -21,12 +21,16 @@ import ctypes
 from typing import Any
 
 from cpg_ros.dynamics.integration.machine_code import machine_function
-from cpg_ros.feedback.closed_loop import close, Instant, STATE, warm_up_senses
+from cpg_ros.feedback.closed_loop import (
+    close,
+    closing_arguments,
+    Instant,
+    STATE,
+    warm_up_senses,
+)
 from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.kinematics import Geometry
-from cpg_ros.feedback.leg_rates import rates_memory
-from cpg_ros.feedback.tick import PlannedMotion
 from numba.extending import intrinsic
 import numpy as np
 
@@ -77,12 +81,8 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     """Run each kernel once, on the types that a generator uses; joints is their number."""
     feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
     senses, sensors = warm_up_senses(legs, joints)
-    some, one = np.zeros((1, joints)), np.zeros(1)
-    planned = PlannedMotion(some, one, np.zeros((1, 2), dtype=np.int64), one.copy(),
-                            np.zeros((1, 2)), one.copy(), one.copy(), np.zeros((1, 3)))
-    instant = Instant.empty(legs, one)
-    arguments = (geometry.arrays, feedback.tables, feedback.gains, feedback.memory, senses,
-                 sensors, planned, rates_memory(legs), instant, np.zeros(STATE), some.copy())
+    arguments = closing_arguments(feedback, senses, sensors, Instant.empty(legs, np.zeros(1)),
+                                  np.zeros(STATE), np.zeros((1, joints)), np.zeros(joints))
     close(*arguments)
     compiled(arguments)
     Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)

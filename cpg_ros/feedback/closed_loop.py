@@ -15,7 +15,7 @@
 """One tick of the closed loop, compiled: from the values of messages to corrected angles."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.estimate import loads_of, SensorData, TOUCH
@@ -36,8 +36,8 @@ from cpg_ros.feedback.input_checks import (
     note,
 )
 from cpg_ros.feedback.kinematics import LegArrays
-from cpg_ros.feedback.leg_rates import compare_rates
-from cpg_ros.feedback.tick import tick
+from cpg_ros.feedback.leg_rates import compare_rates, rates_memory
+from cpg_ros.feedback.tick import PlannedMotion, tick
 import numpy as np
 
 #: FURTHEST: largest difference between wanted and measured heading, rad.
@@ -293,6 +293,26 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
          (dt, state[FRACTION] * level, level, math.inf if math.isnan(age) else age), out)
     instant.scale[0], trim[:], state[CLOSED] = memory.frequency_scale[0], memory.stride[0], 1.0
     return 1
+
+
+def closing_arguments(feedback: Any, senses: Senses, sensors: SensorData, instant: Instant,
+                      state: np.ndarray, angles: np.ndarray, out: np.ndarray) -> tuple:
+    """Return the arguments of close.
+
+    Args:
+        feedback: Feedback of one robot.
+        senses: see close.
+        sensors: see close.
+        instant: see close.
+        state: see close.
+        angles: planned, rad, shape (1, joints).
+        out: corrected, rad, shape (joints,).
+
+    """
+    planned = PlannedMotion.zeros(1, out.size)._replace(angles=angles)
+    legs = feedback.geometry.arrays
+    return (legs, feedback.tables, feedback.gains, feedback.memory, senses, sensors, planned,
+            rates_memory(len(legs.rows)), instant, state, out[None])
 
 
 def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:

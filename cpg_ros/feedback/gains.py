@@ -23,27 +23,13 @@ a Unitree Go2.
 
 from collections.abc import Sequence
 from functools import cache
+from importlib import import_module
 import math
 from typing import Any
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.feedback.efference_copy import SIGNALS
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
-from cpg_ros.feedback.laws import (
-    clearance,
-    heading,
-    pace,
-    placement,
-    posture,
-    reflexes,
-    sidestep,
-    slope,
-    speed,
-    stiffen,
-    tegotae,
-    touchdown,
-    virtual_stiffness,
-)
 from cpg_ros.feedback.laws.law import Gain, Law, named_tuple, StateVariable
 from cpg_ros.motion.robot import Robot
 import numpy as np
@@ -51,9 +37,9 @@ import numpy as np
 # The list of the feedback laws, and the switches and gains of all of them.
 
 #: All laws, in the order in which parameters and the reference list them.
-LAWS: Sequence[Law] = [module.LAW for module in (
-    posture, placement, pace, stiffen, virtual_stiffness, reflexes, clearance, slope, heading,
-    speed, sidestep, touchdown, tegotae)]
+LAWS: Sequence[Law] = [import_module(f'cpg_ros.feedback.laws.{name}').LAW for name in (
+    'posture', 'placement', 'pace', 'stiffen', 'virtual_stiffness', 'reflexes', 'clearance',
+    'slope', 'heading', 'speed', 'sidestep', 'touchdown', 'tegotae')]
 #: Gains that all laws share.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}

@@ -72,6 +72,13 @@ class PlannedMotion(NamedTuple):
     turn: np.ndarray
     lean: np.ndarray
 
+    @classmethod
+    def zeros(cls, runs: int, joints: int) -> 'PlannedMotion':
+        """Return zeros, to be filled in place."""
+        return cls(np.zeros((runs, joints)), np.zeros(runs), np.zeros((runs, 2), dtype=np.int64),
+                   np.zeros(runs), np.zeros((runs, 2)), np.zeros(runs), np.zeros(runs),
+                   np.zeros((runs, 3)))
+
 
 class Deviation(NamedTuple):
     """Difference of the body's motion from the expected one: m/s, rad/s, rad."""
@@ -82,6 +89,30 @@ class Deviation(NamedTuple):
     wy: float
     roll: float
     pitch: float
+
+
+class Intent(NamedTuple):
+    """Motion of all feet of a run that the laws want; pairs are forward and to the left.
+
+    Attributes:
+        turns: 1 where left and right legs take turns, 0 where they hop.
+        roll, pitch: deviation from the slope of the ground, rad.
+        uphill: displacement of all feet, m, a pair.
+        further: how much further to put feet down, m, a pair.
+        yielded: speeds to which feet in stance yield, m/s, a pair.
+        sideways: wanted speed to the left, m/s.
+        strode: cycles since the last tick.
+
+    """
+
+    turns: float
+    roll: float
+    pitch: float
+    uphill: tuple[float, float]
+    further: tuple[float, float]
+    yielded: tuple[float, float]
+    sideways: float
+    strode: float
 
 
 @jit
@@ -134,6 +165,168 @@ def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
         stride[leg] = longer + uneven * tables.sides[leg]
 
 
+@jit
+def _intend(tables, gains, memory, planned, run, off, step):
+    """Return the Intent of a run, and advance the filters that it depends on."""
+    old, new, mix, (dt, fraction, _, _) = (planned.gaits[run, 0], planned.gaits[run, 1],
+                                           planned.mix[run], step)
+    slot = new if mix > 0.5 else old
+    phase, left = planned.phase[run], memory.wanted_velocity[run, 0, 1]
+    # Feet that land together pitch and roll the body wherever they are put: of the laws
+    # that move feet or change the frequency, only posture helps a hop.
+    turns = tables.turns[old] + mix * (tables.turns[new] - tables.turns[old])
+    ground = memory.ground_angles[run]
+    ground[0] = low_passed(ground[0], off.roll, gains.slope_filter, dt)
+    ground[1] = low_passed(ground[1], off.pitch, gains.slope_filter, dt)
+    uphill_x = uphill_y = 0.0
+    if gains.slope:
+        singly = tables.one_by_one[old] + mix * (tables.one_by_one[new] - tables.one_by_one[old])
+        uphill_x = turns * slope.shift_ahead(ground[1], singly, gains)
+        uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
+    further = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
+               placement.step(off.vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
+    yielded = placement.yielding(
+        off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
+        and tables.one_by_one[slot] > 0.0, gains)
+    memory.commanded_turn[run] = low_passed(
+        memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
+    memory.sidestep_correction[run] = sidestep.correct_speed(
+        memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
+        fraction * dt)
+    strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
+    memory.last_phase[run] = phase
+    return slot, Intent(turns, off.roll - ground[0], off.pitch - ground[1], (uphill_x, uphill_y),
+                        further, yielded, left + memory.sidestep_correction[run], strode)
+
+
+@jit
+def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
+    """Return how far to move a foot forward, to the left and up, m.
+
+    Args:
+        tables: GaitTables.
+        gains: Gains.
+        memory: Memory, changed in place.
+        at: run, leg, slot of the gait, and the rows of its tables with LEAD and without.
+        foot: as planned, base's frame, m, shape (3,).
+        middle: of the feet that stand, forward and to the left, m.
+        off: Deviation.
+        intent: Intent.
+        dt: s.
+
+    """
+    run, leg, slot, row, now = at
+    turns, swinging, contact = (intent.turns, tables.swinging[slot, row, leg],
+                                memory.contact[run, leg])
+    (x, y), z = intent.uphill, 0.0
+    if gains.posture:
+        if swinging:
+            # A hop lands on legs that a falling nose would draw in.
+            z = turns * posture.in_swing(foot[0], foot[1], intent.roll, intent.pitch, gains)
+        else:
+            # About the middle of the feet that stand: the body is tilted, not raised.
+            z = posture.in_stance(foot[0] - middle[0], foot[1] - middle[1], off.roll, off.pitch,
+                                  off.wx, off.wy, gains)
+    if gains.placement:
+        placed = memory.placement_displacement[run, leg]
+        placement.advance(placed, swinging, intent.further, intent.yielded, gains, dt)
+        x, y = x + turns * placed[0], y + turns * placed[1]
+    if gains.sidestep:
+        carried = memory.sidestep_displacement[run]
+        carried[leg] = sidestep.advance(
+            carried[leg], swinging, intent.sideways,
+            tables.duty[slot, leg] * dt / max(intent.strode, 0.1 * dt), gains, dt)
+        y += carried[leg]
+    if gains.reflexes:
+        z += turns * reflexes.advance(
+            memory.reflex_state[run, leg], contact, tables.swinging[slot, now, leg],
+            tables.progress[slot, now, leg], foot[2],
+            intent.roll * foot[1] - intent.pitch * foot[0], gains, dt)
+    if gains.clearance and swinging:
+        z += turns * clearance.lift(memory.clearance_share[run], tables.progress[slot, row, leg],
+                                    gains)
+    return x, y, z
+
+
+@jit
+def _move_feet(legs, tables, gains, memory, sensors, planned, run, slot, off, intent, step, out):
+    """Move the feet of a run; out are its angles, rad, shape (joints,).
+
+    Returns:
+        Sum of the changes of the legs' phase rates, rad/s, and how many feet stumble.
+
+    """
+    rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
+    quick, phase = 1.0 - math.exp(-dt / gains.smooth), planned.phase[run]
+    foot, feet = memory.scratch[0], memory.leg_velocities
+    row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
+    now = int(phase % 1.0 * POINTS) % POINTS
+    phase_rate, standing, mean_x, mean_y, stumbling = 0.0, 0, 0.0, 0.0, 0.0
+    for leg in range(rows.shape[0]):
+        feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
+            rows[leg], out[columns[leg, 0]], out[columns[leg, 1]], out[columns[leg, 2]])
+        if not tables.swinging[slot, row, leg]:
+            standing, mean_x, mean_y = (standing + 1, mean_x + feet[leg, 0],
+                                        mean_y + feet[leg, 1])
+    middle = mean_x / max(standing, 1), mean_y / max(standing, 1)
+    for leg in range(rows.shape[0]):
+        foot[0], foot[1], foot[2] = feet[leg, 0], feet[leg, 1], feet[leg, 2]
+        contact, swings_now, progress = (memory.contact[run, leg], tables.swinging[slot, now, leg],
+                                         tables.progress[slot, now, leg])
+        way = _displacement(tables, gains, memory, (run, leg, slot, row, now), foot, middle, off,
+                            intent, dt)
+        if gains.clearance:
+            stumbling += clearance.stumbles(contact, swings_now, progress)
+        if gains.tegotae:
+            phase_rate += tegotae.rate(max(sensors.foot_forces[run, leg], 0.0) / legs.weight,
+                                       swings_now, progress, gains)
+        if gains.touchdown and contact and not memory.previous_contact[leg]:
+            memory.phase_correction[run] += touchdown.phase_change(
+                swings_now, progress, tables.duty[slot, leg], gains) / rows.shape[0]
+        displacement = memory.displacement[run, leg]
+        for k in range(3):
+            displacement[k] += quick * (fraction * way[k] - displacement[k])
+        move_foot(rows[leg], columns[leg], out, foot, displacement)
+    return phase_rate, stumbling
+
+
+@jit
+def _stiffen(gains, memory, run, error, step):
+    """Make the servos stiff for a while after a velocity error, m/s."""
+    dt, fraction, _, delay = step
+    memory.kp_scale[run], memory.stiff[run] = 1.0, False
+    if not gains.stiffen:
+        return
+    # Before the full gait is reached the body is not yet where the efference copy has it.
+    memory.stiff_for[run] = stiffen.remaining(
+        memory.stiff_for[run], error if fraction == 1.0 else 0.0, gains, dt)
+    memory.stiff[run] = memory.stiff_for[run] > 0.0
+    if gains.virtual_stiffness:
+        # Measurements of which the feedback lets go may be old.
+        spent = memory.virtual_spent[run]
+        memory.stiff[run] = virtual_stiffness.acts(
+            spent, memory.stiff[run] and fraction == 1.0, delay, gains)
+        memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run], gains, dt)
+    elif memory.stiff[run]:
+        memory.kp_scale[run] = gains.stiffen_kp
+
+
+@jit
+def _change_frequency(gains, memory, run, steered, error, phase_rate, strode, step):
+    """Fill the factor of the stride frequency; phase_rate is the legs' sum, rad/s."""
+    scale, (dt, fraction, _, _) = 1.0, step
+    frequency = max(strode / dt, 0.1)
+    if gains.pace and steered:
+        scale += fraction * pace.frequency_change(error, memory.fatigue[run], gains)
+    memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
+    scale += fraction * phase_rate / (2.0 * math.pi * frequency * memory.stride.shape[1])
+    if gains.touchdown:
+        change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
+        memory.phase_correction[run] -= change * strode
+        scale += change
+    memory.frequency_scale[run] = max(scale, SLOWEST)
+
+
 @jit_entry
 def tick(legs, tables, gains, memory, sensors, planned, step, out):
     """Correct planned angles: fill out, rad, shape (runs, joints), and memory's outputs.
@@ -145,134 +338,28 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory: Memory of all runs, changed in place.
         sensors: SensorData.
         planned: PlannedMotion.
-        step: its length dt in s, the share of all corrections, the pattern's level, 0 to 1 both,
-            and the age of the measured angles, s.
+        step: its length dt in s, the fraction of all corrections, the pattern's level, 0 to 1
+            both, and the age of the measured angles, s.
         out: filled.
 
     """
-    rows, columns, (dt, fraction, level, delay) = legs.rows, legs.columns, step
-    quick = 1.0 - math.exp(-dt / gains.smooth)
-    foot, feet = memory.scratch[0], memory.leg_velocities
+    dt, fraction, level, _ = step
     for run in range(out.shape[0]):
         memory.previous_contact[:] = memory.contact[run]
         update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run], memory.doubt,
                memory.leg_velocities, memory.scratch)
-        target, velocity = memory.wanted_velocity[run], planned.velocity[run]
-        _approach(velocity, dt, target[0], target[1])
-        old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
-        slot, phase, left = new if mix > 0.5 else old, planned.phase[run], target[0, 1]
+        target = memory.wanted_velocity[run]
+        _approach(planned.velocity[run], dt, target[0], target[1])
         off = _deviation(tables, memory, sensors, planned, run, level)
-
-        # Feet that land together pitch and roll the body wherever they are put: of the laws
-        # that move feet or change the frequency, only posture helps a hop.
-        turns = tables.turns[old] + mix * (tables.turns[new] - tables.turns[old])
-        ground = memory.ground_angles[run]
-        ground[0] = low_passed(ground[0], off.roll, gains.slope_filter, dt)
-        ground[1] = low_passed(ground[1], off.pitch, gains.slope_filter, dt)
-        roll, pitch = off.roll - ground[0], off.pitch - ground[1]
-        uphill_x = uphill_y = 0.0
-        if gains.slope:
-            singly = tables.one_by_one[old] + mix * (
-                tables.one_by_one[new] - tables.one_by_one[old])
-            uphill_x = turns * slope.shift_ahead(ground[1], singly, gains)
-            uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
-        wide = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
-                placement.step(off.vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
-        yielded = placement.yielding(
-            off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
-            and tables.one_by_one[slot] > 0.0, gains)
-        memory.commanded_turn[run] = low_passed(
-            memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
-        memory.sidestep_correction[run] = sidestep.correct_speed(
-            memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
-            fraction * dt)
-        sideways = left + memory.sidestep_correction[run]
-        strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
-        memory.last_phase[run] = phase
-        row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
-        now = int(phase % 1.0 * POINTS) % POINTS
+        slot, intent = _intend(tables, gains, memory, planned, run, off, step)
         out[run] = planned.angles[run]
-        phase_rate, standing, mean_x, mean_y, stumbling = 0.0, 0, 0.0, 0.0, 0.0
-        for leg in range(rows.shape[0]):
-            hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
-            feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
-                rows[leg], out[run, hip], out[run, thigh], out[run, calf])
-            if not tables.swinging[slot, row, leg]:
-                standing, mean_x, mean_y = (standing + 1, mean_x + feet[leg, 0],
-                                            mean_y + feet[leg, 1])
-        mean_x, mean_y = mean_x / max(standing, 1), mean_y / max(standing, 1)
-        for leg in range(rows.shape[0]):
-            foot[0], foot[1], foot[2] = feet[leg, 0], feet[leg, 1], feet[leg, 2]
-            swinging, contact = tables.swinging[slot, row, leg], memory.contact[run, leg]
-            swings_now, progress = tables.swinging[slot, now, leg], tables.progress[slot, now, leg]
-            x, y, z = uphill_x, uphill_y, 0.0
-            if gains.posture:
-                if swinging:
-                    # A hop lands on legs that a falling nose would draw in.
-                    z = turns * posture.in_swing(foot[0], foot[1], roll, pitch, gains)
-                else:
-                    # About the middle of the feet that stand: the body is tilted, not raised.
-                    z = posture.in_stance(foot[0] - mean_x, foot[1] - mean_y, off.roll,
-                                          off.pitch, off.wx, off.wy, gains)
-            if gains.placement:
-                placed = memory.placement_displacement[run, leg]
-                placement.advance(placed, swinging, wide, yielded, gains, dt)
-                x, y = x + turns * placed[0], y + turns * placed[1]
-            if gains.sidestep:
-                carried = memory.sidestep_displacement[run]
-                carried[leg] = sidestep.advance(
-                    carried[leg], swinging, sideways,
-                    tables.duty[slot, leg] * dt / max(strode, 0.1 * dt), gains, dt)
-                y += carried[leg]
-            if gains.reflexes:
-                z += turns * reflexes.advance(
-                    memory.reflex_state[run, leg], contact, swings_now, progress, foot[2],
-                    roll * foot[1] - pitch * foot[0], gains, dt)
-            if gains.clearance:
-                stumbling += clearance.stumbles(contact, swings_now, progress)
-                if swinging:
-                    z += turns * clearance.lift(memory.clearance_share[run],
-                                                tables.progress[slot, row, leg], gains)
-            if gains.tegotae:
-                phase_rate += tegotae.rate(max(sensors.foot_forces[run, leg], 0.0) / legs.weight,
-                                           swings_now, progress, gains)
-            if gains.touchdown and contact and not memory.previous_contact[leg]:
-                memory.phase_correction[run] += touchdown.phase_change(
-                    swings_now, progress, tables.duty[slot, leg], gains) / rows.shape[0]
-            displacement = memory.displacement[run, leg]
-            displacement[0] += quick * (fraction * x - displacement[0])
-            displacement[1] += quick * (fraction * y - displacement[1])
-            displacement[2] += quick * (fraction * z - displacement[2])
-            move_foot(rows[leg], columns[leg], out[run], foot, displacement)
-
+        phase_rate, stumbling = _move_feet(legs, tables, gains, memory, sensors, planned, run,
+                                           slot, off, intent, step, out[run])
         memory.clearance_share[run] = clearance.update(
             memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
-        scale, frequency = 1.0, max(strode / dt, 0.1)
-        error = turns * pace.velocity_error(off.vx, off.vy, gains)
-        if gains.pace and tables.steered[slot]:
-            scale += fraction * pace.frequency_change(error, memory.fatigue[run], gains)
-        memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
-        memory.kp_scale[run], memory.stiff[run] = 1.0, False
-        if gains.stiffen:
-            # Before the full gait is reached the body is not yet where the efference copy has it.
-            memory.stiff_for[run] = stiffen.remaining(
-                memory.stiff_for[run], error if fraction == 1.0 else 0.0, gains, dt)
-            memory.stiff[run] = memory.stiff_for[run] > 0.0
-            if gains.virtual_stiffness:
-                # Measurements of which the feedback lets go may be old.
-                spent = memory.virtual_spent[run]
-                memory.stiff[run] = virtual_stiffness.acts(
-                    spent, memory.stiff[run] and fraction == 1.0, delay, gains)
-                memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run],
-                                                                    gains, dt)
-            elif memory.stiff[run]:
-                memory.kp_scale[run] = gains.stiffen_kp
-        scale += fraction * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
-        if gains.touchdown:
-            change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
-            memory.phase_correction[run] -= change * strode
-            scale += change
-        memory.frequency_scale[run] = max(scale, SLOWEST)
-
+        error = intent.turns * pace.velocity_error(off.vx, off.vy, gains)
+        _stiffen(gains, memory, run, error, step)
+        _change_frequency(gains, memory, run, tables.steered[slot], error, phase_rate,
+                          intent.strode, step)
         _change_strides(tables, gains, memory, run, slot, -off.vx,
                         (planned.heading[run], sensors.rpy[run, 2] - planned.lean[run, 2]), step)

@@ -31,14 +31,7 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.ros.feedback import switch
 from cpg_ros.ros.feedback.sensor_input import CONTACTS
-from cpg_ros.ros.feedback.switch import (
-    BalanceSwitch,
-    default_enabled,
-    ENABLED,
-    FeedbackSwitch,
-    FORMER,
-    PREFIX,
-)
+from cpg_ros.ros.feedback.switch import default_enabled, ENABLED, FeedbackSwitch, FORMER, PREFIX
 from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, FASTEST, MeasuredPose, Outputs
 from cpg_ros.ros.generator_parameters import (
     COMMANDS,
@@ -292,8 +285,7 @@ class Generator(StartedNode):
                                lambda: self._feedback.active) if steered else None
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                 self._value('command'))
-        self._feedback = (BalanceSwitch if soled else FeedbackSwitch)(
-            self, self.pattern, self._motion, self._outputs.topics)
+        self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
 
     # -- parameters -----------------------------------------------------------------------

@@ -71,11 +71,8 @@ class Patterns:
         first, runs = next(iter(plans.values())), len(scenarios)
         self._patterns = [Pattern(first, RAMP, drive=StrideCommand(len(first.robot.legs)))
                           for _ in scenarios]
-        self.planned = PlannedMotion(
-            np.zeros((runs, len(first.robot.joints))), np.zeros(runs),
-            np.zeros((runs, 2), dtype=np.int64), np.zeros(runs),
-            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs),
-            np.zeros((runs, 3)))
+        self.planned = PlannedMotion.zeros(runs, len(first.robot.joints))
+        self.planned.velocity[:, 0] = [one.speed for one in scenarios]
         self._position = self.planned.angles.copy()
         for run, (pattern, one) in enumerate(zip(self._patterns, scenarios, strict=True)):
             pattern.begin_at(one.phase)

@@ -32,6 +32,7 @@ from cpg_ros.feedback.biped.substitutes import (
 )
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.input_checks import GOOD
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.core import confine
 from cpg_ros.motion.pattern import GaitRunner, Pattern, SHORTEST
@@ -71,8 +72,6 @@ PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.1, 0.12, 0.06
 TWISTED, TURNED, USUAL, SEEN_LEVEL = 0.015, 0.05, 1.0, 1.0
 #: TOPPLES: lean of a robot that holds the stand, rad, above which it topples.
 TOPPLES = 0.05
-#: GOOD: time, s, after which an input that failed counts as valid again.
-GOOD = 0.3
 #: BLIND: age of IMU and joints, s, from which on nothing balances a walk: its last stride is
 #: repeated; LATE: the same where an input has failed already.
 BLIND, LATE = 0.025, 0.015
@@ -127,7 +126,9 @@ class BalancedPattern(Pattern):
         self.ages, self.latencies = np.zeros(3), np.zeros(3)
         self.failed, self.refused, self.crouching = False, False, False
         self.doubts: dict[int, str] = {}
-        self._contrary, self._gap, self._measured = 0.0, math.inf, np.zeros(1)
+        self._contrary, self._gap, self._before = 0.0, math.inf, np.zeros(1)
+        #: Which measured joints have moved further than they can.
+        self._leaps = np.zeros(1, dtype=bool)
         self._uneven, self._level, self._unchanged = 0.0, 0.0, np.zeros(1)
         self._settles, self._leant = 0.0, False
         self._tilts, self._usual = np.zeros((2, 2, 2))
@@ -140,7 +141,6 @@ class BalancedPattern(Pattern):
         self._substitutes: Substitutes | None = None
         self._crouch, self._depth = self._offset, 0.0
         self._braced, self._braces = self._offset, False
-        self._before: np.ndarray | None = None
         self._places = self.robot.places
         self._rest = np.array(list(self.robot.held.values()))
         self._arms: Arms | None = None
@@ -211,7 +211,7 @@ class BalancedPattern(Pattern):
     def resume(self, stall: float) -> None:
         """Go on after a stall in s, in which joints moved unseen."""
         super().resume(stall)
-        self._gap, self._before = self._gap + stall, None
+        self._gap += stall
 
     def release(self) -> None:
         """Stop balancing, as without sensors, and hold the angles of the stand."""
@@ -359,8 +359,12 @@ class BalancedPattern(Pattern):
 
     def _doubt(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
         """Count an input as out if it contradicts the others while the robot balances."""
+        joints = sensors.joint_positions[0]
+        moved = np.abs(joints - self._before)
+        self._leaps = moved > JUMP + FASTEST * (self._gap + dt)
+        self._before, self._gap = joints.copy(), self._ages[JOINTS]
         if self.balancing:
-            self._doubt_joints(balance, sensors, dt)
+            self._doubt_joints(balance, moved, dt)
         self._doubt_soles(balance, sensors, dt)
         if self.balancing and balance.mode == WALK and balance.kind == WALKS:
             loads, swings = sensors.foot_forces[0], balance.memory.swinging
@@ -369,7 +373,6 @@ class BalancedPattern(Pattern):
             self._contrary = self._contrary + dt if contrary else 0.0
             if self._contrary > STEADY:
                 self.doubts.setdefault(FEET, 'the contacts do not go with the gait')
-        self._measured, self._gap = sensors.joint_positions[0].copy(), self._ages[JOINTS]
         assert self._substitutes is not None
         if not self.doubts:
             self._substitutes.suspect = None
@@ -377,18 +380,15 @@ class BalancedPattern(Pattern):
             if doubted != JOINTS or self._substitutes.suspect is None:
                 self._ages[doubted] = max(self._ages[doubted], EXTRAPOLATED + ADOPTED)
 
-    def _doubt_joints(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+    def _doubt_joints(self, balance: BipedFeedback, moved: np.ndarray, dt: float) -> None:
         """Doubt a single joint that jumps, or that stays the same in a walk."""
-        joints = sensors.joint_positions[0]
-        moved = np.abs(joints - self._measured)
-        wrong, reason = moved > JUMP + FASTEST * (self._gap + dt), 'jumped'
-        if self._unchanged.size != joints.size or balance.mode != WALK:
-            self._unchanged = np.zeros(joints.size)
+        wrong, reason = self._leaps, 'jumped'
+        if self._unchanged.size != moved.size or balance.mode != WALK:
+            self._unchanged = np.zeros(moved.size)
         self._unchanged = np.where(moved > 0.0, 0.0, self._unchanged + dt)
         if not wrong.any():
-            wrong, reason = np.zeros(joints.size, dtype=bool), 'is stuck'
+            wrong, reason = np.zeros(moved.size, dtype=bool), 'is stuck'
             wrong[balance.rows] = self._unchanged[balance.rows] > STEADY
-        # A person who moves the robot moves more than one joint.
         if wrong.sum() == 1 and JOINTS not in self.doubts:
             assert self._substitutes is not None
             self._substitutes.suspect = int(wrong.argmax())
@@ -442,13 +442,11 @@ class BalancedPattern(Pattern):
         joints = sensors.joint_positions[0]
         lean = math.acos(min(max(math.cos(sensors.rpy[0, 0]) * math.cos(sensors.rpy[0, 1]),
                                  -1.0), 1.0))
-        moved = (self._before is not None
-                 and float(np.abs(joints - self._before).max()) > JUMP + FASTEST * dt)
-        self._before = joints.copy()
         if self.balancing:
             if lean > LEANS:
                 self._fall()
-            elif moved:
+            elif self._leaps.sum() > 1:
+                # A person moves more than one joint.
                 self.release()
             return
         if self._stops or self._lowers:
@@ -461,7 +459,7 @@ class BalancedPattern(Pattern):
         if TOPPLES < lean < UPRIGHT and not (stands or self.fallen or self.crouching):
             # Its feet do not show that it stands.
             self.crouching = True
-        self._stood = self._stood + dt if stands and not moved else 0.0
+        self._stood = self._stood + dt if stands and not self._leaps.any() else 0.0
         if self._stood >= STEADY:
             balance.restart(self._depth if self.crouching else 0.0)
             self.balancing, self.fallen, self._share, self._known = True, False, 0.0, True

@@ -138,12 +138,18 @@ class Targets:
 
 # Monitoring of how far joints are from their commanded angles.
 
-class TrackingMonitor:
-    """Averages |commanded - measured| of each joint, and finds the joint that does not follow.
+#: A joint is stuck if it moves by less than FOLLOWS of the range that it is commanded, while that
+#: is more than MOVES, rad, in two windows of ``tracking_time`` that follow one another.
+FOLLOWS, MOVES = 0.2, 0.08
 
-    A joint that is stuck amid a gait is at its commanded angle twice in a stride, so the mean
-    counts: an exponential one, of the time constant ``tracking_time``. A joint that is late by
-    some time has the mean error of its mean speed times that time.
+
+class TrackingMonitor:
+    """Finds the joint that does not follow its commands: one that is far from them, or is stuck.
+
+    A joint that is stuck amid a gait is at its commanded angle twice in a stride, so the mean of
+    |commanded - measured| counts: an exponential one, of the time constant ``tracking_time``. A
+    joint that is late by some time has the mean error of its mean speed times that time. A joint
+    that is stuck within a small swing is never far away, but its range is small.
     """
 
     def __init__(self, settings: BridgeSettings) -> None:
@@ -154,6 +160,13 @@ class TrackingMonitor:
     def reset(self) -> None:
         """Forget all errors."""
         self._mean = np.zeros(len(self._settings.names))
+        self._still, self._stuck = np.zeros((2, self._mean.size), dtype=bool)
+        self._begin_window()
+
+    def _begin_window(self) -> None:
+        """Forget the commanded and measured extremes, rad, (2, joints), and the time so far, s."""
+        self._low, self._window = np.full((2, self._mean.size), math.inf), 0.0
+        self._high = -self._low
 
     @property
     def worst(self) -> str:
@@ -167,11 +180,30 @@ class TrackingMonitor:
         weight = min(dt / settings.tracking_time, 1.0)
         self._mean += weight * (np.abs(commanded - measured) - self._mean)
         worst = int(self._mean.argmax())
+        if stuck := self._find_stuck(np.stack([commanded, measured]), dt):
+            return stuck
         if not self._mean[worst] > settings.tracking_error:
             return ''
         return (f'{settings.names[worst]} does not follow: it is at {measured[worst]:.2f} rad, '
                 f'commanded to {commanded[worst]:.2f}, and was {self._mean[worst]:.2f} rad away '
                 f'on average (tracking_error {settings.tracking_error:g} rad)')
+
+    def _find_stuck(self, angles: np.ndarray, dt: float) -> str:
+        """Add commanded and measured angles, rad, (2, joints); say which joint is stuck, or ''."""
+        settings = self._settings
+        self._low, self._high = np.minimum(self._low, angles), np.maximum(self._high, angles)
+        self._window += dt
+        if self._window >= settings.tracking_time and math.isfinite(settings.tracking_error):
+            commanded, measured = self._high - self._low
+            before, self._still = self._still, (commanded > MOVES) & (
+                measured < FOLLOWS * commanded)
+            self._stuck = self._still & before
+            self._begin_window()
+        if not self._stuck.any():
+            return ''
+        joint = int(self._stuck.argmax())
+        return (f'{settings.names[joint]} is stuck at {angles[1, joint]:.2f} rad: it moves by '
+                f'less than {FOLLOWS:g} of the range that it is commanded')
 
 
 class BridgeState(Enum):

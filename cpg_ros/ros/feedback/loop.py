@@ -22,10 +22,12 @@ from typing import Any
 from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
 from cpg_ros.feedback.closed_loop import (
     close,
     CLOSED,
+    closing_arguments,
     CONTRARY,
     DIES_OUT,
     FRACTION,
@@ -38,11 +40,10 @@ from cpg_ros.feedback.closed_loop import (
 )
 from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.gains import Memory
+from cpg_ros.feedback.gains import Gains, Memory
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.laws.virtual_stiffness import targets
-from cpg_ros.feedback.leg_rates import MOUNTED, rates_memory
-from cpg_ros.feedback.tick import PlannedMotion
+from cpg_ros.feedback.leg_rates import MOUNTED
 from cpg_ros.motion.pattern import Machine, Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.ros.feedback.sensor_input import SensorInput
@@ -60,11 +61,33 @@ class SensorLoop:
 
     Attributes:
         inputs: the robot's sensors.
+        feedback: its laws, whose gains may be replaced.
+        wanted: whether the feedback is enabled.
+        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; '' while it is active.
+        waiting: whether an input has never arrived.
+        fraction: of all corrections, 0 to 1.
 
     """
 
+    feedback: Any
+    wanted: Any
+    faults: Any
+    waiting: Any
+    fraction: Any
+
     def __init__(self, inputs: SensorInput, motion: Motion) -> None:
         self.inputs, self._motion = inputs, motion
+
+    @property
+    def state(self) -> str:
+        """State of the feedback while it is wanted, for /diagnostics."""
+        if self.faults:
+            return f'{"waiting" if self.waiting else "out"}: {self.faults}'
+        return self._active_state
+
+    @property
+    def _active_state(self) -> str:
+        return f'{100.0 * self.fraction:.0f} %'
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
@@ -89,7 +112,6 @@ class FeedbackLoop(SensorLoop):
     """Corrects a pattern by the robot's sensors, as long as they are plausible.
 
     Attributes:
-        feedback: its laws, whose gains may be replaced, see ``bind``.
         odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
 
     """
@@ -106,16 +128,13 @@ class FeedbackLoop(SensorLoop):
 
         """
         super().__init__(inputs, motion)
-        self._state = np.zeros(STATE)
-        self._pattern, legs = pattern, len(pattern.robot.legs)
-        self._wanted, self._goal, scale = pattern.planned
+        self._pattern = pattern
+        planned, self._goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
-        self._instant = Instant.empty(legs, scale)
-        self._planned = PlannedMotion(self._wanted[None], np.zeros(1),
-                                      np.zeros((1, 2), dtype=np.int64), np.zeros(1),
-                                      np.zeros((1, 2)), np.zeros(1), np.zeros(1),
-                                      np.zeros((1, 3)))
-        self._legs, self._rates = geometry.arrays, rates_memory(legs)
+        self._instant = Instant.empty(len(pattern.robot.legs), scale)
+        self._state = np.zeros(STATE)
+        self._arguments = closing_arguments(self.feedback, inputs.senses, inputs.sensor_data,
+                                            self._instant, self._state, planned[None], self._goal)
         self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
         self.odometry: Odometry | None = None
         # It loads numba.
@@ -161,6 +180,11 @@ class FeedbackLoop(SensorLoop):
         """Factor of the servos' proportional gain."""
         return float(self.feedback.memory.kp_scale[0])
 
+    def set_gains(self, gains: Gains) -> None:
+        """Replace the gains; errors as of bind."""
+        self.feedback.gains = gains
+        self.bind()
+
     def bind(self) -> None:
         """Use the feedback's gains from the next tick on.
 
@@ -168,15 +192,12 @@ class FeedbackLoop(SensorLoop):
             InputError: one is outside its limits.
 
         """
-        feedback = self.feedback
-        feedback.gains.check()
-        self._arguments = (self._legs, feedback.tables, feedback.gains, feedback.memory,
-                           self.inputs.senses, self.inputs.sensor_data, self._planned,
-                           self._rates, self._instant, self._state, self._goal[None])
+        self._bound = self.feedback.gains
+        self._bound.check()
+        self._arguments = (*self._arguments[:2], self._bound, *self._arguments[3:])
         # A tick under way may still read those before.
         self._memories = [*self._memories[-1:], self._by_address.memory_of(self._arguments)]
         self._correction.arguments = ctypes.addressof(self._memories[-1])
-        self._bound = feedback.gains
         if self._kernel is None:
             self._kernel = specialised(close, *self._arguments)
 
@@ -187,7 +208,7 @@ class FeedbackLoop(SensorLoop):
         self._state[[WANTED, SPENT]] = wanted, math.inf
         self.feedback.reset()
         self.inputs.restart()
-        self._rates[0][:] = 0.0
+        self._arguments[7][0][:] = 0.0
         if self.odometry is not None:
             self.odometry.restart()
         self._pattern.correct, self._instant.scale[0], self._instant.trim[:] = None, 1.0, 0.0
@@ -278,18 +299,8 @@ class FeedbackLoop(SensorLoop):
         return self._correction
 
 
-# The balance of a biped: from the topics of its sensors to its feedback, at every tick.
-
 class BalanceLoop(SensorLoop):
-    """Balances a biped by its sensors, as long as they are plausible.
-
-    Attributes:
-        feedback: its laws, whose gains may be replaced.
-        wanted: whether the feedback is enabled.
-        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
-        waiting: whether an input has never arrived.
-
-    """
+    """Balances a biped by its sensors, as long as they are plausible."""
 
     def __init__(self, pattern: BalancedPattern, inputs: SensorInput, motion: Motion) -> None:
         """Prepare to balance.
@@ -327,14 +338,22 @@ class BalanceLoop(SensorLoop):
         self._pattern.release()
         self.inputs.restart()
 
+    def set_gains(self, gains: BipedGains) -> None:
+        """Replace the gains of the walk."""
+        self.feedback.set_gains('walk', gains)
+
     @property
-    def state(self) -> str:
-        """State of the feedback, as text."""
+    def held_angles(self) -> np.ndarray:
+        """Target angles of joints of no leg, rad, in the order of ``robot.held``."""
+        return self._pattern.held_angles
+
+    @property
+    def _active_state(self) -> str:
         pattern = self._pattern
         if pattern.balancing:
-            return f'coming to a stand: {self.faults}' if self.faults else 'on'
+            return 'on'
         if pattern.crouching and not pattern.fallen:
-            return 'crouching' + (f': {self.faults}' if self.faults else '')
+            return 'crouching'
         return ('the robot has fallen: put it on its feet' if pattern.fallen else
                 'holding the stand until the robot stands on its feet')
 

@@ -14,21 +14,22 @@
 
 """Switches the feedback of a generator on and off, as its parameters say."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 from cpg_ros.dynamics.integration.compilation import COMPILED
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.gains import BipedGains
-from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
+from cpg_ros.feedback.biped.gains import GAINS as BALANCE_GAINS
 from cpg_ros.feedback.closed_loop import CONTACTS
 from cpg_ros.feedback.estimate import Odometry, SCALE
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS, robot_gains
 from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
+from cpg_ros.feedback.laws.law import Gain
 from cpg_ros.motion.body_file import GAIT_SPEEDS
 from cpg_ros.motion.pattern import Machine, Pattern
 from cpg_ros.motion.plan import GaitPlan
@@ -89,21 +90,24 @@ TOPICS = fixed({
 #: Switches of the laws and gains, all of which can be set at any time.
 
 
+def _specs(gains: Mapping[str, Gain], values: Any) -> dict[str, Spec]:
+    return {f'{PREFIX}{name}': Spec(getattr(values, name), f'{gain.text} [{gain.unit}]'
+                                    if gain.unit else gain.text, gain.low, gain.high)
+            for name, gain in gains.items()}
+
+
 def of_gains(usual: Gains) -> dict[str, Spec]:
     """Return the parameters of the laws, whose defaults are these gains."""
     return {**{f'{PREFIX}{law.name}': Spec(getattr(usual, law.name), law.text) for law in LAWS},
-            **{f'{PREFIX}{name}': Spec(getattr(usual, name), f'{gain.text} [{gain.unit}]'
-                                       if gain.unit else gain.text, gain.low, gain.high)
-               for name, gain in GAIN_OF.items()}}
+            **_specs(GAIN_OF, usual)}
 
 
 #: GAINS: the same for a Go2.
 GAINS = of_gains(Gains())
 SPECS = {**TOPICS, **GAINS}
 #: The same of bipeds with soles; the generator's parameter ``frequency`` is their clock's.
-BIPED_GAINS = {f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
-                                       else gain.text, gain.low, gain.high)
-               for name, gain in BIPED_GAIN_OF.items() if name != 'frequency'}
+BIPED_GAIN_OF = {name: gain for name, gain in BALANCE_GAINS.items() if name != 'frequency'}
+BIPED_GAINS = _specs(BIPED_GAIN_OF, BipedGains())
 
 
 def specs(robot: Robot) -> dict[str, Spec]:
@@ -120,19 +124,7 @@ def specs(robot: Robot) -> dict[str, Spec]:
                                                ('max_delay', LATE_BALANCE if balanced else LATE))}}
     if robot.biped is None:
         return {**topics, **of_gains(robot_gains(robot))}
-    own = BipedGains.of_body(robot.biped)
-    return {**topics, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
-                         for name, spec in BIPED_GAINS.items()}}
-
-
-def gains(value: Callable[[str], Any]) -> Gains:
-    """Return the gains; ``value`` returns a parameter's value by its name behind PREFIX."""
-    return Gains(*map(value, Gains._fields))
-
-
-def biped_gains(value: Callable[[str], Any]) -> BipedGains:
-    """Return a biped's gains in its walk, the same way."""
-    return BipedGains(**{name: value(name) for name in BIPED_GAIN_OF if name != 'frequency'})
+    return {**topics, **_specs(BIPED_GAIN_OF, BipedGains.of_body(robot.biped))}
 
 
 def missing_requirements(robot: Robot) -> str:
@@ -184,7 +176,8 @@ class FeedbackSwitch:
     """The feedback of a generator, made when it is first switched on.
 
     Attributes:
-        loop: a FeedbackLoop; None as long as it has not been on.
+        loop: a FeedbackLoop, or the BalanceLoop of a robot with soles; None as long as it has not
+            been on.
 
     """
 
@@ -193,7 +186,7 @@ class FeedbackSwitch:
 
         Args:
             node: a StartedNode.
-            pattern: to be corrected.
+            pattern: to be corrected; a BalancedPattern of a robot with soles.
             motion: returns the wanted motion of the robot.
             own: topics that the node publishes itself, resolved.
 
@@ -202,9 +195,11 @@ class FeedbackSwitch:
 
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
+        self._biped = pattern.robot.biped
         self.loop: Any = None
         self._delays_logged = False
         self._odometry: OdometryPublisher | None = None
+        self._held: HeldPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
         self._hindrance = ''
@@ -218,6 +213,9 @@ class FeedbackSwitch:
 
     def obstacle(self) -> str:
         """Return why the feedback cannot be on, or ''."""
+        if self._biped is not None and self._value('contacts') == 'efforts':
+            return ("feedback.contacts 'efforts' is for feet that are points: a robot with soles "
+                    'needs foot_contacts or wrenches')
         if missing := missing_requirements(self._pattern.robot):
             return missing
         topic = self._node.resolve_topic_name(self._value('joint_states_topic'))
@@ -234,25 +232,29 @@ class FeedbackSwitch:
         return f'no feedback: {obstacle}' if obstacle else ''
 
     def refuses(self, plan: GaitPlan) -> str:
-        """Return why a gait cannot be run, or '': feedback without an efference copy waits."""
-        return ''
+        """Return why a gait cannot be run, or ''; point feet run it without an efference copy."""
+        if self._biped is None or plan.balanced or not self._value('enabled'):
+            return ''
+        return f'gait {plan.gait} cannot be balanced (supported: {", ".join(GAIT_SPEEDS)})'
 
     def apply(self) -> None:
         """Apply the parameters."""
         enabled = self._node.get_parameter(ENABLED).value and not self.obstacle()
         if enabled and self.loop is None:
-            self.loop = self._make()
+            self.loop = self._make_balance() if self._biped is not None else self._make()
         if self.loop is not None:
-            self._set_gains()
+            self.loop.set_gains(Gains(*map(self._value, Gains._fields)) if self._biped is None else
+                                BipedGains(**{name: self._value(name) for name in BIPED_GAIN_OF}))
             self.loop.wanted = enabled and not self._hindrance
 
     def hinder(self, reason: str) -> None:
-        """Fade the feedback out as long as there is a reason, '' for none."""
-        self._hindrance = reason
-        if self.loop is not None:
-            self.apply()
+        """Fade the feedback out as long as there is a reason, '' for none; a biped would fall."""
+        if self._biped is None:
+            self._hindrance = reason
+            if self.loop is not None:
+                self.apply()
 
-    def _make(self) -> Any:
+    def _make(self) -> FeedbackLoop:
         """Return the loop, its kernels compiled."""
         # It loads numba.
         from cpg_ros.feedback.by_address import warm_up
@@ -278,6 +280,21 @@ class FeedbackSwitch:
                 self._value('odometry_tf'))
         return loop
 
+    def _make_balance(self) -> BalanceLoop:
+        """Return the loop of a biped, its kernels compiled."""
+        pattern, biped = self._pattern, self._biped
+        assert isinstance(pattern, BalancedPattern) and biped is not None
+        if self._started:
+            compile_apart(self._node, 'balance', BALANCE)
+        inputs = self._inputs(GRAVITY * biped.total)
+        if self._value('odometry_topic'):
+            self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
+        with announced(self._node, 'the feedback', BALANCE):
+            loop = BalanceLoop(pattern, inputs, self._motion)
+        if loop.feedback.arms.swing:
+            self._held = HeldPublisher(self._node, pattern.robot)
+        return loop
+
     def _inputs(self, geometry: Geometry | float) -> SensorInput:
         mount = self._value('imu_mount')
         if len(mount) != 3 or not np.isfinite(mount).all():
@@ -286,10 +303,6 @@ class FeedbackSwitch:
         return SensorInput(self._node, self._pattern.robot, geometry, *map(self._value, (
             'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic', 'imu_mount',
             'max_delay')))
-
-    def _set_gains(self) -> None:
-        self.loop.feedback.gains = gains(self._value)
-        self.loop.bind()
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
@@ -308,7 +321,12 @@ class FeedbackSwitch:
         self.loop.renew()
         if self.loop.fraction > 0.0 and not self._delays_logged:
             self._delays_logged = True
-            self._log_delays()
+            delays = [f'{name} {1e3 * delay:.1f} ms'
+                      for name, delay in self.loop.latencies().items()]
+            self._node.get_logger().info(
+                'feedback: age of the measurements when they are used: '
+                f'{", ".join(delays) or "unknown, messages have no stamps"} '
+                f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
 
     def machine(self, pattern: Machine) -> native.Correction | None:
         """Return how machine code corrects a pattern, None where ticks need Python."""
@@ -327,23 +345,22 @@ class FeedbackSwitch:
         """Return the output of kp_scale for ticks outside the interpreter, rate in Hz."""
         return self._kp_scale.output(self.loop.feedback.memory.kp_scale, rate)
 
-    def _log_delays(self) -> None:
-        delays = [f'{name} {1e3 * delay:.1f} ms' for name, delay in self.loop.latencies().items()]
-        self._node.get_logger().info(
-            'feedback: age of the measurements when they are used: '
-            f'{", ".join(delays) or "unknown, messages have no stamps"} '
-            f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
-
     def targets(self, position: np.ndarray) -> np.ndarray:
         """Return the targets to send for wanted angles of the joints, rad, shape (joints,)."""
         return position if self.loop is None else self.loop.targets(position)
 
     def publish(self, dt: float, stamp: int) -> None:
         """Publish the messages that are due; dt since the last call, s, and stamp, ns."""
-        if self.loop is not None:
+        if self.loop is None:
+            return
+        if self._biped is None:
             self._kp_scale.publish(dt, self.loop.kp_scale)
-            if self._odometry is not None and self.loop.fraction > 0.0:
-                self._odometry.publish(dt, stamp)
+        elif news := self.loop.news():
+            self._node.get_logger().warning(news)
+        if self._held is not None:
+            self._held.publish(stamp, self.loop.held_angles)
+        if self._odometry is not None and self.loop.fraction > 0.0:
+            self._odometry.publish(dt, stamp)
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
@@ -361,79 +378,14 @@ class FeedbackSwitch:
         loop = self.loop
         return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
 
-    def _text(self) -> str:
-        return f'{100.0 * self.loop.fraction:.0f} %'
-
     def state(self, now: float) -> dict[str, str]:
         """Return its state and the ages of its inputs, for /diagnostics; now in s."""
         loop = self.loop
-        if loop is None or not loop.wanted:
-            text = 'off'
-        elif loop.faults:
-            text = f'{"waiting" if loop.waiting else "out"}: {loop.faults}'
-        else:
-            text = self._text()
         if loop is None:
-            return {'feedback': text}
-        return {'feedback': text,
+            return {'feedback': 'off'}
+        return {'feedback': loop.state if loop.wanted else 'off',
                 **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
                    for name, age in loop.ages(now).items()},
                 **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'
                    for name, delay in loop.latencies().items()},
                 'largest delay [ms]': f'{1e3 * self._value("max_delay"):.1f}'}
-
-
-# Switches the balance of a biped on and off, as the generator's parameters say.
-
-class BalanceSwitch(FeedbackSwitch):
-    """The feedback of a generator of a biped with soles.
-
-    Attributes:
-        loop: a BalanceLoop; None as long as it has not been on.
-
-    """
-
-    _held: HeldPublisher | None = None
-
-    def obstacle(self) -> str:
-        """Return why the feedback cannot be on, or ''."""
-        if self._value('contacts') == 'efforts':
-            return ("feedback.contacts 'efforts' is for feet that are points: a robot with soles "
-                    'needs foot_contacts or wrenches')
-        return super().obstacle()
-
-    def hinder(self, reason: str) -> None:
-        """Do nothing: without its balance the robot falls."""
-
-    def _make(self) -> BalanceLoop:
-        pattern = cast(BalancedPattern, self._pattern)
-        biped = pattern.robot.biped
-        assert biped is not None
-        if self._started:
-            compile_apart(self._node, 'balance', BALANCE)
-        inputs = self._inputs(GRAVITY * biped.total)
-        if self._value('odometry_topic'):
-            self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
-        with announced(self._node, 'the feedback', BALANCE):
-            return BalanceLoop(pattern, inputs, self._motion)
-
-    def refuses(self, plan: GaitPlan) -> str:
-        """Return why a gait cannot be run, or ''."""
-        if plan.balanced or not self._value('enabled'):
-            return ''
-        return f'gait {plan.gait} cannot be balanced (supported: {", ".join(GAIT_SPEEDS)})'
-
-    def _set_gains(self) -> None:
-        self.loop.feedback.set_gains('walk', biped_gains(self._value))
-
-    def publish(self, dt: float, stamp: int) -> None:
-        """Publish the targets of joints of no leg; log changes of the balance."""
-        if self.loop is not None and self.loop.feedback.arms.swing:
-            if self._held is None:
-                self._held = HeldPublisher(self._node, self._pattern.robot)
-            self._held.publish(stamp, cast(BalancedPattern, self._pattern).held_angles)
-        if self.loop is not None and (news := self.loop.news()):
-            self._node.get_logger().warning(news)
-
-    def _text(self) -> str:
-        return str(self.loop.state)

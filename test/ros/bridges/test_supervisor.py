@@ -315,6 +315,20 @@ def test_a_joint_that_does_not_follow_makes_it_sit():
     assert rig.machine.reason.startswith('FL_hip_joint does not follow: it is at')
 
 
+@pytest.mark.parametrize(('swing', 'slack', 'stuck'), [
+    (0.06, 0.005, True), (0.06, 0.03, False), (0.03, 0.0, False)])
+def test_a_joint_that_is_stuck_within_a_small_swing_makes_it_sit(swing, slack, stuck):
+    # Never 0.1 rad away on average: what tells is that it hardly moves, where it should by enough.
+    rig = Rig(settings=replace(GO2, tracking_error=0.1, tracking_time=0.5)).following()
+    middle = rig.target[3]
+    for tick in range(round(2.5 / DT)):
+        wave = np.sin(2.0 * np.pi * 2.0 * DT * tick)
+        rig.target[3], rig.stuck = middle + swing * wave, (3, middle + slack * wave)
+        rig.run(DT)
+    assert (rig.machine.state is BridgeState.FOLLOWING) != stuck
+    assert ('FL_hip_joint is stuck at' in rig.machine.reason) == stuck
+
+
 # -- the watchdog ------------------------------------------------------------------------------
 
 def test_the_watchdog_damps_after_two_missing_ticks_until_the_next():

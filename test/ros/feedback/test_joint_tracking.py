@@ -74,6 +74,16 @@ def test_a_joint_that_jams_is_an_error_and_ends_the_feedback(followed):
     assert state(watcher).startswith('waiting: ')
 
 
+def test_a_joint_that_jams_within_its_swing_is_an_error(followed):
+    generator, watcher, jammed, _ = followed
+    until(lambda: len(watcher.diagnostics) >= 2, 'diagnostics')
+    # In the middle of its swing, whose mean distance from there is below tracking_error.
+    jammed[JOINT] = 0.9
+    generator.wait_for(f'{JOINT} is stuck at 0.90 rad')
+    jammed.clear()
+    generator.wait_for('all joints follow again')
+
+
 def test_the_mean_is_over_simulated_time(followed):
     generator, watcher, jammed, measure = followed
     until(lambda: len(watcher.diagnostics) >= 2, 'diagnostics')
