@@ -174,7 +174,7 @@ class RobotCheck:
 
 def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
             gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0,
-            geometry: BodyGeometry | None = None, notes: Sequence[str] = ()) -> RobotCheck:
+            geometry: BodyGeometry | None = None) -> RobotCheck:
     """Compare a robot file with the robot's description.
 
     Args:
@@ -186,7 +186,6 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
             robot file says of the gait, or else 1 Hz.
         amplitude: factor on the readout weights.
         geometry: that the description gives, if the file's is to be compared with it.
-        notes: of the caller's.
 
     """
     near = _nearest(robot, description)
@@ -194,19 +193,14 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
         _faults(joint, description, near.get(joint.name, '')))) for joint in robot.joints)
     pairs = [(network, name) for network in robot.networks for name in
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
+    shape = list(_implausible(robot, description))
+    if robot.geometry is not None and geometry is not None:
+        shape += _differing(robot.geometry, geometry, description.format)
+    shape += walking_faults(robot, description, pairs)
     return RobotCheck(*names, description.format, joints, tuple(
         _gait(robot, description, network, name, frequency, amplitude) for network, name in pairs),
-        tuple(_lopsided(robot)), tuple(_shape(robot, description, pairs, geometry)),
-        (*notes, *_notes(robot, description)))
-
-
-def _shape(robot: Robot, description: RobotDescription, gaits: Sequence[tuple[str, str]],
-           geometry: BodyGeometry | None) -> Iterator[str]:
-    """Say what is wrong with lengths, masses, sides, the stand and the steps."""
-    yield from _implausible(robot, description)
-    if robot.geometry is not None and geometry is not None:
-        yield from _differing(robot.geometry, geometry, description.format)
-    yield from walking_faults(robot, description, gaits)
+        tuple(_lopsided(robot)), tuple(shape),
+        tuple(_notes(robot, description)))
 
 
 def walking_faults(robot: Robot, known: RobotDescription,

@@ -78,9 +78,9 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
     """
     counts = {len(legs[leg]) for leg in legs}
     if len(legs) == 2 and not counts <= {5, 6}:
-        joints = next(legs[leg] for leg in legs)
+        first = next(legs[leg] for leg in legs)
         raise DescriptionError(
-            f'legs of {len(joints)} joints ({", ".join(joints)}): on two legs a robot needs five '
+            f'legs of {len(first)} joints ({", ".join(first)}): on two legs a robot needs five '
             'or six in each, to step aside and to keep its soles level')
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))

@@ -155,9 +155,10 @@ MASS = 15.2
 #: REFUSED: price of a design that the joints cannot follow; BEYOND: price of each unit beyond a
 #: limit, which leads the search back within it; NO_GAIT: price of a design without a gait.
 REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
-#: For slow joints. SLOWEST: least factor of a gait's usual frequencies that is tried; ROOM: share
-#: of their speed limit with which the gentlest start begins.
-SLOWEST, ROOM = 0.3, 0.9
+#: For slow joints. SLOWEST: least factor of a gait's usual frequencies that is tried; SMALLEST: of
+#: the strides of the nearest design where it is the slowest; ROOM: share of their speed limit with
+#: which the gentlest start begins.
+SLOWEST, SMALLEST, ROOM = 0.3, 0.5, 0.9
 #: SPREAD: initial standard deviation of the designs about the start (1: the whole range).
 SPREAD = 0.15
 #: GENTLE: starts that are tried first, by how much gentler than the usual one, 0 to 1.
@@ -288,11 +289,13 @@ class Tuner:
                               update, len(aims))
         near = self._nearest
         if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
-            # The nearest one, by so much slower that its joints follow.
-            fraction = ROOM * near.fraction
-            slower = replace(near.design, frequency=fraction * near.design.frequency)
+            # The nearest one, by so much slower that its joints follow, or else smaller.
+            fraction, keys = ROOM * near.fraction, ['stride', 'lift', 'push_fore', 'push_hind']
             if fraction * aim.speed >= SLOWEST * AIMS[gait].speed:
-                best, aim, tried = slower, aim.slower(fraction), tried + 1
+                keys, aim = ['frequency'], aim.slower(fraction)
+            if keys == ['frequency'] or fraction >= SMALLEST:
+                best, tried = replace(near.design, **{
+                    key: fraction * getattr(near.design, key) for key in keys}), tried + 1
                 cheapest = float(self.prices(gait, [best], aim)[0])
         if cheapest >= REFUSED:
             raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"

@@ -191,6 +191,29 @@ def test_a_design_just_beyond_a_limit_of_speed_is_slowed(monkeypatch):
     assert found.design.stride == aims[0].start.stride and found.trial.upright
 
 
+def test_the_slowest_design_just_beyond_a_limit_of_speed_is_made_smaller(monkeypatch):
+    tuner, aim = Tuner(GO2, 'go2'), AIMS['trot'].slower(0.3)
+    price, longest = tuner.prices, aim.start.stride / 1.1
+
+    def prices(gait, designs, aim=None):
+        strides = [design.stride for design in designs]
+        if min(strides) <= longest:
+            return price(gait, designs, aim)
+        k = int(np.argmin(strides))
+        tuner._nearest = ClosestDesign(designs[k], designs[k].frequency, 1.0, OutOfLimits(
+            'the', 'knee at 8 rad/s', strides[k] / longest - 1.0, 'velocity'))
+        return np.full(len(designs), REFUSED + 1.0)
+
+    monkeypatch.setattr(tuner, 'prices', prices)
+    monkeypatch.setattr(tuner, '_starts', lambda gait: ([aim], prices(gait, [aim.start])))
+    monkeypatch.setattr('cpg_ros.simulation.tuning.gaits.cma_search',
+                        lambda *args: (None, 1))
+    found = tuner.tune('trot', 1)
+    assert found.design.frequency == pytest.approx(aim.start.frequency)
+    assert found.design.stride == pytest.approx(0.9 * longest)
+    assert found.design.lift == pytest.approx(0.9 / 1.1 * aim.start.lift)
+
+
 def test_a_refusal_for_angles_says_by_how_much_and_what_to_change():
     stiff = replace(GO2, motions={}, legs={leg: tuple(
         replace(joint, lower=joint.offset - 0.02, upper=joint.offset + 0.02) for joint in joints)
