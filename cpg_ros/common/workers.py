@@ -353,8 +353,19 @@ def chosen_fleet(args: Namespace, say: Callable[[str], None]) -> ResilientExecut
 
 
 @contextmanager
-def working(args: Namespace, what: str, say: Callable[[str], None]) -> Iterator[ResilientExecutor]:
-    """Open the fleet that the options choose; close it at the end, and at once on an error.
+def closing(fleet: ResilientExecutor) -> Iterator[ResilientExecutor]:
+    """Close a fleet at the end; at once, with its running jobs, on an error or Ctrl-C."""
+    try:
+        yield fleet
+    except BaseException:
+        fleet.shutdown(wait=False)
+        raise
+    fleet.shutdown()
+
+
+def working(args: Namespace, what: str, say: Callable[[str], None]
+            ) -> AbstractContextManager[ResilientExecutor]:
+    """Open the fleet that the options choose, and close it as closing does.
 
     Args:
         args: options.
@@ -367,12 +378,7 @@ def working(args: Namespace, what: str, say: Callable[[str], None]) -> Iterator[
     """
     fleet = chosen_fleet(args, say)
     fleet.what = what
-    try:
-        yield fleet
-    except BaseException:
-        fleet.shutdown(wait=False)
-        raise
-    fleet.shutdown()
+    return closing(fleet)
 
 
 def executor_for(count: int, args: Namespace, what: str, say: Callable[[str], None]

@@ -35,7 +35,8 @@ import numpy as np
 Permutation = tuple[int, ...]
 
 
-def _compose(outer: Permutation, inner: Permutation) -> Permutation:
+def compose(outer: Permutation, inner: Permutation) -> Permutation:
+    """Return the product: first the inner one."""
     return tuple(outer[i] for i in inner)
 
 
@@ -61,14 +62,14 @@ class Group:
             listed: list[Permutation] = []
             while not listed or power != listed[0]:
                 listed.append(power)
-                power = _compose(generator, power)
+                power = compose(generator, power)
             powers.append(listed)
             names.append(['', name, *(f'{name}^{k}' for k in range(2, len(listed)))])
         named: dict[str, Permutation] = {}
         for choice in product(*(range(len(listed)) for listed in powers)):
             element = tuple(range(self.cells))
             for listed, k in zip(powers, choice, strict=True):
-                element = _compose(listed[k], element)
+                element = compose(listed[k], element)
             name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
             named[name or '1'] = element
         return named
@@ -89,7 +90,7 @@ class Group:
         if sorted(element[0] for element in elements) != list(range(self.cells)):
             raise InputError(f'the group has {len(elements)} symmetries of {self.cells} cells; '
                              f'exactly one must take the first cell to each cell')
-        if any(_compose(a, b) != _compose(b, a) for a, b in combinations(elements, 2)):
+        if any(compose(a, b) != compose(b, a) for a, b in combinations(elements, 2)):
             raise InputError('the group is not abelian')
 
     def order(self, name: str, modulo: Collection[str] = ('1',)) -> int:
@@ -98,7 +99,7 @@ class Group:
         element = power = self.elements[name]
         order = 1
         while power not in subgroup:
-            power = _compose(element, power)
+            power = compose(element, power)
             order += 1
         return order
 
@@ -115,7 +116,7 @@ class Group:
         while waiting:
             element = waiting.pop()
             for name, shift in shifts.items():
-                image = _compose(self.elements[name], element)
+                image = compose(self.elements[name], element)
                 theta = (phases[element] + shift) % 1
                 if image not in phases:
                     phases[image] = theta

@@ -16,7 +16,7 @@
 
 from dataclasses import replace
 
-from cpg_ros.analysis.papers.buono_linear import square_root, Tables
+from cpg_ros.analysis.papers.buono_linear import PRINTED, Sample, square_root
 from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.library.biped import Biped
@@ -152,33 +152,35 @@ def test_unequal_weights_have_no_blocks():
 def test_printed_tables_and_what_is_wrong_in_them(network):
     # At any state: none of it needs a stand.
     state = np.array([0.2, 0.4])
-    tables = Tables.at(network, alone(state))
-    for block in blocks(network, state):
-        matrix = block.now
+    sample = Sample(network, state)
+    assert np.allclose(sample.names['A'], alone(state))
+    for name, block in sample.blocks.items():
+        matrix, printed = block.now, {table: sample.printed(PRINTED[table][name]) for table in (
+            'table_6', 'table_7', 'table_8', 'table_9', 'table_10') if name in PRINTED[table]}
         trace, determinant = np.trace(matrix), np.linalg.det(matrix)
         under = trace**2 - 4.0 * determinant
-        assert np.allclose(tables.block(*block.mode), matrix)
+        assert np.allclose(printed['table_6'], matrix)
         if not block.real:
-            assert tables.phi(*block.mode) + 1j * tables.psi(*block.mode) == pytest.approx(under)
+            assert printed['table_9'] + 1j * printed['table_10'] == pytest.approx(under)
             # Eq. 5.3 is a root for a positive imaginary part only.
             if abs(under.imag) > 1e-3:
                 good = abs(square_root(under.real, under.imag)**2 - under) < 1e-9
                 assert good == (under.imag > 0.0)
             # Eqs. 5.4 and 5.5 lack the factor 1/2.
-            assert np.allclose(tables.real_parts(block.mode[1]),
+            middle = sample.printed(PRINTED['proposition_5_2'][block.mode[1]])
+            assert np.allclose([middle + sample.root(name), middle - sample.root(name)],
                                2.0 * np.sort(block.roots(2).real)[::-1], 0.0, 1e-6)
             continue
-        assert tables.discriminant(*block.mode) == pytest.approx(under.real)
+        assert printed['table_8'] == pytest.approx(under.real)
         # Table 7, L_21: xi + eta has the wrong sign.
         wrong = 2.0 * (network.xi + network.eta) if block.mode == (2, 1) else 0.0
-        assert tables.trace(*block.mode) == pytest.approx(trace.real - wrong)
+        assert printed['table_7'] == pytest.approx(trace.real - wrong)
 
 
 @examples(20)
 @given(*[st.floats(-0.4, 0.4)] * 3)
 def test_table_11_is_twice_the_real_part(alpha, gamma, xi):
     network, state = Quadruped(alpha, alpha, gamma, gamma, xi, xi), np.array([0.31, 0.52])
-    tables = Tables.at(network, alone(state))
-    for block in blocks(network, state):
-        if block.mode[0] < 3:
-            assert np.allclose(tables.sigma(*block.mode), 2.0 * block.roots(2).real)
+    sample = Sample(network, state)
+    for name, text in PRINTED['table_11'].items():
+        assert np.allclose(sample.printed(text), 2.0 * sample.blocks[name].roots(2).real)

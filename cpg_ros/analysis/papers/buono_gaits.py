@@ -40,7 +40,7 @@ from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
-from cpg_ros.networks.symmetry import admissible_pairs, GAITS, label, Permutation, Z4_Z2
+from cpg_ros.networks.symmetry import admissible_pairs, compose, GAITS, label, Permutation, Z4_Z2
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
@@ -149,7 +149,8 @@ def _figure_2(gait: SolvedGait) -> Iterator[ReproducedRow | Picture]:
                                variable='v'))
 
 
-def _gaits(*names: str) -> Iterator[ReproducedRow | Picture]:
+def gaits(*names: str) -> Iterator[ReproducedRow | Picture]:
+    """Compute the rows of some gaits of Table 13."""
     for name in names:
         gait = settled(name)
         for rows in (_table_1, _table_2, _table_13, _section_7):
@@ -167,16 +168,6 @@ def _gaits(*names: str) -> Iterator[ReproducedRow | Picture]:
                             erratum=(14, '4'))
 
 
-def fast_gaits() -> Iterator[ReproducedRow | Picture]:
-    """Pronk, pace, bound and jump."""
-    return _gaits('pronk', 'pace', 'bound', 'jump')
-
-
-def slow_gaits() -> Iterator[ReproducedRow | Picture]:
-    """Walk and trot."""
-    return _gaits('walk', 'trot')
-
-
 def constants() -> Iterator[ReproducedRow | Picture]:
     """Yield the cell of section 6, read off the compiled rates."""
     at = Citation(AUTHORS, 'section 6')
@@ -184,8 +175,7 @@ def constants() -> Iterator[ReproducedRow | Picture]:
     for name, printed in PRINTED['section_6'].items():
         yield at.number(name, printed, values[name], within=1e-8,
                         note=f'read off the compiled rates, with i = {CURRENT}')
-    yield at.formula('tau ten widths v4 from v3, over its least', 'cosh(5)', np.cosh(5.0),
-                     values['tau_far'])
+    yield at.formula('tau ten widths v4 from v3, over its least', 'cosh(5)', {}, values['tau_far'])
 
 
 Subgroup = frozenset[Permutation]
@@ -201,11 +191,6 @@ def cycles(text: str, cells: int) -> Permutation:
     return tuple(image)
 
 
-def after(outer: Permutation, inner: Permutation) -> Permutation:
-    """Return the product: first the inner one."""
-    return tuple(outer[i] for i in inner)
-
-
 def inverse(element: Permutation) -> Permutation:
     """Return the inverse."""
     return tuple(sorted(range(len(element)), key=element.__getitem__))
@@ -218,7 +203,7 @@ def generated(*generators: Permutation) -> Subgroup:
     while waiting:
         element = waiting.pop()
         for generator in generators:
-            image = after(generator, element)
+            image = compose(generator, element)
             if image not in elements:
                 elements.add(image)
                 waiting.append(image)
@@ -227,7 +212,7 @@ def generated(*generators: Permutation) -> Subgroup:
 
 def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
     """``g S g^-1``."""
-    return frozenset(after(after(by, element), inverse(by)) for element in subgroup)
+    return frozenset(compose(compose(by, element), inverse(by)) for element in subgroup)
 
 
 @cache
@@ -244,12 +229,12 @@ def cyclic(h: Subgroup, k: Subgroup) -> bool:
 
 #: Section 3's D4, and the names of section 2.3.
 OMEGA, KAPPA = cycles('(1 3 5 7)(2 4 6 8)', 8), cycles('(1 2)(3 8)(5 6)(7 4)', 8)
-HALF = after(OMEGA, OMEGA)
+HALF = compose(OMEGA, OMEGA)
 D4 = generated(OMEGA, KAPPA)
 ONE = tuple(range(8))
-NAMES = {'D4': D4, 'D2s': generated(KAPPA, HALF), 'D2p': generated(after(KAPPA, OMEGA), HALF),
+NAMES = {'D4': D4, 'D2s': generated(KAPPA, HALF), 'D2p': generated(compose(KAPPA, OMEGA), HALF),
          'Z4': generated(OMEGA), '1': generated(ONE), 'Z2s': generated(KAPPA),
-         'Z2p': generated(after(KAPPA, OMEGA)), 'Z2': generated(HALF)}
+         'Z2p': generated(compose(KAPPA, OMEGA)), 'Z2': generated(HALF)}
 
 
 def _name(subgroup: Subgroup) -> str:
@@ -278,15 +263,15 @@ def dihedral() -> Iterator[ReproducedRow | Picture]:
     yield at.word('those with a quarter-period phase shift', '1 in Z4', ', '.join(sorted(quarter)))
     at = Citation(AUTHORS, 'Theorem 3.2')
     yield at.holds('kappa omega = omega^3 kappa',
-                   after(KAPPA, OMEGA) == after(after(HALF, OMEGA), KAPPA))
+                   compose(KAPPA, OMEGA) == compose(compose(HALF, OMEGA), KAPPA))
     half = [(k, h) for k, h in solutions()
-            if KAPPA in h - k and len(k) > 1 and after(KAPPA, KAPPA) in k]
+            if KAPPA in h - k and len(k) > 1 and compose(KAPPA, KAPPA) in k]
     yield at.number('types with kappa as a half-period shift and a spatial symmetry', '3',
                     len(half), erratum=(15, '4'),
                     note='K in H: ' + ', '.join(sorted(f'{_name(k)} in {_name(h)}'
                                                        for k, h in half)))
     for k, h, phase in ((NAMES['D2p'], D4, '0'), (NAMES['Z2'], NAMES['D2s'], '0'),
-                        (generated(after(KAPPA, HALF)), NAMES['D2s'], '1/2')):
+                        (generated(compose(KAPPA, HALF)), NAMES['D2s'], '1/2')):
         yield at.phases(f'{_name(k)} in {_name(h)}: phase of RH (cell 5) against LH (cell 1)',
                         phase, [0.0 if HALF in k else 0.5 * (HALF in h)],
                         note='H/K is Z2: what is in H but not in K shifts by half a period')
@@ -309,7 +294,7 @@ def four_cells() -> Iterator[ReproducedRow | Picture]:
     turn = cycles('(1 3 2 4)', 4)
     for first, second in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
                           ('(1 2)(3 4)', '(1 2)(3 4)')):
-        image = after(after(turn, cycles(first, 4)), inverse(turn))
+        image = compose(compose(turn, cycles(first, 4)), inverse(turn))
         yield at.word(f'(1 3 2 4) {first} (1 3 2 4)^-1', second, _written(image))
 
 

@@ -20,7 +20,7 @@ from typing import cast
 
 from cpg_ros.analysis.papers.buono_gaits import AUTHORS, PRINTED
 from cpg_ros.analysis.papers.buono_linear import Sample, UNCOUPLED
-from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow
+from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow, value_of
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import hopf_at, hopf_points, HopfPoint
 from cpg_ros.dynamics.isotypic import blocks
@@ -85,36 +85,32 @@ def the_stand() -> Iterator[ReproducedRow | Picture]:
 
 def existence() -> Iterator[ReproducedRow | Picture]:
     """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
-    nu = stand_sample(UNCOUPLED).trace('L_00').real
-    for theorem, gait, line, text, value, speed in (
-            ('Theorem 4.1', 'walk', 'gamma=delta=-alpha=-beta', 'nu_0/2', nu / 2.0, '-2'),
-            ('Theorem 4.1', 'trot', 'xi=eta=-alpha=-beta', '-nu_0/4', -nu / 4.0, None),
-            ('Theorem 4.3', 'pace', 'alpha=beta=-gamma=-delta', '-nu_0/4', -nu / 4.0, None),
-            ('Theorem 4.3', 'bound', 'alpha=beta=-gamma=-delta', 'nu_0/4', nu / 4.0, None)):
+    nu = {'nu_0': stand_sample(UNCOUPLED).trace('L_00').real}
+    for theorem, gait, line, text, speed in PRINTED['existence']:
+        value = value_of(text, nu)
         point = hopf(UNCOUPLED, line, gait, value - 0.1, value + 0.1)
         at = Citation(AUTHORS, theorem)
-        yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, value,
+        yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, nu,
                          point.value)
         if speed:
-            yield at.formula(f'{gait}: speed at which the eigenvalues cross', speed,
-                             float(speed), point.normal_form.k1.real,
-                             erratum=(13, float(speed) / 2.0))
+            yield at.formula(f'{gait}: speed at which the eigenvalues cross', speed, {},
+                             point.normal_form.k1.real, erratum=(13, f'{speed}/2'))
     # On xi = -(alpha + gamma) with gamma fixed, nu - 2 (alpha + gamma) + 2 xi by xi is 4, of
     # which the proof takes the part by xi alone.
     point = hopf(UNCOUPLED, 'xi=eta=-alpha=-beta', 'trot', 0.2, 0.4)
     yield Citation(AUTHORS, 'Theorem 4.1').formula(
-        'trot: speed at which the eigenvalues cross, xi = -(alpha + gamma)', '2', 2.0,
+        'trot: speed at which the eigenvalues cross, xi = -(alpha + gamma)', '2', {},
         point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
         'grows by 4, the real part by 2')
-    walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
+    half = nu['nu_0'] / 2.0
+    walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', half - 0.1, half + 0.1)
     sample = stand_sample(walk.network)
-    alpha = sample.network.alpha
     at = Citation(AUTHORS, 'Proposition 5.6')
     zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
     yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
                   ', '.join(zero), erratum=(21, 'L_11'))
-    yield at.formula('trace of L_01 there', '2 alpha', 2.0 * alpha, sample.trace('L_01').real)
-    yield at.formula('trace of L_21 there', '-2 alpha', -2.0 * alpha, sample.trace('L_21').real)
+    yield at.formula('trace of L_01 there', '2 alpha', sample.names, sample.trace('L_01').real)
+    yield at.formula('trace of L_21 there', '-2 alpha', sample.names, sample.trace('L_21').real)
     yield at.holds('an eigenvalue has a positive real part there', walk.unstable_roots > 0)
 
 
@@ -170,33 +166,21 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
     trot = points['trot']
     sample = stand_sample(trot.network)
-    n = sample.network
-    at = Citation(AUTHORS, 'Proposition 5.5')
-    for name, text, value in (
-            ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma)),
-            ('L_01', '4 alpha', 4.0 * n.alpha), ('L_20', '4 gamma', 4.0 * n.gamma),
-            ('L_10', '2 alpha + 4 gamma', 2.0 * n.alpha + 4.0 * n.gamma),
-            ('L_11', '2 alpha', 2.0 * n.alpha)):
-        yield at.formula(f'trace of {name} (real part) at the Hopf point to the trot', text,
-                         value, sample.trace(name).real)
-    at = Citation(AUTHORS, 'Proposition 5.7')
-    for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
+    for name, text in PRINTED['proposition_5_5'].items():
+        yield Citation(AUTHORS, 'Proposition 5.5').formula(
+            f'trace of {name} (real part) at the Hopf point to the trot', text, sample.names,
+            sample.trace(name).real)
+    for gait, formulas in PRINTED['proposition_5_7'].items():
         sample = stand_sample(points[gait].network)
-        gamma = sample.network.gamma
-        phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
-        root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
-        four = f'{"-" if sign < 0.0 else ""}4 gamma'
-        with_it = {'jump': ('L_01', 'L_00'), 'walk': ('L_00', 'L_01')}[gait]
-        for name, text, value, ours in (
-                (other, four, sign * 4.0 * gamma, 2.0 * sample.largest(other)),
-                (with_it[0], f'{four} - X', sign * 4.0 * gamma - root,
-                 sample.trace(with_it[0]).real),
-                (with_it[1], '-X', -root, sample.trace(with_it[1]).real)):
-            yield at.formula(f'sigma of {name} at the Hopf point to the {gait}', text, value,
-                             ours, note='X = sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)')
+        names = sample.names | {'X': sample.root('L_10')}
+        for name, text in formulas.items():
+            # Of the gait's conjugate class, twice the real part that counts.
+            ours = (2.0 * sample.largest(name) if name.startswith('L_1')
+                    else sample.trace(name).real)
+            yield Citation(AUTHORS, 'Proposition 5.7').formula(
+                f'sigma of {name} at the Hopf point to the {gait}', text, names, ours,
+                note='X = sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)')
 
-
-# Theorem 4.2 of Buono & Golubitsky (2001): which Hopf bifurcations of the quadruped are stable.
 
 #: Gait -> sign of beta against alpha, and the signs that alpha and gamma must have; 0 is any.
 SIGNS = {'pronk': (1, 1, 1), 'pace': (1, 1, -1), 'bound': (1, -1, 1), 'trot': (1, -1, -1),
@@ -357,10 +341,10 @@ def jump() -> Iterator[ReproducedRow | Picture]:
     nu, point = stand_sample(UNCOUPLED).trace('L_00').real, _on_line('jump')
     at = Citation(AUTHORS, 'Theorem 4.1')
     yield at.formula('jump: gamma at the Hopf point, gamma=delta=-alpha=-beta', '-nu_0/2',
-                     -nu / 2.0, point.value, note='where sigma_10 = nu + 2 gamma vanishes')
+                     {'nu_0': nu}, point.value, note='where sigma_10 = nu + 2 gamma vanishes')
     yield at.word('jump: gait of the class whose eigenvalues cross', 'jump', point.gait)
-    yield at.formula('jump: speed at which the eigenvalues cross', '2', 2.0,
-                     point.normal_form.k1.real, erratum=(13, 1.0))
+    yield at.formula('jump: speed at which the eigenvalues cross', '2', {},
+                     point.normal_form.k1.real, erratum=(13, '1'))
 
 
 def stable_points() -> Iterator[ReproducedRow | Picture]:

@@ -19,10 +19,11 @@ with equal cells and random couplings, so that no formula holds by chance.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 from cpg_ros.analysis.papers.buono_gaits import AUTHORS, PRINTED
-from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow
+from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow, Value, value_of
 from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -30,138 +31,50 @@ import numpy as np
 
 # Tables 6 to 11 of Buono & Golubitsky (2001) exactly as printed, for linear synaptic coupling.
 
-#: Table 6: L_jk = A + sum of these multiples of B, C and D.
-TABLE_6_FACTORS = {(0, 0): (1, 1, 1), (0, 1): (1, -1, 1), (2, 0): (-1, 1, 1), (2, 1): (-1, -1, 1),
-           (1, 0): (-1j, 1, -1), (1, 1): (-1j, -1, -1), (3, 0): (1j, 1, -1),
-           (3, 1): (1j, -1, -1)}
-#: Table 7: signs of alpha + beta, gamma + delta and xi + eta in the trace. The last sign of L_21
-#: contradicts Tables 6, 8 and 11: it should be +1.
-TABLE_7 = {(0, 0): (1, 1, 1), (0, 1): (1, -1, 1), (2, 0): (-1, 1, 1), (2, 1): (-1, -1, -1)}
-#: Table 8: signs of alpha - beta, gamma - delta and xi - eta in D_jk.
-TABLE_8 = {(0, 0): (1, 1, 1), (0, 1): (1, -1, 1), (2, 0): (-1, 1, 1), (2, 1): (-1, -1, 1)}
-#: Table 11: multiples of alpha, gamma and xi that are added to nu.
-TABLE_11_FACTORS = {(0, 0): (2, 2, 2), (0, 1): (2, -2, 2), (2, 0): (-2, 2, 2), (2, 1): (-2, -2, 2),
-            (1, 0): (0, 2, -2), (1, 1): (0, -2, -2)}
-
-
-@dataclass(frozen=True)
-class Tables:
-    """The tables' entries for a network.
-
-    Attributes:
-        network: couplings.
-        a, b, c, d: A, the derivatives of an uncoupled cell's rates at the stand.
-
-    """
-
-    network: Quadruped
-    a: float
-    b: float
-    c: float
-    d: float
-
-    @classmethod
-    def at(cls, network: Quadruped, linearisation: np.ndarray) -> 'Tables':
-        """Take a, b, c, d from the linearisation of an uncoupled cell at the stand, (2, 2)."""
-        return cls(network, *(float(entry) for entry in linearisation.ravel()))
-
-    @property
-    def _sums(self) -> np.ndarray:
-        n = self.network
-        return np.array([n.alpha + n.beta, n.gamma + n.delta, n.xi + n.eta])
-
-    @property
-    def _differences(self) -> np.ndarray:
-        n = self.network
-        return np.array([n.alpha - n.beta, n.gamma - n.delta, n.xi - n.eta])
-
-    @property
-    def nu(self) -> float:
-        """Trace of A."""
-        return self.a + self.d
-
-    @property
-    def determinant(self) -> float:
-        """Determinant of A, the paper's Delta."""
-        return self.a * self.d - self.b * self.c
-
-    def block(self, j: int, k: int) -> np.ndarray:
-        """Table 6: L_jk, shape (2, 2)."""
-        n = self.network
-        coupled = np.array([[n.alpha, n.beta], [n.gamma, n.delta], [n.xi, n.eta]])
-        return np.array([[self.a, self.b], [self.c, self.d]]) + np.diag(
-            np.array(TABLE_6_FACTORS[j, k]) @ coupled)
-
-    def trace(self, j: int, k: int) -> float:
-        """Table 7: trace of a real block."""
-        return float(self.nu + np.dot(TABLE_7[j, k], self._sums))
-
-    def discriminant(self, j: int, k: int) -> float:
-        """Table 8: D_jk of a real block, ``(tr L_jk)^2 - 4 det L_jk``."""
-        first = self.a - self.d + np.dot(TABLE_8[j, k], self._differences)
-        return float(first**2 + 4.0 * self.b * self.c)
-
-    def phi(self, j: int, k: int) -> float:
-        """Table 9: real part of ``(tr L_jk)^2 - 4 det L_jk`` of a complex block, j = 1 or 3."""
-        along, across, ring = self._differences
-        whole, apart = self.nu**2 - 4.0 * self.determinant - along**2, 2.0 * (self.a - self.d)
-        if k == 0:
-            return float(whole + (across - ring) * (apart + across - ring))
-        return float(whole + (across + ring) * (across + ring - apart))
-
-    def psi(self, j: int, k: int) -> float:
-        """Table 10: imaginary part of ``(tr L_jk)^2 - 4 det L_jk`` of a complex block."""
-        along, across, ring = self._differences
-        sign = {1: -2.0, 3: 2.0}[j]
-        return float(sign * along * (self.a - self.d + (across if k == 0 else -across) - ring))
-
-    def sigma(self, j: int, k: int) -> float:
-        """Table 11: "real part of the eigenvalue" where alpha = beta, gamma = delta, xi = eta.
-
-        It is the trace, twice the real part of either eigenvalue.
-        """
-        n = self.network
-        return float(self.nu + np.dot(TABLE_11_FACTORS[j, k], [n.alpha, n.gamma, n.xi]))
-
-    def real_parts(self, k: int) -> tuple[float, float]:
-        """Proposition 5.2, eqs. 5.4 and 5.5: real parts in the component U_1k, the larger first.
-
-        Twice the real parts: the factor 1/2 of the quadratic formula is missing.
-        """
-        _, across, ring = self._sums
-        trace = self.nu + (across if k == 0 else -across) - ring
-        phi, psi = self.phi(1, k), self.psi(1, k)
-        root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
-        return float(trace + root), float(trace - root)
-
-
 def square_root(phi: float, psi: float) -> complex:
     """Return the square root of ``phi + i psi`` as in eq. 5.3, which holds for psi >= 0 only."""
     size = np.hypot(phi, psi)
     return complex(np.sqrt((phi + size) / 2.0), np.sqrt((size - phi) / 2.0))
 
 
+#: X of Propositions 5.2 and 5.7.
+ROOT = 'sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)'
 UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
 #: STAND: v and w at the stand of section 6, approximately.
 STAND = np.array([0.31, 0.52])
 
 
 class Sample:
-    """Couplings, a state of all cells, the blocks of the linearisation, and the tables there.
+    """Couplings, a state of all cells, the blocks of the linearisation, and the printed formulas.
 
     Attributes:
         network: the couplings.
         state: (v, w) of every cell.
         blocks: by their name.
-        tables: the printed formulas.
+        names: of the formulas -> value: the couplings; A, the derivatives of an uncoupled cell's
+            rates, with its entries a to d, trace nu and determinant Delta; B, C, D of Table 6.
 
     """
 
     def __init__(self, network: Quadruped, state: np.ndarray) -> None:
         self.network, self.state = network, state
         self.blocks: dict[str, Block] = {block.name: block for block in blocks(network, state)}
-        alone = blocks(UNCOUPLED, state)[0]
-        self.tables = Tables.at(network, alone.now.real)
+        alone = blocks(UNCOUPLED, state)[0].now.real
+        (a, b), (c, d) = alone.tolist()
+        along, across, ring = map(np.diag, np.reshape([*network.as_dict().values()], (3, 2)))
+        self.names: dict[str, Value] = {
+            **network.as_dict(), 'a': a, 'b': b, 'c': c, 'd': d, 'bc': b * c, 'nu': a + d,
+            'Delta': a * d - b * c, 'A': alone, 'B': along, 'Bi': 1j * along, 'C': across,
+            'D': ring}
+
+    def printed(self, text: str) -> Any:
+        """Return the value of a printed formula."""
+        return value_of(text, self.names)
+
+    def root(self, name: str) -> float:
+        """Return the root in Proposition 5.2 of a complex block."""
+        phi, psi = (self.printed(PRINTED[table][name]) for table in ('table_9', 'table_10'))
+        return value_of(ROOT, {'Phi': phi, 'Psi': psi})
 
     def trace(self, name: str) -> complex:
         """Trace of a block."""
@@ -207,48 +120,39 @@ def phases() -> Iterator[ReproducedRow | Picture]:
                         note='from the eigenvector of the 16 x 16 matrix')
 
 
-def _signed(signs: tuple[int, ...], operator: str) -> str:
-    pairs = (('alpha', 'beta'), ('gamma', 'delta'), ('xi', 'eta'))
-    return ' '.join(f'{"+" if sign > 0 else "-"} ({a} {operator} {b})'
-                    for sign, (a, b) in zip(signs, pairs, strict=True))
-
-
 def tables() -> Iterator[ReproducedRow | Picture]:
     """Tables 6 to 10, and the eigenvalues that the paper derives from them."""
     sample = drawn()
-    printed, parts = sample.tables, sample.blocks
+    names = sample.names
     for name, text in PRINTED['table_6'].items():
-        yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
-                                                   parts[name].now)
-    for (j, k), signs in TABLE_7.items():
-        name, trace, n = f'L_{j}{k}', printed.trace(j, k), sample.network
+        yield Citation(AUTHORS, 'Table 6').formula(name, text, names, sample.blocks[name].now)
+    for name, text in PRINTED['table_7'].items():
         yield Citation(AUTHORS, 'Table 7').formula(
-            f'trace of {name}', f'(a + d) {_signed(signs, "+")}', trace, sample.trace(name).real,
-            erratum=(12, trace + 2.0 * (n.xi + n.eta)) if name == 'L_21' else None)
-    for (j, k), signs in TABLE_8.items():
-        yield Citation(AUTHORS, 'Table 8').formula(
-            f'D of L_{j}{k}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
-            printed.discriminant(j, k), sample.discriminant(f'L_{j}{k}').real)
-    for name in ('L_10', 'L_30', 'L_11', 'L_31'):
-        mode, whole = parts[name].mode, sample.discriminant(name)
-        yield Citation(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',
-                                                   printed.phi(*mode), whole.real)
-        yield Citation(AUTHORS, 'Table 10').formula(f'Psi of {name}', 'as printed',
-                                                    printed.psi(*mode), whole.imag)
+            f'trace of {name}', text, names, sample.trace(name).real,
+            erratum=(12, f'{text} + 2(xi + eta)') if name == 'L_21' else None)
+    for name, text in PRINTED['table_8'].items():
+        yield Citation(AUTHORS, 'Table 8').formula(f'D of {name}', text, names,
+                                                   sample.discriminant(name).real)
+    for name in PRINTED['table_9']:
+        whole = sample.discriminant(name)
+        for table, what, ours in (('9', 'Phi', whole.real), ('10', 'Psi', whole.imag)):
+            yield Citation(AUTHORS, f'Table {table}').formula(
+                f'{what} of {name}', 'as printed',
+                sample.printed(PRINTED[f'table_{table}'][name]), ours)
         root = square_root(whole.real, whole.imag)
         yield Citation(AUTHORS, 'eq. 5.3').formula(
             f'square of the root of Phi + i Psi, {name}', 'Phi + i Psi', whole, root**2,
             erratum=(24, whole.conjugate()),
             note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
-    for k in (0, 1):
-        real = sorted((value.real for value in parts[f'L_1{k}'].roots(2)), reverse=True)
-        for text, theirs, ours in zip(('eq. 5.4', 'eq. 5.5'), printed.real_parts(k), real,
-                                      strict=True):
+    for k, text in enumerate(PRINTED['proposition_5_2']):
+        real = sorted((value.real for value in sample.blocks[f'L_1{k}'].roots(2)), reverse=True)
+        for equation, sign, ours in zip(('eq. 5.4', 'eq. 5.5'), (1.0, -1.0), real, strict=True):
+            theirs = sample.printed(text) + sign * sample.root(f'L_1{k}')
             yield Citation(AUTHORS, 'Proposition 5.2').formula(
-                f'real part of an eigenvalue in U_1{k}', text, theirs, ours,
+                f'real part of an eigenvalue in U_1{k}', equation, theirs, ours,
                 erratum=(13, theirs / 2.0))
             yield Citation(AUTHORS, 'Proposition 5.2').formula(
-                f'twice the real part of an eigenvalue in U_1{k}', text, theirs, 2.0 * ours)
+                f'twice the real part of an eigenvalue in U_1{k}', equation, theirs, 2.0 * ours)
         yield Citation(AUTHORS, 'Corollary 5.4').holds(
             f'in U_1{k} one pair lies to the right of the other', real[0] > real[1])
 
@@ -257,7 +161,7 @@ def coupled_variable() -> Iterator[ReproducedRow | Picture]:
     """Compute the variable that delta multiplies in equation 4.4."""
     sample = drawn()
     network, at = sample.network, Citation(AUTHORS, 'eq. 4.4')
-    theirs = sample.tables.trace(0, 0)
+    theirs = sample.printed(PRINTED['table_7']['L_00'])
     # Seen by all cells alike, delta acts on w by way of w; or, as printed, by way of v.
     printed = sample.blocks['L_00'].now + network.delta * np.array([[0, 0], [1, -1]])
     yield at.formula('trace of L_00 if delta multiplies y', 'Table 7', theirs,
@@ -269,29 +173,18 @@ def coupled_variable() -> Iterator[ReproducedRow | Picture]:
 def equal_couplings() -> Iterator[ReproducedRow | Picture]:
     """Table 11 and Lemma 5.8: alpha = beta, gamma = delta, xi = eta."""
     sample = drawn(equal=True)
-    printed, parts = sample.tables, sample.blocks
-    at = Citation(AUTHORS, 'Table 11')
+    names, at = sample.names, Citation(AUTHORS, 'Table 11')
     for name, text in PRINTED['table_11'].items():
-        value = printed.sigma(*parts[name].mode)
-        yield at.formula(f'real part of the eigenvalues of {name}', text, value,
-                         sample.largest(name), erratum=(13, value / 2.0))
-        yield at.formula(f'twice the real part of the eigenvalues of {name}', text, value,
+        yield at.formula(f'real part of the eigenvalues of {name}', text, names,
+                         sample.largest(name), erratum=(13, f'({text})/2'))
+        yield at.formula(f'twice the real part of the eigenvalues of {name}', text, names,
                          2.0 * sample.largest(name))
-    at, n = Citation(AUTHORS, 'Lemma 5.8'), sample.network
+    at = Citation(AUTHORS, 'Lemma 5.8')
     # nu enters each trace once: take it for which tr L_21 vanishes.
-    critical = printed.nu - sample.trace('L_21').real
-    yield at.formula('nu at which the trace of L_21 vanishes', '2 alpha + 2 gamma - xi',
-                     2.0 * n.alpha + 2.0 * n.gamma - n.xi, critical,
-                     erratum=(20, 2.0 * (n.alpha + n.gamma - n.xi)))
-    for name, text, value, wrong in (
-            ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma), None),
-            ('L_10', '4 alpha', 4.0 * n.alpha,
-             (20, 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi)),
-            ('L_01', '4 alpha, printed of L_10', 4.0 * n.alpha, None),
-            ('L_20', '4 gamma', 4.0 * n.gamma, None),
-            ('L_11', '2 alpha - 4 xi', 2.0 * n.alpha - 4.0 * n.xi, None),
-            ('L_10', '2 alpha + 4 gamma - 4 xi', 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi,
-             None)):
-        trace = sample.trace(name).real - printed.nu + critical
-        yield at.formula(f'trace of {name} (real part) with that nu', text, value, trace,
-                         erratum=wrong)
+    critical = sample.printed('nu') - sample.trace('L_21').real
+    yield at.formula('nu at which the trace of L_21 vanishes', '2 alpha + 2 gamma - xi', names,
+                     critical, erratum=(20, '2(alpha + gamma - xi)'))
+    for name, text, *wrong in PRINTED['lemma_5_8']:
+        trace = sample.trace(name).real - sample.printed('nu') + critical
+        yield at.formula(f'trace of {name} (real part) with that nu', text, names, trace,
+                         erratum=(20, wrong[0]) if wrong else None)

@@ -17,6 +17,7 @@
 import cmath
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 from cpg_ros.analysis.papers.row import (
     Citation,
@@ -160,7 +161,9 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[ReproducedRow]
                         note='with q = 1 + tau B exp(-i omega tau) and the mode of the gait')
 
 
-def _example(example: Example) -> Iterator[ReproducedRow | Picture]:
+def published_gait(name: str) -> Iterator[ReproducedRow | Picture]:
+    """Compute the rows of one of EXAMPLES."""
+    example = EXAMPLES[name]
     network, gait = example.network, example.gait
     at = Citation(AUTHORS, example.section)
     point = first_hopf(network, gait)
@@ -231,31 +234,6 @@ def conditions() -> Iterator[ReproducedRow | Picture]:
             sign * (a + b) * d > 0.0 and abs(c) > abs(a + b + sign * d))
 
 
-def walk() -> Iterator[ReproducedRow | Picture]:
-    """Return the rows of Example 1, the walk."""
-    return _example(EXAMPLES['walk'])
-
-
-def trot() -> Iterator[ReproducedRow | Picture]:
-    """Return the rows of Example 1, the trot."""
-    return _example(EXAMPLES['trot'])
-
-
-def pace() -> Iterator[ReproducedRow | Picture]:
-    """Return the rows of Example 2."""
-    return _example(EXAMPLES['pace'])
-
-
-def goat_trot() -> Iterator[ReproducedRow | Picture]:
-    """Section 4.1 without its table."""
-    return _example(EXAMPLES['goat_trot'])
-
-
-def goat_walk() -> Iterator[ReproducedRow | Picture]:
-    """Section 4.2 without its table."""
-    return _example(EXAMPLES['goat_walk'])
-
-
 def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Make up a recording of one cycle whose best fit is known to be the example's parameters.
 
@@ -274,9 +252,10 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
     return states + misfit, theta
 
 
-def _inversion(figure: str, example: Example, name: str, starts: dict[str, str]
-               ) -> Iterator[ReproducedRow | Picture]:
-    at = Citation(AUTHORS, figure)
+def inversion(number: int, key: str, name: str) -> Iterator[ReproducedRow | Picture]:
+    """Compute Table 1, c of the trot, or Table 2, tau of the walk."""
+    at, example = Citation(AUTHORS, f'Table {number}'), EXAMPLES[key]
+    starts = PRINTED[f'table_{number}']
     samples, theta = recording(example, name)
 
     def fitted(start: float) -> CycleFit:
@@ -298,16 +277,7 @@ def _inversion(figure: str, example: Example, name: str, starts: dict[str, str]
                    bool(np.ptp([fit.cost for fit in fits.values()]) <= ONE_MINIMUM))
 
 
-def table_1() -> Iterator[ReproducedRow | Picture]:
-    """Table 1: c of the trot."""
-    return _inversion('Table 1', EXAMPLES['goat_trot'], 'c', PRINTED['table_1'])
-
-
-def table_2() -> Iterator[ReproducedRow | Picture]:
-    """Table 2: tau of the walk."""
-    return _inversion('Table 2', EXAMPLES['goat_walk'], 'tau', PRINTED['table_2'])
-
-
 PAPER = Paper('liu_zhang', AUTHORS,
               'L. Liu, C. Zhang: A neural network model for goat gait (2024)',
-              (conditions, taylor_terms, walk, trot, pace, goat_trot, goat_walk, table_1, table_2))
+              (conditions, taylor_terms, *(partial(published_gait, name) for name in EXAMPLES),
+               partial(inversion, 1, 'goat_trot', 'c'), partial(inversion, 2, 'goat_walk', 'tau')))

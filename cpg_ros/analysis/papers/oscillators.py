@@ -50,10 +50,11 @@ def synchronisation() -> Iterator[ReproducedRow]:
                           np.arctan2(state[4:8], state[:4]) / TURN, within=1e-8)
     network: Any = Phase.presets()['walk'].network
     orbit = solve_orbit(network, 'walk')
-    yield cite.formula('period', '1/nu', 1.0 / network.nu, orbit.period)
+    yield cite.formula('period', '1/nu', network.as_dict(), orbit.period)
     slowest = float(np.sort(np.abs(multipliers(orbit).within))[-1])
     yield cite.formula('what is left of a small phase difference after a stride, n = 4',
-                       'exp(-n w R T)', np.exp(-4.0 * network.w * network.r / network.nu), slowest)
+                       'exp(-n w R T)',
+                       {'n': 4, 'w': network.w, 'R': network.r, 'T': 1.0 / network.nu}, slowest)
 
 
 def amplitudes() -> Iterator[ReproducedRow]:
@@ -87,7 +88,7 @@ def stance_and_swing() -> Iterator[ReproducedRow]:
                       epsabs=1e-13)[0] for begin in (0.0, np.pi)]
         yield cite.formula(f'period at duty {duty:g}, b = 50', 'integral of 1/omega over a turn',
                            sum(spans), orbit.period)
-        yield cite.formula(f'amplitude at duty {duty:g}', 'sqrt(mu)', np.sqrt(network.mu),
+        yield cite.formula(f'amplitude at duty {duty:g}', 'sqrt(mu)', network.as_dict(),
                            orbit.peak)
         yield cite.number(f'share of stance for omega_swing / omega_stance = '
                           f'{duty / (1.0 - duty):.4g}', f'{duty:g}', spans[0] / sum(spans),
@@ -104,10 +105,10 @@ def neurons() -> Iterator[ReproducedRow]:
         yield cite.holds(f'a = {a:g}: they {"oscillate" if exists else "do not oscillate"}, as '
                          '1 + tau/tau_v < a < 1 + beta says', _oscillates(network, a) == exists)
     orbit, double = (solve_orbit(replace(network, c=c), 'trot') for c in (1.0, 2.0))
-    yield cite.formula('amplitude with twice the input, over that with it', '2', 2.0,
+    yield cite.formula('amplitude with twice the input, over that with it', '2', {},
                        double.peak / orbit.peak)
     slow = solve_orbit(replace(network, tau=2.0 * tau, tau_v=2.0 * tau_v), 'trot')
-    yield cite.formula('period with twice the time constants, over that with them', '2', 2.0,
+    yield cite.formula('period with twice the time constants, over that with them', '2', {},
                        slow.period / orbit.period)
 
 

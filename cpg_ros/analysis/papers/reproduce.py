@@ -18,9 +18,11 @@ that differs names the erratum that explains it; otherwise it fails.
 
 import argparse
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
-from dataclasses import asdict, dataclass
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from html import escape
+from itertools import starmap
 import json
 import os
 from pathlib import Path
@@ -34,13 +36,14 @@ from cpg_ros.analysis.papers import (
     oscillators,
     rashidi,
 )
-from cpg_ros.analysis.papers.row import Paper, ReproducedRow
+from cpg_ros.analysis.papers.row import Paper, Picture, ReproducedRow
 from cpg_ros.common import command_line
 from cpg_ros.common.command_line import Parser, progress_bar, run, say
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import write_atomically
+from cpg_ros.common.jobs import in_order
 from cpg_ros.common.report_page import html_table, image, page, rendered
-from cpg_ros.common.workers import processes
+from cpg_ros.common.workers import closing, processes
 import yaml
 
 # Buono & Golubitsky (2001), Models of central pattern generators for quadruped locomotion I.
@@ -48,9 +51,9 @@ import yaml
 PAPER = Paper('buono_golubitsky', buono_gaits.AUTHORS,
               'P.-L. Buono, M. Golubitsky: Models of central pattern generators for quadruped '
               'locomotion. I. Primary gaits (2001)',
-              (buono_gaits.constants, buono_gaits.fast_gaits, buono_gaits.slow_gaits,
-               buono_gaits.dihedral, buono_gaits.lattice, buono_gaits.four_cells,
-               buono_gaits.legs,
+              (buono_gaits.constants, partial(buono_gaits.gaits, 'pronk', 'pace', 'bound', 'jump'),
+               partial(buono_gaits.gaits, 'walk', 'trot'), buono_gaits.dihedral,
+               buono_gaits.lattice, buono_gaits.four_cells, buono_gaits.legs,
                buono_linear.phases, buono_linear.tables, buono_linear.coupled_variable,
                buono_linear.equal_couplings, buono_hopf.the_stand, buono_hopf.existence,
                buono_hopf.table_12, buono_hopf.theorem_4_2, buono_hopf.genericity,
@@ -76,16 +79,6 @@ RESOLUTION = 100
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """A figure as a picture: paper, number, caption, and PNG."""
-
-    paper: str
-    place: str
-    caption: str
-    png: bytes
-
-
-@dataclass(frozen=True)
 class Reproduction:
     """The rows and figures of some papers.
 
@@ -98,7 +91,7 @@ class Reproduction:
 
     papers: tuple[Paper, ...]
     rows: tuple[ReproducedRow, ...]
-    figures: tuple[Drawn, ...]
+    figures: tuple[Picture, ...]
 
     @property
     def failed(self) -> tuple[ReproducedRow, ...]:
@@ -124,22 +117,21 @@ class Reproduction:
                 f'explained by errata, {len(self.failed)} fail')
 
 
-def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow], list[Drawn]]:
+def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow], list[Picture]]:
     """Compute a section of a paper; an error becomes a row that fails."""
     rows: list[ReproducedRow] = []
-    figures: list[Drawn] = []
+    figures: list[Picture] = []
     section = paper.sections[number]
     try:
         for row in section():
             if isinstance(row, ReproducedRow):
                 rows.append(row)
             elif draw:
-                figures.append(Drawn(row.paper, row.place, row.caption,
-                                     rendered(row.figure, dpi=RESOLUTION)))
+                figures.append(replace(row, figure=rendered(row.figure, dpi=RESOLUTION)))
     except (CpgError, ArithmeticError) as error:
-        rows.append(ReproducedRow(paper.authors, section.__name__.replace('_', ' '),
-                                  'what is printed here',
-                                  'a result', f'no result: {error}', False, 'computed at all'))
+        name = getattr(section, 'func', section).__name__.replace('_', ' ')
+        rows.append(ReproducedRow(paper.authors, name, 'what is printed here', 'a result',
+                                  f'no result: {error}', False, 'computed at all'))
     return rows, figures
 
 
@@ -156,22 +148,13 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
     """
     papers = tuple(PAPERS[name] for name in names)
     tasks = [(paper, number, draw) for paper in papers for number in range(len(paper.sections))]
-    done: dict[int, tuple[list[ReproducedRow], list[Drawn]]] = {}
-    if jobs == 1:
-        for index, task in enumerate(tasks):
-            done[index] = _section(*task)
-            progress(len(done))
-    else:
-        pool = processes(min(jobs, len(tasks)))
-        try:
-            waiting = {pool.submit(_section, *task): index for index, task in enumerate(tasks)}
-            for future in as_completed(waiting):
-                done[waiting[future]] = future.result()
-                progress(len(done))
-        finally:
-            # After an error or Ctrl-C, running jobs are ended.
-            pool.shutdown(wait=len(done) == len(tasks))
-    parts = [done[index] for index in range(len(tasks))]
+    parts: list[tuple[list[ReproducedRow], list[Picture]]] = []
+    with (nullcontext() if jobs == 1 else closing(processes(min(jobs, len(tasks))))) as fleet:
+        results = (starmap(_section, tasks) if fleet is None
+                   else in_order(fleet, _section, tasks))
+        for part in results:
+            parts.append(part)
+            progress(len(parts))
     return Reproduction(papers, tuple(row for rows, _ in parts for row in rows),
                         tuple(figure for _, figures in parts for figure in figures))
 
@@ -243,7 +226,7 @@ def as_html(report: Reproduction) -> str:
         for figure in report.figures:
             if figure.paper == paper.authors:
                 name = f'{figure.paper}, {figure.place}'
-                parts.append(image(figure.png, name, '<figcaption>'
+                parts.append(image(figure.figure, name, '<figcaption>'
                                    f'{escape(f"{name}. {figure.caption}")}</figcaption>'))
     parts += ['<h2>Errata</h2>', '<ol>']
     parts += [f'<li id="erratum-{number}" value="{number}">{escape(paper)}: {escape(text)}</li>'

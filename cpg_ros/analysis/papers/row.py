@@ -20,6 +20,7 @@ from decimal import Decimal
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
+import re
 from typing import Any, TYPE_CHECKING
 
 from cpg_ros.common.errors import InputError
@@ -133,14 +134,14 @@ class Picture:
         paper: authors and year.
         place: the figure's number.
         caption: description, and differences from the paper's figure.
-        figure: its title names paper and figure.
+        figure: its title names paper and figure; or the same as PNG.
 
     """
 
     paper: str
     place: str
     caption: str
-    figure: 'Figure'
+    figure: Any
 
 
 @cache
@@ -153,6 +154,23 @@ def printed_values(paper: str) -> dict[str, Any]:
 
 #: Value of a formula.
 Value = float | complex | np.ndarray
+#: Places of a printed formula where a product has no sign: after a number, a bracket or a blank.
+PRODUCT = re.compile(r'(?<=\d)\s*(?=[A-Za-z(])|(?<=\))\s*(?=[\w(])|(?<=\w)\s+(?=[\w(])')
+
+
+def value_of(text: str, names: Mapping[str, Value]) -> Any:
+    """Return the value of a formula as a paper prints it, up to a comma.
+
+    Args:
+        text: products without a sign, powers with ^, cosh, exp and sqrt.
+        names: of its variables -> value.
+
+    """
+    python = PRODUCT.sub('*', text.partition(',')[0]).replace('^', '**')
+    functions = {'cosh': np.cosh, 'exp': np.exp, 'sqrt': np.sqrt}
+    return eval(python, {'__builtins__': {}, **functions}, dict(names))
+
+
 #: A part of a paper: computes some of its rows and pictures.
 Section = Callable[[], Iterable[ReproducedRow | Picture]]
 
@@ -246,18 +264,32 @@ class Citation:
                          erratum=None if erratum is None else (erratum, 'unstable'),
                          note=f'{which} Floquet multiplier {multiplier:.3g} a cycle')
 
-    def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
-                erratum: tuple[int, Value] | None = None, note: str = '') -> ReproducedRow:
-        """Quote a formula by its value at some arguments, compared with ours at the same."""
+    def formula(self, quantity: str, published: str, value: Value | Mapping[str, Value],
+                computed: Value, *, erratum: tuple[int, Value | str] | None = None,
+                note: str = '') -> ReproducedRow:
+        """Quote a formula by its value at some arguments, compared with ours at the same.
+
+        Args:
+            quantity: its description.
+            published: as printed.
+            value: of the formula, or those of its variables by name.
+            computed: ours.
+            erratum: that covers a difference, and the right value or formula.
+            note: for the reader.
+
+        """
         ours = np.ravel(computed)
         limit = FORMULA * max(1.0, float(np.abs(ours).max()))
+        number, right = erratum or (None, None)
+        if isinstance(value, Mapping):
+            right = value_of(right, value) if isinstance(right, str) else right
+            value = value_of(published, value)
 
-        def same(other: Value) -> bool:
+        def same(other: Any) -> bool:
             theirs = np.ravel(other)
             return theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
 
         single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
-        number, right = erratum or (None, None)
         return ReproducedRow(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
                              _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}',
                              single, number, '' if right is None else _shown(right),
@@ -271,7 +303,7 @@ def _exponent(text: str) -> int:
     return exponent
 
 
-def _shown(value: Value) -> str:
+def _shown(value: Any) -> str:
     values = np.ravel(value)
     if np.iscomplexobj(values) and np.abs(values.imag).max() > 1e-12:
         return ', '.join(f'{number.real:.4f}{number.imag:+.4f}i' for number in values)

@@ -16,6 +16,7 @@
 
 import base64
 from dataclasses import replace
+from functools import partial
 import json
 from pathlib import Path
 import re
@@ -241,7 +242,7 @@ def test_a_changed_published_value_fails(monkeypatch, capsys):
 
 
 def test_changed_numerics_of_the_delayed_network_fail(monkeypatch, capsys):
-    only(monkeypatch, 'liu_zhang', liu_zhang.trot)
+    only(monkeypatch, 'liu_zhang', partial(liu_zhang.published_gait, 'trot'))
     monkeypatch.setattr(liu_zhang, 'first_hopf', lambda network, gait: first_hopf(
         replace(network, c=1.01 * network.c), gait))
     code, rows = outcome(capsys, 'liu_zhang')
