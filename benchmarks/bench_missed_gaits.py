@@ -30,11 +30,11 @@ import time
 
 from common import emit, log
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers_within
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.orbit import check_values, signal_symmetry
 from cpg_ros.dynamics.settling import last_cycle
+from cpg_ros.dynamics.solve_orbit import coexisting_orbits
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped

@@ -29,8 +29,7 @@ import tempfile
 import time
 
 from common import emit, log, ROOT
-from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import Branch, continue_orbit
+from cpg_ros.dynamics.continuation import bifurcations, Branch, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.networks.library.delayed import Delayed

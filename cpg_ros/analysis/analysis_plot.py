@@ -160,8 +160,7 @@ def _draw_roots(axes: Axes, analysis: Analysis) -> None:
 
 def _draw_trajectories(axes: Axes, analysis: Analysis) -> None:
     for row, verdict in enumerate(analysis.existing):
-        orbit = verdict.orbit
-        assert orbit is not None
+        orbit = verdict.known_orbit
         times = np.linspace(0.0, footfall.STRIDES * orbit.period, 601)
         cells = orbit(times)[:, :4]
         height = 2.3 * (len(analysis.existing) - 1 - row)
@@ -217,8 +216,7 @@ def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> 
     inner = outer[1, 1].subgridspec(count, 1)
     for row, verdict in enumerate(analysis.existing):
         axes = figure.add_subplot(inner[row])
-        assert verdict.orbit is not None
-        footfall.draw(axes, verdict.orbit, f'Footfalls: {verdict.gait.replace("_", " ")}')
+        footfall.draw(axes, verdict.known_orbit, f'Footfalls: {verdict.gait.replace("_", " ")}')
         if row == count - 1:
             axes.set_xlabel('time [strides]')
     figure.suptitle(f'{analysis.network.name}: {analysis.parameters}', fontsize=11)

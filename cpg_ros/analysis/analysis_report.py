@@ -97,10 +97,7 @@ def _yes(value: bool | None) -> str:
 
 def _which(verdict: GaitAssessment, meant: GaitAssessment) -> str:
     """Return which of a gait's orbits is meant, if not the first."""
-    if meant is verdict:
-        return ''
-    assert meant.orbit is not None
-    return f' (the orbit of period {meant.orbit.period:.6f})'
+    return '' if meant is verdict else f' (the orbit of period {meant.known_orbit.period:.6f})'
 
 
 def _kind(point: HopfPoint) -> tuple[str, str]:
@@ -206,9 +203,8 @@ class Analysis(ShortRepr):
             'gait', 'period', 'amplitude', *names, 'in class', 'transverse', 'stable',
             'gain needed', 'default', 'stable then')]
         for verdict in (orbit for whole in self.existing for orbit in whole.orbits):
-            assert verdict.orbit is not None
             rows.append((
-                verdict.gait, f'{verdict.orbit.period:.6f}', f'{verdict.amplitude:.6f}',
+                verdict.gait, f'{verdict.known_orbit.period:.6f}', f'{verdict.amplitude:.6f}',
                 *(f'{phase:g}' for phase in verdict.phases.values()),
                 f'{verdict.multipliers.leading_within:.4f}',
                 f'{verdict.multipliers.leading_transverse:.4f}', _yes(verdict.stable),

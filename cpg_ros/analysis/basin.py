@@ -192,13 +192,10 @@ def basins(analysis: 'Analysis', count: int, seed: int) -> dict[str, Basin]:
     by_gait: dict[str, Basin] = {}
     with progress_bar('random states', len(gains) * count) as bar:
         for gait, gain in gains.items():
-            orbit, before = analysis.gaits[gait].orbit, len(by_gait) * count
-            assert orbit is not None
-
-            def done(states: int, before: int = before) -> None:
+            def done(states: int, before: int = len(by_gait) * count) -> None:
                 bar(before + states)
 
-            by_gait[gait] = basin(orbit, count, seed, gain, done)
+            by_gait[gait] = basin(analysis.gaits[gait].known_orbit, count, seed, gain, done)
     return by_gait
 
 

@@ -19,8 +19,13 @@ from dataclasses import dataclass, field
 from cpg_ros.analysis.analysis_report import Analysis
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.bifurcation import Bifurcation, bifurcations
-from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_orbit
+from cpg_ros.dynamics.continuation import (
+    Bifurcation,
+    bifurcations,
+    Branch,
+    continue_from_hopf,
+    continue_orbit,
+)
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import Orbit
@@ -122,8 +127,8 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
     for point in on_line(analysis)[:BRANCHES]:
         branches.extend((point.gait, branch) for branch in _born(point, analysis))
     for verdict in analysis.existing:
-        orbit = verdict.orbit
-        if low <= value <= high and orbit is not None and not any(
+        orbit = verdict.known_orbit
+        if low <= value <= high and not any(
                 gait == verdict.gait and _holds(branch, value, orbit)
                 for gait, branch in branches):
             branches.append((verdict.gait,

@@ -24,17 +24,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.dynamics import settling
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import Trajectory
 from cpg_ros.dynamics.orbit import extra_symmetry
-from cpg_ros.dynamics.settling import (
-    ALIVE,
-    last_cycle,
-    LimitCycle,
-    population_run,
-    SPAN,
-    start_states,
-)
 from cpg_ros.dynamics.solve_orbit import solve_from_path
 from cpg_ros.fitting.gaits.recognition import lag, shape_difference, shifted, steadiness
 from cpg_ros.networks.network import known, Network
@@ -291,15 +284,16 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
     return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
 
 
-def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, LimitCycle | None]:
+def _simulated(network: Network, gait: str, run: Trajectory
+               ) -> tuple[Score, settling.LimitCycle | None]:
     """Score a set by its simulation; also return its cycle if that is worth solving for."""
     symmetry, cells = network.symmetry(gait), network.cells
     first = symmetry.first
     two = len(first) == 2
     finite = bool(np.isfinite(run.x[-1]).all())
-    cycle = last_cycle(run, cells) if finite else None
+    cycle = settling.last_cycle(run, cells) if finite else None
     if cycle is None:
-        alive = finite and np.ptp(run.x[run.t.size // 2:, :cells], axis=0).max() >= ALIVE
+        alive = finite and np.ptp(run.x[run.t.size // 2:, :cells], axis=0).max() >= settling.ALIVE
         return Score(network, np.full(len(pairs(symmetry)), WORST),
                      APERIODIC if alive else DEAD, 0.0 if two else None, 10.0), None
     signals = cycle.signals
@@ -316,12 +310,13 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Lim
     difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None
     # Estimate the multiplier by the decay of the start's disturbance per cycle. It is above 1 if
     # the network has left the gait.
-    stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)**(cycle.period / SPAN))
+    stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)
+                    **(cycle.period / settling.SPAN))
     score = Score(network, errors, float(stability), difference, float(shortfall))
     return score, cycle if near and shortfall == 0.0 else None
 
 
-def _proven(score: Score, cycle: LimitCycle, gait: str) -> Score:
+def _proven(score: Score, cycle: settling.LimitCycle, gait: str) -> Score:
     """Solve for the exact orbit of a set that ends near its gait, from its cycle."""
     symmetry = score.network.symmetry(gait)
     orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
@@ -345,7 +340,7 @@ def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
     results = []
     for first in range(0, len(networks), LARGEST_BATCH):
         batch = networks[first:first + LARGEST_BATCH]
-        runs = population_run(batch, start_states(batch, gait, seed))
+        runs = settling.population_run(batch, settling.start_states(batch, gait, seed))
         results += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
                     for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]
     scores = [score for score, _ in results]

@@ -29,9 +29,8 @@ import re
 import sys
 from typing import Any
 
-from cpg_ros.analysis.nsga2 import Front, optimise
+from cpg_ros.analysis.nsga2 import Front, optimise, orbit_signals
 from cpg_ros.analysis.objectives import APERIODIC, objective_names, RESOLUTION, SEARCHED
-from cpg_ros.analysis.verification import orbit_signals
 from cpg_ros.common.command_line import (
     assignment,
     named_interval,
@@ -40,6 +39,7 @@ from cpg_ros.common.command_line import (
     refuse_repeated,
     run,
     say,
+    table,
 )
 from cpg_ros.common.files import write_atomically
 from cpg_ros.common.report_page import rendered
@@ -224,7 +224,7 @@ def _parser() -> Parser:
     return parser
 
 
-def table(front: Front) -> str:
+def chosen_set(front: Front) -> str:
     """Return the selected set as lines of a name, a value and a unit."""
     best, space = front.best, front.space
     parameters = best.preset.network.as_dict()
@@ -238,11 +238,9 @@ def table(front: Front) -> str:
     rows.append(('leading multiplier', f'{best.leading:.4f}', 'a cycle'))
     if best.orbit.waves.max():
         rows.append(('waveforms differ by', f'{best.differences[0]:.3f}', 'of their RMS'))
-    width, middle = (max(len(row[k]) for row in rows) for k in (0, 1))
-    lines = [f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
-             f'{len(front.scores)} on the Pareto front; chosen:']
-    return '\n'.join([*lines, *(f'  {name:<{width}}  {value:>{middle}}  {unit}'.rstrip()
-                                for name, value, unit in rows)])
+    head = (f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
+            f'{len(front.scores)} on the Pareto front; chosen:')
+    return '\n'.join([head, *(f'  {line}' for line in table(rows, '<><'))])
 
 
 def _optimize(args: argparse.Namespace) -> int:
@@ -262,7 +260,7 @@ def _optimize(args: argparse.Namespace) -> int:
     draw_front(args.out / 'front.png', front)
     write_presets(args.out / 'preset.yaml', front.space.network, {name: front.best.preset},
                   f'Found by: {args.command}')
-    say(f'{table(front)}\n'
+    say(f'{chosen_set(front)}\n'
         f'written: front.csv, front.png and preset.yaml (preset {name}) in {args.out}')
     return 0
 

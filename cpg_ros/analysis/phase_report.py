@@ -46,9 +46,8 @@ class PhaseReport(ShortRepr):
         """Solve for the phase responses of an analysis."""
         responses, missing = {}, {}
         for verdict in analysis.existing:
-            assert verdict.orbit is not None
             try:
-                responses[verdict.gait] = phase_response(verdict.orbit)
+                responses[verdict.gait] = phase_response(verdict.known_orbit)
             except NoOrbit as error:
                 missing[verdict.gait] = str(error)
         return cls(responses, missing)

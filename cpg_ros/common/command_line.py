@@ -128,7 +128,7 @@ def as_json(tree: Any) -> str:
     return json.dumps(finite(tree), indent=2)
 
 
-def table(rows: list[tuple[str, ...]], right: str = '') -> list[str]:
+def table(rows: Sequence[tuple[str, ...]], right: str = '') -> list[str]:
     """Align rows in columns, the first row being the head.
 
     Args:

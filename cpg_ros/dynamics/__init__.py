@@ -17,7 +17,7 @@
 Imports ``networks`` and ``common``; knows nothing of ROS.
 """
 
-__all__ = ['arclength', 'bifurcation', 'characteristic', 'coexisting_orbits', 'continuation',
+__all__ = ['arclength', 'characteristic', 'continuation',
            'equilibrium', 'floquet', 'fourier', 'hopf', 'integration', 'isotypic', 'mesh',
            'orbit', 'orbit_method', 'orbit_normal_form', 'phase_response', 'settling',
            'solve_orbit', 'stability']

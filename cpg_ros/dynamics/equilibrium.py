@@ -68,16 +68,8 @@ class Quotient(Field[Network]):
 
     def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates, (..., variables), and their Jacobian, if all cells move together."""
-        equations = self._equations
-        variables = np.moveaxis(states, -1, 0)
-        rates, slopes = equations.slopes(
-            [variables[argument.variable] for argument in equations.arguments], self._p)
-        out, jacobian = np.empty(states.shape), np.zeros((*states.shape, states.shape[-1]))
-        for v, rate in enumerate(rates):
-            out[..., v] = rate
-        for (v, k), slope in slopes.items():
-            jacobian[..., v, equations.arguments[k].variable] += slope
-        return out, jacobian
+        rates, now, past = self.linearised(states)
+        return rates, now + past if past.size else now
 
     def push(self, state: np.ndarray) -> np.ndarray:
         """Return the derivative of the rates by the coupling fraction, shape (variables,)."""

@@ -22,8 +22,7 @@ import math
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.stated_gait import other_gait, stated_gait
+from cpg_ros.networks.network import Network, other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 

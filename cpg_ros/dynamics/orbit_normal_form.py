@@ -36,7 +36,7 @@ from typing import Any
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.bifurcation import REAL
+from cpg_ros.dynamics.continuation import REAL
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method

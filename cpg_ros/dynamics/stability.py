@@ -25,11 +25,11 @@ from typing import Any
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics import floquet
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits, CoexistingOrbits
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import Multipliers, multipliers_within, sufficient_gain
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.solve_orbit import coexisting_orbits, CoexistingOrbits
 from cpg_ros.networks.network import Network
 
 #: Rate at which transverse disturbances decay with the lock gain, 1/model time.
@@ -96,7 +96,8 @@ class GaitAssessment(ShortRepr):
         return () if self.orbit is None else (self, *self.others)
 
     @property
-    def _orbit(self) -> Orbit:
+    def known_orbit(self) -> Orbit:
+        """The orbit of a gait that exists; NoOrbit otherwise."""
         if self.orbit is None:
             raise NoOrbit(f'there is no {self.gait}: {self.why}')
         return self.orbit
@@ -104,12 +105,12 @@ class GaitAssessment(ShortRepr):
     @property
     def amplitude(self) -> float:
         """Half the range of cell 1's first variable."""
-        return float(self._orbit.levels[0, 0, 1])
+        return float(self.known_orbit.levels[0, 0, 1])
 
     @property
     def phases(self) -> dict[str, float]:
         """Phase of each leg's first cell, or of each muscle, in cycles."""
-        orbit = self._orbit
+        orbit = self.known_orbit
         muscles = orbit.network.muscles
         return ({name: float(orbit.phases[cell - 1]) for name, cell in muscles.items()}
                 or orbit.leg_phases)
@@ -117,7 +118,7 @@ class GaitAssessment(ShortRepr):
     @cached_property
     def multipliers(self) -> Multipliers:
         """Floquet multipliers without a symmetry lock."""
-        return floquet.multipliers(self._orbit)
+        return floquet.multipliers(self.known_orbit)
 
     @property
     def stable(self) -> bool | None:
@@ -127,17 +128,17 @@ class GaitAssessment(ShortRepr):
     @cached_property
     def smallest_gain(self) -> float:
         """Symmetry gain above which every transverse disturbance decays, 1/model time."""
-        return floquet.smallest_gain(self._orbit)
+        return floquet.smallest_gain(self.known_orbit)
 
     @cached_property
     def default_gain(self) -> float:
         """The gain the generator would choose, 1/model time."""
-        return sufficient_gain(self._orbit, RATE)
+        return sufficient_gain(self.known_orbit, RATE)
 
     @cached_property
     def stable_with_default_gain(self) -> bool | None:
         """Whether the gait attracts with the gain the generator would choose; None as above."""
-        return floquet.attracts_with(self._orbit, self.default_gain)
+        return floquet.attracts_with(self.known_orbit, self.default_gain)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""

@@ -19,10 +19,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
-from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.dynamics.solve_orbit import solve_preset
+from cpg_ros.dynamics.solve_orbit import coexisting_orbits, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.motion.body_file import GAIT_SPEEDS
 from cpg_ros.motion.core import CGait

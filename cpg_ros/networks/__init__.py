@@ -18,4 +18,4 @@ Imports ``common``; knows nothing of ROS.
 """
 
 __all__ = ['definition', 'derivation', 'equations', 'leg_numbers', 'library', 'network',
-           'network_options', 'presets', 'registry', 'stated_gait', 'symmetry']
+           'network_options', 'presets', 'registry', 'symmetry']

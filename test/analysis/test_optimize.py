@@ -20,10 +20,10 @@ import os
 import subprocess
 import sys
 
+from cpg_ros.analysis import nsga2 as polish
 from cpg_ros.analysis import nsga2 as weights
 from cpg_ros.analysis import objectives, optimize
 from cpg_ros.analysis import objectives as search_space
-from cpg_ros.analysis import verification as polish
 from cpg_ros.analysis.optimize import write_front
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import extra_symmetry

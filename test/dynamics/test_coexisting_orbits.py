@@ -18,10 +18,10 @@ from pathlib import Path
 import re
 
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import multipliers, multipliers_within
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.settling import last_cycle
+from cpg_ros.dynamics.solve_orbit import coexisting_orbits
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.registry import find_network, PRESETS

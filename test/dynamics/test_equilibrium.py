@@ -16,7 +16,7 @@
 
 from dataclasses import replace
 
-from cpg_ros.analysis.papers.buono_linear import PRINTED, Sample, square_root
+from cpg_ros.analysis.papers.buono_hopf import PRINTED, Sample, square_root
 from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.library.biped import Biped

@@ -17,8 +17,7 @@
 from dataclasses import replace
 
 from branch_switching import mode, switch_branch
-from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import continue_orbit
+from cpg_ros.dynamics.continuation import bifurcations, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.mesh.solve import from_path

@@ -29,9 +29,8 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.library import shipped
-from cpg_ros.networks.network import ParameterLine
+from cpg_ros.networks.network import ParameterLine, stated_gait
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.networks.stated_gait import stated_gait
 from depth import examples, in_depth, spread
 from hypothesis import given
 from hypothesis import strategies as st

@@ -20,15 +20,15 @@ import json
 from cpg_ros.analysis.analysis_plot import colours
 from cpg_ros.analysis.analyze import main as analyze
 from cpg_ros.analysis.atlas.chart import chart_of
+from cpg_ros.analysis.atlas.grid import assess_row, AtlasRow, NONE, STABLE
 from cpg_ros.analysis.atlas.hopf_curves import hopf_curves
-from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow, NONE, STABLE
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.dynamics.stability import verdicts
+from cpg_ros.networks.network import stated_gait
 from cpg_ros.networks.registry import find_network, NETWORKS, PRESETS, SHIPPED
-from cpg_ros.networks.stated_gait import stated_gait
 from depth import examples, in_depth
 from hypothesis import given
 from hypothesis import strategies as st

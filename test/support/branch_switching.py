@@ -17,8 +17,7 @@
 from fractions import Fraction
 
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.bifurcation import Bifurcation
-from cpg_ros.dynamics.continuation import Branch, continue_from_disturbance
+from cpg_ros.dynamics.continuation import Bifurcation, Branch, continue_from_disturbance
 from cpg_ros.dynamics.fourier.floquet import mode as fourier_mode
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.mesh import collocation

@@ -15,4 +15,4 @@
 """Maps of gaits over two parameters, with their exact boundaries."""
 
 __all__ = ['atlas', 'chart', 'fold_curves', 'grid', 'hopf_curves', 'map',
-           'orbit_curves', 'orbit_plane', 'row_job']
+           'orbit_curves']

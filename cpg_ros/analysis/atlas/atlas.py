@@ -28,6 +28,7 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from cpg_ros.analysis.atlas import hopf_curves
 from cpg_ros.analysis.atlas.chart import chart_of, ParameterPlane
 from cpg_ros.analysis.atlas.fold_curves import (
     bautin_folds,
@@ -35,17 +36,9 @@ from cpg_ros.analysis.atlas.fold_curves import (
     edges_without_orbit,
     fold_curves,
 )
-from cpg_ros.analysis.atlas.grid import GaitMap, refine, uncrossed_edges
-from cpg_ros.analysis.atlas.hopf_curves import (
-    Boundary,
-    curves_from,
-    hopf_curves,
-    hopf_starts,
-    with_degeneracies,
-)
+from cpg_ros.analysis.atlas.grid import assess_row, AtlasRow, GaitMap, refine, uncrossed_edges
 from cpg_ros.analysis.atlas.map import AtlasFolder, draw_map
 from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
-from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow
 from cpg_ros.common.command_line import named_interval, note, Parser, refuse_repeated, run, say
 from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
 from cpg_ros.common.workers import add_options, KEPT, working
@@ -95,7 +88,7 @@ def _planned(args: argparse.Namespace) -> tuple[ParameterPlane, tuple[str, ...]]
 
 
 def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecutor, folder: Path
-          ) -> tuple[dict[str, GaitMap], list[Boundary], list[Path]]:
+          ) -> tuple[dict[str, GaitMap], list[hopf_curves.Boundary], list[Path]]:
     """Compute an atlas on a fleet, and write its table and its map.
 
     Raises:
@@ -125,20 +118,20 @@ def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecuto
     curves = stored.curves()
     if curves is None:
         fleet.what = 'lines'
-        hopf = hopf_curves(chart, gaits, fleet.map)
+        hopf = hopf_curves.hopf_curves(chart, gaits, fleet.map)
     else:
         hopf = [curve for curve in curves if curve.kind == 'Hopf']
     sheets = refine(chart, gaits, hopf, run)
     if curves is None:
         fleet.what = 'edges'
-        missed = curves_from(chart, chain(*fleet.map(hopf_starts, [
+        missed = hopf_curves.curves_from(chart, chain(*fleet.map(hopf_curves.hopf_starts, [
             edge for gait, sheet in sheets.items()
             for edge in uncrossed_edges(chart, gait, sheet, hopf)])))
         if missed:
             hopf += missed
             sheets = refine(chart, gaits, hopf, run)
         fleet.what = 'boundaries'
-        hopf = [*fleet.map(with_degeneracies, [(chart, curve) for curve in hopf])]
+        hopf = [*fleet.map(hopf_curves.with_degeneracies, [(chart, curve) for curve in hopf])]
         jobs: list[tuple[Any, ...]] = [
             *((bautin_folds, (chart, curve)) for curve in hopf),
             *((orbit_curves, (chart, gait, edges(chart, sheet)))

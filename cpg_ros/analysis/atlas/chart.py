@@ -15,11 +15,12 @@
 """The plane of an atlas: two lines of parameters, their ranges, and the grid on them."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 import math
 from typing import Any
 
+from cpg_ros.common.command_line import finite
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.networks.network import Network, ParameterLine
 from cpg_ros.networks.registry import find_network, reference
@@ -65,22 +66,31 @@ class CodimensionTwo(ShortRepr):
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything in plain types; fields that do not apply are None."""
-        return {'type': self.kind, 'gait': self.gait, 'values': list(self.values),
-                'test': self.test, 'omega': _plain(self.omega), 'other': list(self.other),
-                'other_omega': _plain(self.other_omega)}
+        fields: dict[str, Any] = finite(asdict(self))
+        return {'type': fields.pop('kind'), **fields}
 
     @classmethod
     def of(cls, stored: dict[str, Any]) -> 'CodimensionTwo':
         """Make one from the result of as_dict."""
-        first, second = stored['values']
-        omegas = [math.nan if stored[name] is None else stored[name]
-                  for name in ('omega', 'other_omega')]
-        return cls(stored['type'], stored['gait'], (first, second), stored['test'], omegas[0],
-                   tuple(stored['other']), omegas[1])
+        fields: Any = [math.nan if value is None else tuple(value) if isinstance(value, list)
+                       else value for value in stored.values()]
+        return cls(*fields)
 
 
-def _plain(number: float) -> float | None:
-    return None if math.isnan(number) else number
+@dataclass(frozen=True)
+class LossOnCurve:
+    """The normal form's verdict at a point of a curve.
+
+    Attributes:
+        values: on both axes.
+        soft: whether the motion that branches off attracts; None if the form does not decide.
+        why: reason why it does not decide, or ''.
+
+    """
+
+    values: tuple[float, float]
+    soft: bool | None
+    why: str = ''
 
 
 #: Stride of the coarse grid, a power of 2.

@@ -25,10 +25,9 @@ from functools import partial
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.grid import GaitMap
+from cpg_ros.analysis.atlas.grid import GaitMap, NONE, solve_from_wave
 from cpg_ros.analysis.atlas.hopf_curves import Boundary, condition_of, HopfCondition
 from cpg_ros.analysis.atlas.orbit_curves import Edge
-from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError
 from cpg_ros.dynamics.arclength import (
     continue_steps,

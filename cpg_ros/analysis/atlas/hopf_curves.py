@@ -27,20 +27,13 @@ pair meets in 0 (Bogdanov-Takens), or where the equilibrium folds (zero-Hopf).
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import partial
 from itertools import chain, pairwise
 import math
 
-from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
+from cpg_ros.analysis.atlas.chart import CodimensionTwo, LossOnCurve, ParameterPlane
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import (
-    continue_along_tangents,
-    derivatives,
-    locate,
-    newton,
-    on_curve,
-)
+from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
 from cpg_ros.dynamics.hopf import hopf_points, HopfPoint, ON_AXIS, SPARE, tracked_roots
@@ -72,12 +65,12 @@ class HopfCondition:
 
     def tangent(self, fraction: np.ndarray) -> np.ndarray:
         """Return the unit tangent of the curve, either way, shape (3,)."""
-        return np.linalg.svd(derivatives(self.values, fraction, DIFFERENCE))[2][-1]
+        return np.linalg.svd(arclength.derivatives(self.values, fraction, DIFFERENCE))[2][-1]
 
     def corrected(self, guess: np.ndarray, tangent: np.ndarray) -> np.ndarray | None:
         """Solve in the plane normal to a tangent; None where Newton's method is lost."""
         try:
-            return newton(
+            return arclength.newton(
                 lambda fraction: np.append(self.values(fraction), tangent @ (fraction - guess)),
                 guess, steps=NEWTON, tolerance=EXACT, difference=DIFFERENCE, longest=0.5)
         except (np.linalg.LinAlgError, CpgError, ArithmeticError):
@@ -203,7 +196,7 @@ class Boundary(ShortRepr):
 
     def passes(self, chart: ParameterPlane, point: np.ndarray, reach: float) -> bool:
         """Whether the curve passes a point within a distance, both in fractions of a plane."""
-        return on_curve(chart.fractions_of(self.points), point, reach)
+        return arclength.on_curve(chart.fractions_of(self.points), point, reach)
 
     def __str__(self) -> str:
         met = [name for name, soft in (('supercritical', True), ('subcritical', False))
@@ -223,8 +216,9 @@ def _continue_hopf(condition: HopfCondition, start: np.ndarray, direction: float
         point = condition.corrected(guess, tangent)
         return (None if point is None or not _inside(point) else (point, condition.tangent(point)))
 
-    return [*continue_along_tangents(correct, start, direction * condition.tangent(start),
-                                     (FIRST, SHORTEST, LONGEST), aligned=0.95, most=MOST)]
+    return [*arclength.continue_along_tangents(
+        correct, start, direction * condition.tangent(start), (FIRST, SHORTEST, LONGEST),
+        aligned=0.95, most=MOST)]
 
 
 @dataclass(eq=False)
@@ -236,7 +230,7 @@ class _HopfCurve:
     def holds(self, chart: ParameterPlane, start: HopfStart) -> bool:
         """Whether a point lies on the curve, and its class shares all of the curve."""
         scale = np.array([1.0, 1.0, max(1.0, abs(start.fraction[2]))])
-        if not on_curve(self.fractions / scale, start.fraction / scale, SAME):
+        if not arclength.on_curve(self.fractions / scale, start.fraction / scale, SAME):
             return False
         if start.mode not in self.modes:
             condition = HopfCondition(chart, start.mode)
@@ -337,7 +331,7 @@ def _determinant(block: Block, root: complex) -> complex:
 def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Apply Newton's method; return the solution and its largest residual, or None."""
     try:
-        solution = newton(equations, start, steps=END_NEWTON, tolerance=EXACT,
+        solution = arclength.newton(equations, start, steps=END_NEWTON, tolerance=EXACT,
                           difference=DIFFERENCE, longest=1.0)
         residual = math.inf if solution is None else float(np.abs(equations(solution)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
@@ -447,7 +441,7 @@ class _Curve:
             if not left * right < 0.0:
                 continue
             try:
-                zero = locate(test, partial(self.between, start, end), 0.0, 1.0, BRACKET)
+                zero = arclength.locate(test, partial(self.between, start, end), 0.0, 1.0, BRACKET)
             except (ArithmeticError, ValueError, CpgError):
                 continue
             if abs(test(zero)) < VANISHED * min(abs(left), abs(right)):
@@ -488,15 +482,11 @@ def hopf_degeneracies(chart: ParameterPlane, curve: Boundary) -> tuple[Codimensi
 
 
 def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
-    @cache
-    def coefficient(key: bytes) -> float:
+    def test(fraction: np.ndarray) -> float:
         try:
-            return curve.at(np.frombuffer(key))[0].lyapunov
+            return curve.at(fraction)[0].lyapunov
         except (np.linalg.LinAlgError, CpgError):
             return math.nan  # At a pole, which is skipped.
-
-    def test(fraction: np.ndarray) -> float:
-        return coefficient(fraction.tobytes())
 
     small = ROUNDING * float(np.nanmax([0.0,
                                         *(abs(test(fraction)) for fraction in curve.fractions)]))

@@ -24,11 +24,9 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from cpg_ros.analysis.atlas.chart import CodimensionTwo, LABELS, ParameterPlane
-from cpg_ros.analysis.atlas.grid import GaitMap, NUMBERS
+from cpg_ros.analysis.atlas.chart import CodimensionTwo, LABELS, LossOnCurve, ParameterPlane
+from cpg_ros.analysis.atlas.grid import AtlasRow, GaitMap, NUMBERS
 from cpg_ros.analysis.atlas.hopf_curves import Boundary
-from cpg_ros.analysis.atlas.orbit_plane import LossOnCurve
-from cpg_ros.analysis.atlas.row_job import AtlasRow
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import replacing, stored_json, write_atomically
 from cpg_ros.common.report_page import rendered, STYLE
@@ -179,7 +177,7 @@ class AtlasFolder:
             return None  # Those of an earlier version are followed anew.
         return [Boundary(curve['kind'], tuple(curve['gaits']), np.array(curve['points']),
                          tuple(map(CodimensionTwo.of, curve['codimension_two'])),
-                         tuple(LossOnCurve(tuple(loss['values']), loss['soft'], loss['why'])
+                         tuple(LossOnCurve(**loss | {'values': tuple(loss['values'])})
                                for loss in curve['losses']))
                 for curve in stored]
 

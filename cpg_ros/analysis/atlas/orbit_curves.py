@@ -24,22 +24,80 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import chain, pairwise
 
-from cpg_ros.analysis.atlas.chart import CodimensionTwo, ParameterPlane
-from cpg_ros.analysis.atlas.grid import GaitMap
+from cpg_ros.analysis.atlas.chart import CodimensionTwo, LossOnCurve, ParameterPlane
+from cpg_ros.analysis.atlas.grid import GaitMap, NONE, solve_from_wave
 from cpg_ros.analysis.atlas.hopf_curves import Boundary
-from cpg_ros.analysis.atlas.orbit_plane import OrbitPlane, spectrum, stability_losses
-from cpg_ros.analysis.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.dynamics.arclength import (
-    continue_along_tangents,
-    derivatives,
-    locate,
-    newton,
-    NoOrbit,
-)
-from cpg_ros.dynamics.bifurcation import kind_of, REAL
-from cpg_ros.dynamics.floquet import ATTRACTS
+from cpg_ros.dynamics import arclength
+from cpg_ros.dynamics.continuation import kind_of, REAL
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.fourier.floquet import Accuracy
+from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form
+from cpg_ros.dynamics.solve_orbit import solve_beside
 import numpy as np
+
+#: Accuracy of multipliers on curves.
+ACCURACY = Accuracy(4, 1e-12, 1e-8, 5)
+
+
+def spectrum(orbit: Orbit) -> list[np.ndarray]:
+    """Multipliers of each subspace, largest first; the class comes first, without 1."""
+    return multipliers(orbit, accuracy=ACCURACY).subspaces
+
+
+class OrbitPlane:
+    """Orbits over the plane, each solved beside the last one."""
+
+    def __init__(self, chart: ParameterPlane, gait: str) -> None:
+        """Take the plane; the first orbit is set as the last."""
+        self.chart, self.gait = chart, gait
+        self.last: Orbit | None = None
+
+    def orbit(self, fraction: np.ndarray) -> Orbit:
+        """Solve at a point given in fractions of the ranges.
+
+        Raises:
+            NoOrbit: there is none beside the last one.
+
+        """
+        assert self.last is not None
+        solved = solve_beside(self.chart.at_fractions(fraction), self.last)
+        if solved.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
+            raise arclength.NoOrbit('the orbit has shrunk')
+        return solved
+
+
+#: Points on a curve at which the normal form is computed.
+POINTS = 5
+
+
+def stability_losses(plane: OrbitPlane, part: int, rank: int,
+                     curve: Sequence[tuple[np.ndarray, Orbit]]) -> Iterator[LossOnCurve]:
+    """Yield the normal forms at evenly spaced points of a curve.
+
+    Points at which other multipliers are outside the unit circle are left out: there the gait is
+    unstable on both sides.
+
+    Args:
+        plane: of the curve.
+        part: index of the subspace in which a multiplier crosses the unit circle.
+        rank: of the multiplier in it, by size.
+        curve: its points in fractions of the ranges, and orbits beside them.
+
+    """
+    indices = np.unique(((np.arange(POINTS) + 0.5) / POINTS * len(curve)).astype(int))
+    for fraction, beside in (curve[k] for k in indices):
+        plane.last = beside
+        try:
+            orbit = plane.orbit(fraction)
+        except arclength.NoOrbit:
+            continue
+        if loses_stability(orbit):
+            multiplier = complex(spectrum(orbit)[part][rank])
+            form = orbit_normal_form(orbit, multiplier, part)
+            yield LossOnCurve(plane.chart.values_at(fraction), form.soft, form.why)
+
 
 # Strong resonances on a curve of torus points: 1:1 to 1:4.
 
@@ -123,8 +181,9 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
         return np.array([product - 1.0, total - SUMS[n]])
 
     try:
-        solution = newton(gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
-                          difference=RESONANCE_DIFFERENCE, longest=REACH)
+        solution = arclength.newton(
+            gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
+            difference=RESONANCE_DIFFERENCE, longest=REACH)
         return None if solution is None else (solution, float(np.abs(gaps(solution)).max()))
     except (CpgError, np.linalg.LinAlgError, IndexError):
         return None
@@ -169,7 +228,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
             continue
         try:
             curves += _through(chart, gait, edge)
-        except (NoOrbit, np.linalg.LinAlgError):
+        except (arclength.NoOrbit, np.linalg.LinAlgError):
             continue
         if len(curves) >= CURVES:
             break
@@ -198,7 +257,7 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
         if not crosses:
             # A neutral multiplier, as of uncoupled rings, may be below 1 by rounding.
             continue
-        fraction = locate(g, partial(_between, edge.start, edge.end), 0.0, 1.0, 1e-9)
+        fraction = arclength.locate(g, partial(_between, edge.start, edge.end), 0.0, 1.0, 1e-9)
         crossing = complex(spectrum(plane.orbit(fraction))[part][rank])
         kind = kind_of(crossing)
         crossing_orbit = plane.last
@@ -226,13 +285,13 @@ def _continue_edge(g: Distance, start: np.ndarray, direction: float) -> Iterator
     def correct(guess: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         try:
             point, slope = _onto(g, guess, _normal(tangent))
-        except (NoOrbit, np.linalg.LinAlgError):
+        except (arclength.NoOrbit, np.linalg.LinAlgError):
             return None
         return None if (point < 0.0).any() or (point > 1.0).any() else (point, _normal(slope))
 
-    tangent = direction * _normal(derivatives(g, start, DIFFERENCE))
-    return continue_along_tangents(correct, start, tangent, (STEP, SHORTEST, STEP), aligned=0.8,
-                                   most=MOST)
+    tangent = direction * _normal(arclength.derivatives(g, start, DIFFERENCE))
+    return arclength.continue_along_tangents(
+        correct, start, tangent, (STEP, SHORTEST, STEP), aligned=0.8, most=MOST)
 
 
 def _normal(vector: np.ndarray) -> np.ndarray:
@@ -245,7 +304,7 @@ def _onto(g: Distance, fraction: np.ndarray, normal: np.ndarray) -> tuple[np.nda
     for _ in range(NEWTON):
         value = g(fraction)
         if abs(value) < EXACT:
-            return fraction, derivatives(g, fraction, DIFFERENCE)
+            return fraction, arclength.derivatives(g, fraction, DIFFERENCE)
         along = (g(fraction + DIFFERENCE * normal) - value) / DIFFERENCE
         fraction = fraction - value / along * normal
-    raise NoOrbit('the curve is lost')
+    raise arclength.NoOrbit('the curve is lost')

@@ -14,5 +14,5 @@
 
 """Published quantities of the papers, each beside the value computed here."""
 
-__all__ = ['buono_gaits', 'buono_hopf', 'buono_linear', 'liu_zhang', 'oscillators', 'rashidi',
+__all__ = ['buono_gaits', 'buono_hopf', 'liu_zhang', 'oscillators', 'rashidi',
            'reproduce', 'row']

@@ -30,8 +30,7 @@ from cpg_ros.fitting.gaits.foot_contacts import FootContacts, NEVER, OFTEN
 from cpg_ros.fitting.gaits.leg_names import HEXAPOD, role_of
 from cpg_ros.fitting.gaits.mean_cycle import blocks, evaluate_coefficients, PhaseAverage
 from cpg_ros.fitting.gaits.recognition import best_shift, recognise
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
+from cpg_ros.networks.network import GAIT_TOLERANCE, nearest_gait, Network
 import numpy as np
 from scipy.special import stdtrit
 
@@ -385,7 +384,7 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
         if not _reversed(network, gait, symmetry):
             apart[gait] = min(apart[gait], _apart(own, -target, waves))
         size[gait] = -symmetry.waves.max()
-    fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
+    fits = [gait for gait in apart if apart[gait] <= max(GAIT_TOLERANCE, min(apart.values()))]
     nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
     # Others with the same phases of the legs; less constrained ones never fit worse.
     same = [gait for gait in fits if size[gait] == size[nearest]
@@ -404,8 +403,9 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
         beside = network.sides[order[1]] == network.sides[order[0]]
         kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
-    return GaitMatch(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
-                     margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
+    named = nearest if apart[nearest] <= GAIT_TOLERANCE else None
+    return GaitMatch(named, nearest, apart[nearest], margin, tuple(same),
+                     1.0 / (1.0 + sum(odds)), tuple(notes))
 
 
 def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:

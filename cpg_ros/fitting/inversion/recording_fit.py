@@ -35,7 +35,7 @@ from cpg_ros.fitting.recordings.recording import (
 )
 from cpg_ros.motion.plan import refusal
 from cpg_ros.motion.robot import Robot
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.network import Network, other_gait, Preset
 from cpg_ros.networks.registry import (
     find_network,
     NetworkError,
@@ -44,7 +44,6 @@ from cpg_ros.networks.registry import (
     SHIPPED,
     with_legs_of,
 )
-from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 
 # A fit to every steady gait: where the requested fit has no orbit, a simpler one.

@@ -37,8 +37,7 @@ from typing import Any, ClassVar
 from cpg_ros.networks.definition import Cell, cos, Number, Range, sin, sqrt
 from cpg_ros.networks.leg_numbers import for_legs, leg_names, leg_positions
 from cpg_ros.networks.library.families import ring_gaits
-from cpg_ros.networks.network import known, Network, Preset
-from cpg_ros.networks.stated_gait import stated_gait
+from cpg_ros.networks.network import known, Network, Preset, stated_gait
 from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
 

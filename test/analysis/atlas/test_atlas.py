@@ -20,9 +20,16 @@ import json
 from cpg_ros.analysis.atlas import atlas, fold_curves
 from cpg_ros.analysis.atlas import orbit_curves as curves
 from cpg_ros.analysis.atlas.chart import chart_of
-from cpg_ros.analysis.atlas.grid import GaitMap, refine, uncrossed_edges
+from cpg_ros.analysis.atlas.grid import (
+    assess_row,
+    AtlasRow,
+    GaitMap,
+    LOCKED,
+    NONE,
+    refine,
+    uncrossed_edges,
+)
 from cpg_ros.analysis.atlas.hopf_curves import curves_from, hopf_curves, hopf_starts
-from cpg_ros.analysis.atlas.row_job import assess_row, AtlasRow, LOCKED, NONE
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers

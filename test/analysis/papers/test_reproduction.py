@@ -26,7 +26,6 @@ import sys
 from cpg_ros.analysis.papers import (
     buono_gaits,
     buono_hopf,
-    buono_linear,
     liu_zhang,
     rashidi,
     reproduce,
@@ -253,10 +252,10 @@ def test_changed_numerics_of_the_delayed_network_fail(monkeypatch, capsys):
 
 
 def test_a_changed_linearisation_fails(monkeypatch, capsys):
-    only(monkeypatch, 'buono_golubitsky', buono_linear.tables)
+    only(monkeypatch, 'buono_golubitsky', buono_hopf.tables)
     assert outcome(capsys, 'buono_golubitsky')[0] == 0
-    right = buono_linear.blocks
-    monkeypatch.setattr(buono_linear, 'blocks', lambda network, state: right(
+    right = buono_hopf.blocks
+    monkeypatch.setattr(buono_hopf, 'blocks', lambda network, state: right(
         replace(network, gamma=-network.gamma), state))
     code, rows = outcome(capsys, 'buono_golubitsky')
     assert code == 1

@@ -15,7 +15,7 @@
 """The gait, H and K of a cycle of signals: with noise, in pulses, and none to be found."""
 
 from cpg_ros.fitting.gaits.recognition import recognise
-from cpg_ros.networks.stated_gait import nearest_gait
+from cpg_ros.networks.network import nearest_gait
 from cpg_ros.networks.symmetry import D2, Symmetry, Z4_Z2
 from depth import examples
 from hypothesis import given
