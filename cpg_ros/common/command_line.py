@@ -191,6 +191,8 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, **options: Any) -> None:
         super().__init__(**{'formatter_class': argparse.RawDescriptionHelpFormatter, **options})
         self.description = self.description and self.description.strip()
+        # So that a value such as -0.6:0.2 is not taken for an option.
+        self._negative_number_matcher = re.compile(r'-\.?\d')
 
     def error(self, message: str) -> NoReturn:
         """Print the message and exit."""

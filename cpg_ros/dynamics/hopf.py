@@ -468,7 +468,9 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
     def roots(value: float, which: int, count: int) -> np.ndarray:
         if not split(value):
             return np.full(count, np.nan, dtype=complex)
-        return split(value)[which].roots(count)
+        listed = split(value)[which].roots(count)
+        # Cells whose delayed input has the weight 0 have fewer.
+        return np.pad(listed, (0, count - len(listed)), constant_values=np.nan)
 
     grid = _with_edges([float(value) for value in np.linspace(low, high, GRID)],
                        lambda value: bool(split(value)))

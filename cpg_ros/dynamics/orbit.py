@@ -60,7 +60,7 @@ NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a dist
 POINTS = 1024
 #: COMPARED: fewest points at which signals are compared; PARTS: numbers of equal parts of a cycle
 #: that an orbit must not repeat.
-COMPARED, PARTS = 60, (2, 3, 5)
+COMPARED, PARTS = 60, np.array([2, 3, 5, 7, 11, 13, 17, 19])
 #: Difference of two equal signals, over their range.
 SAME = 1e-4
 
@@ -77,14 +77,24 @@ class Orbit(ShortRepr, ABC):
         network: the parameters for which it solves the equations.
         symmetry: of the gait; gives waves and phases of the cells.
         period: T in model time.
-        residual: largest residual of the equations, between the nodes where they are solved.
 
     """
 
     network: Network
     symmetry: Symmetry
     period: float
-    residual: float
+
+    @cached_property
+    def residual(self) -> float:
+        """Largest residual of all equations, between the nodes where they are solved."""
+        states, past = self(self.between), self(self.between - self.network.delay)
+        gaps = self.derivative(self.between) - self.network.rates(states, past)
+        return float(np.abs(gaps).max())
+
+    @property
+    @abstractmethod
+    def between(self) -> np.ndarray:
+        """Times between the nodes at which the equations are solved, model time."""
 
     @property
     @abstractmethod
@@ -205,9 +215,13 @@ def extra_symmetry(orbit: Orbit) -> str:
     """
     # A multiple of the denominator of every possible shift.
     points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
-    x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
-    for parts in PARTS:
-        if np.abs(x - np.roll(x, points // parts, axis=0)).max() < SAME * np.ptp(x):
+    theta, cells = np.arange(points) / points, orbit.network.cells
+    x = orbit(theta * orbit.period)[:, :cells]
+    # A single time excludes nearly all of them.
+    again = np.abs(orbit(orbit.period / PARTS)[:, :cells] - x[0]).max(axis=1)
+    for parts in PARTS[again < SAME * np.ptp(x)]:
+        later = orbit((theta + 1.0 / parts) * orbit.period)[:, :cells]
+        if np.abs(later - x).max() < SAME * np.ptp(x):
             return f'it repeats {parts} times'
     return signal_symmetry(orbit.symmetry, x, SAME)
 

@@ -45,16 +45,17 @@ class Term:
     __sub__, __rsub__ = _operators('-')
     __mul__, __rmul__ = _operators('*')
     __truediv__, __rtruediv__ = _operators('/')
+    __pow__, __rpow__ = _operators('**')
 
     def __init__(self, text: str) -> None:
         """Wrap a text."""
         self.text = text
 
-    def __pow__(self, power: int) -> 'Term':
-        return Term(f'({self.text} ** {power!r})')
-
     def __neg__(self) -> 'Term':
         return Term(f'(-{self.text})')
+
+    def __abs__(self) -> 'Term':
+        return Term(f'Abs({self.text})')
 
 
 def _text(value: Number) -> str:
@@ -66,7 +67,8 @@ def _function(name: str) -> Callable[[Number], Term]:
 
 
 #: Functions of terms, by the names that they have in mathematics.
-tanh, cosh, exp, sin, cos, sqrt = map(_function, ('tanh', 'cosh', 'exp', 'sin', 'cos', 'sqrt'))
+tanh, cosh, exp, log, sin, cos, sqrt = map(
+    _function, ('tanh', 'cosh', 'exp', 'log', 'sin', 'cos', 'sqrt'))
 
 
 def positive(x: Number) -> Term:

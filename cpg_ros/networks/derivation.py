@@ -77,8 +77,8 @@ def _nonzero(table: Iterable[tuple[tuple[int, ...], Any]]) -> tuple[list[Any], l
 
 def _source(*parts: str) -> str:
     text = '\n\n\n'.join(parts)
-    functions = [word for word in ('abs', 'cos', 'cosh', 'exp', 'sign', 'sin', 'sinh', 'sqrt',
-                                   'tan', 'tanh') if f'{word}(' in text]
+    functions = [word for word in ('abs', 'cos', 'cosh', 'exp', 'log', 'sign', 'sin', 'sinh',
+                                   'sqrt', 'tan', 'tanh') if f'{word}(' in text]
     head = f'from numpy import {", ".join(functions)}\n\n\n' if functions else ''
     return f'{head}{text}\n'
 

@@ -22,6 +22,7 @@ import resource
 import signal
 import subprocess
 
+from cpg_ros.common.command_line import interval, Parser
 from cpg_ros.ros.cli.executables import EXECUTABLES, start
 from depth import in_depth
 from graph import EXECUTABLE, free_domain, Process
@@ -60,6 +61,13 @@ def test_help_of_a_tool_and_words_that_are_not_for_it(here, tool):
         assert said.startswith('usage: ') and tool in said
     code, said, errors = here(tool, '--nonsense')
     assert code == 2 and not said and len(errors.splitlines()) == 1
+
+
+def test_a_range_may_begin_with_a_minus():
+    parser = Parser(prog='tool')
+    parser.add_argument('--range', type=interval)
+    assert parser.parse_args(['--range', '-0.6:0.2']).range == (-0.6, 0.2)
+    assert parser.parse_args(['--range', '-.5:1']).range == (-0.5, 1.0)
 
 
 @pytest.mark.parametrize(('executable', 'word'), [

@@ -28,6 +28,7 @@ from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.networks.definition import Range
 from cpg_ros.networks.network import Network, ParameterLine
+from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Group, Symmetry
 from depth import in_depth
 import numpy as np
@@ -206,6 +207,17 @@ def test_the_normal_form_predicts_the_exact_orbits():
         assert turns[1] / turns[0] == pytest.approx(0.25, abs=0.05)
         judged += 1
     assert judged
+
+
+def test_a_line_may_begin_where_delayed_cells_are_uncoupled():
+    """At c = 0 they have no root by the delay."""
+    network = PRESETS['delayed']['trot'].network
+    points, beside = (hopf_points(network, 'c', low, 10.0) for low in (0.0, 0.25))
+    assert points and [point.gait for point in points] == [point.gait for point in beside]
+    for point in points:
+        # The root i omega of one variable, for which |omega - A| = |c|.
+        a = point.block.now[0, 0]
+        assert abs(1j * point.omega - a) == pytest.approx(point.value, rel=1e-6)
 
 
 def test_a_negative_delay_is_refused():

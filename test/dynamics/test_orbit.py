@@ -18,6 +18,7 @@ from dataclasses import replace
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.hopf import first_hopf, hopf_points
+from cpg_ros.dynamics.orbit import extra_symmetry
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.networks.library.delayed import Delayed, PRESETS
 from cpg_ros.networks.network import ParameterLine
@@ -171,3 +172,26 @@ def test_refusals(change, gait, words):
         solve_orbit(replace(EXAMPLE, **change), gait)
     # A set without an orbit is told from arguments that make no sense.
     assert isinstance(caught.value, NoOrbit) == ('gives no' in words or 'below' in words)
+
+
+def test_the_residual_is_that_between_the_nodes():
+    """Seven nodes solve no equation but at themselves; eq. 1.1, written out, at other times."""
+    fine = solve_orbit(EXAMPLE, 'trot')
+    coarse = replace(fine, values=fine.values[..., ::9])
+    for orbit, most in ((fine, 1e-9), (coarse, 1.0)):
+        a, b, c, d, tau = orbit.network.as_dict().values()
+        times = np.linspace(0.0, orbit.period, 400)
+        now, past, cells = orbit(times), orbit(times - tau), np.arange(8)
+        rates = (a * now + b * np.tanh(now) + d * np.tanh(now[:, cells - 2])
+                 + c * np.tanh(past[:, cells ^ 1]))
+        gap = np.abs(orbit.derivative(times) - rates).max()
+        assert gap < most
+        assert orbit.residual == pytest.approx(gap, rel=0.5, abs=1e-9)
+    assert coarse.residual > 1e-3
+
+
+def test_an_orbit_that_repeats_eleven_times_is_told():
+    once = solve_orbit(EXAMPLE, 'trot')
+    often = replace(once, period=11.0 * once.period, values=np.tile(once.values, 11))
+    assert extra_symmetry(once) == ''
+    assert extra_symmetry(often) == 'it repeats 11 times'

@@ -25,10 +25,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
-from cpg_ros import solve_orbit
+from cpg_ros import simulate, solve_orbit
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.solve_orbit import solve_preset
-from cpg_ros.networks.definition import Range
+from cpg_ros.networks.definition import log, Range
 from cpg_ros.networks.network import known, Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
@@ -307,6 +307,32 @@ def test_a_gait_that_is_not_there_is_refused_in_one_sentence(monkeypatch):
                                       'simulations from states about the equilibrium nor from a '
                                       'Hopf point along mu'):
         solve_preset(Preset('hop', TwoLegs(-2.0, 6.0, 0.5)))
+
+
+def test_equations_may_have_powers_of_anything_logarithms_and_absolute_values():
+    @dataclass(frozen=True)
+    class Powers(TwoLegs):
+        n: float
+
+        name = 'powers'
+
+        @staticmethod
+        def equations(cell, p):
+            x, y = cell.now()
+            return 2.0 ** y - abs(x) ** p.n, log(1.0 + x ** 2) * p.k - y
+
+    network, state = Powers(1.0, 6.0, -0.5, 2.5), np.array([0.7, -1.2, 0.4, -0.3])
+    x, y = state[:2], state[2:]
+    rates = np.concatenate([2.0 ** y - np.abs(x) ** 2.5, -0.5 * np.log(1.0 + x ** 2) - y])
+    assert network.rates(state) == pytest.approx(rates, abs=1e-14)
+    slopes = [(network.rates(state + step) - network.rates(state - step)) / 2e-6
+              for step in 1e-6 * np.eye(4)]
+    assert network.jacobian(state) == pytest.approx(np.array(slopes).T, abs=1e-8)
+    by_n = -np.concatenate([np.abs(x) ** 2.5 * np.log(np.abs(x)), [0.0, 0.0]])
+    assert network.by_parameter(state)[:, 3] == pytest.approx(by_n, abs=1e-12)
+    run = simulate(network, state, 0.05, 0.01, progress=False)
+    exact = solve_ivp(lambda _, z: network.rates(z), (0.0, 0.05), state, rtol=1e-11, atol=1e-12)
+    assert run.x[-1] == pytest.approx(exact.y[:, -1], abs=1e-8)
 
 
 def test_cells_of_any_number_of_variables_need_no_word():

@@ -137,6 +137,11 @@ class FourierOrbit(Orbit):
         """Number of evenly spaced points that resolve a waveform: the nodes."""
         return int(self.values.shape[-1])
 
+    @property
+    def between(self) -> np.ndarray:
+        """Times in the middle between two nodes, model time, shape (n,)."""
+        return (np.arange(self.samples) + 0.5) / self.samples * self.period
+
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
         """Return a waveform, or its derivative in theta of the given order, at theta in cycles."""
@@ -271,8 +276,8 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
 
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-             residual: np.ndarray, jacobian: np.ndarray, point: Point) -> FourierOrbit:
-    """Complete a solution by its derivatives; the last three are those of the equations."""
+             jacobian: np.ndarray, point: Point) -> FourierOrbit:
+    """Complete a solution by its derivatives; the last two arguments are those of equations."""
     derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
     # The equations of one cell contain only the weights of its own inputs.
@@ -281,8 +286,7 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             members = [names.index(name) for name in family]
             derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
     shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
-    return FourierOrbit(network, symmetry, period, float(np.abs(residual[:-1]).max()),
-                        u.reshape(shape), derivatives)
+    return FourierOrbit(network, symmetry, period, u.reshape(shape), derivatives)
 
 
 def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
@@ -327,4 +331,4 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
         if u.shape[1] >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
         u, periods = np.array([resample(row, 2 * row.size + 1) for row in u]), ()
-    return complete(network, symmetry, u, period, residual, jacobian, point)
+    return complete(network, symmetry, u, period, jacobian, point)

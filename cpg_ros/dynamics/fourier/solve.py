@@ -114,7 +114,7 @@ class FourierCurve(ShortRepr):
         """Complete a solution by its derivatives and its residual."""
         network, u, period = self.along.at(self.network, float(z[-1])), self._rows(z), float(z[-2])
         return complete(network, self.symmetry, u, period,
-                        *equations(network, self.symmetry, u, period))
+                        *equations(network, self.symmetry, u, period)[1:])
 
 
 def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]

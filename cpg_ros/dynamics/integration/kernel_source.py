@@ -337,7 +337,7 @@ class _Printer(C99CodePrinter):  # type: ignore[misc]
         if exponent.is_Integer and 0 < abs(exponent) <= 4:
             text = '*'.join([self.parenthesize(base, 100)] * abs(int(exponent)))
             return f'({text})' if exponent > 0 else f'R(1.0)/({text})'
-        if abs(float(exponent)) == 0.5:
+        if exponent.is_number and abs(float(exponent)) == 0.5:
             root = f'F(sqrt)({self._print(base)})'
             return root if exponent > 0 else f'R(1.0)/{root}'
         return f'F(pow)({self._print(base)}, {self._print(exponent)})'

@@ -254,6 +254,8 @@ def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray
 
 #: SAMPLES: number of even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192
+#: Positions in an interval, 0 to 1, at which the residual is computed.
+BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -313,6 +315,12 @@ class MeshOrbit(Orbit):
     def samples(self) -> int:
         """Number of evenly spaced points that resolve a waveform."""
         return SAMPLES
+
+    @property
+    def between(self) -> np.ndarray:
+        """Times inside the intervals of T/m, model time, shape (5 n,)."""
+        positions = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * BETWEEN
+        return positions.ravel() * self.solution.length
 
 
 def _columns(symmetry: Symmetry, wave: int, variable: int) -> list[int]:

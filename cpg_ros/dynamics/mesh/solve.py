@@ -59,8 +59,6 @@ MORE = 4
 ALIGNED = 8
 #: Range below which the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
-#: Positions in an interval, 0 to 1, at which the residual is computed.
-BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
@@ -146,13 +144,8 @@ def _on_kinks(reduced: Reduced, now: Solution) -> bool:
 
 def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
     """Make an orbit of a solution."""
-    coefficients = coefficients_of(reduced, now)
-    values, rise = (polynomial.polyval(BETWEEN, c).transpose(0, 2, 1)
-                    for c in (coefficients, polynomial.polyder(coefficients)))
-    steps = now.length * np.diff(now.mesh)
-    residual = np.abs(rise / steps[:, None, None] - reduced.rates(values))
     return MeshOrbit(reduced.network, reduced.symmetry, reduced.symmetry.order * now.length,
-                     float(residual.max()), now.mesh, now.stages, coefficients)
+                     now.mesh, now.stages, coefficients_of(reduced, now))
 
 
 
