@@ -155,7 +155,7 @@ def end_of(run: Trajectory, orbit: Orbit) -> str:
 def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
     """Return whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
     points = len(cycle.signals)
-    exact = orbit(np.arange(points) / points * orbit.period)
+    exact = orbit.cycle(points)
     seen = np.fft.rfft(cycle.signals - cycle.signals.mean(axis=0), axis=0)
     cells, blocks = orbit.network.cells, np.arange(orbit.network.variables)[:, None]
     for element in orbit.symmetry.group.elements.values():

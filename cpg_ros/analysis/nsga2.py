@@ -82,11 +82,6 @@ class VerifiedGait(ShortRepr):
     differences: tuple[float, float]
 
 
-def orbit_signals(orbit: Orbit, points: int = POINTS) -> np.ndarray:
-    """Return the states on even points of an orbit's cycle, shape (points, components)."""
-    return orbit(np.arange(points) / points * orbit.period)
-
-
 def exact_preset(preset: Preset) -> tuple[Preset, Orbit]:
     """Move a preset's start onto its exact orbit, to where cell 1 peaks.
 
@@ -163,7 +158,7 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
     leading = spectrum.leading
     if not spectrum.attracts:
         raise NotVerified(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
-    signals = orbit_signals(orbit)
+    signals = orbit.cycle(POINTS)
     if waveform_shortfall(signals, orbit.symmetry) > 0.0:
         raise NotVerified('a waveform is too small, turns too unsteadily or is too like the other')
     first, differences = orbit.symmetry.first, (0.0, 0.0)

@@ -29,7 +29,8 @@ import re
 import sys
 from typing import Any
 
-from cpg_ros.analysis.nsga2 import Front, optimise, orbit_signals
+from cpg_ros.analysis import gait_diagram
+from cpg_ros.analysis.nsga2 import Front, optimise
 from cpg_ros.analysis.objectives import APERIODIC, objective_names, RESOLUTION, SEARCHED
 from cpg_ros.common.command_line import (
     assignment,
@@ -49,9 +50,8 @@ import matplotlib
 from matplotlib.axes import Axes
 import numpy as np
 
-#: Colours. WAVES: of the waveforms; TRIED, SOLVED: of sets without and with an exact orbit; BEST:
-#: of the Pareto front.
-WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
+#: Colours. TRIED, SOLVED: of sets without and with an exact orbit; BEST: of the Pareto front.
+TRIED, SOLVED, BEST = '#cbd5e0', '#718096', '#2f855a'
 #: FLOOR: smallest multiplier that is drawn.
 FLOOR = 1e-6
 
@@ -104,34 +104,8 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
     axes.set_ylabel(y)
 
 
-def _signals(axes: Axes, front: Front) -> None:
-    """Draw the waveform of every cell over two cycles of the exact orbit, one row each."""
-    orbit = front.best.orbit
-    points = 512
-    once = orbit_signals(orbit, points)[:, :orbit.network.cells]
-    signals = np.concatenate([once, once, once[:1]])
-    time = np.arange(2 * points + 1) / points * orbit.period
-    spacing = 1.15 * float(np.ptp(once, axis=0).max())
-    cells = orbit.network.cells
-    middles = (cells - 1 - np.arange(cells)) * spacing
-    for cell in range(cells):
-        middle = 0.5 * float(once[:, cell].max() + once[:, cell].min())
-        axes.plot(time, middles[cell] + signals[:, cell] - middle,
-                  color=WAVES[int(orbit.waves[cell])], linewidth=1.4)
-    axes.axvline(orbit.period, color=TRIED, linewidth=0.8, linestyle=':')
-    axes.set_yticks(middles, [f'cell {cell + 1}' for cell in range(cells)])
-    # A bar gives the scale of the dimensionless potential.
-    unit = float(f'{0.5 * spacing:.1g}')
-    axes.plot([time[-1] * 1.02] * 2, [middles[-1] - 0.5 * unit, middles[-1] + 0.5 * unit],
-              color='#1a202c', linewidth=2.0, clip_on=False)
-    axes.text(time[-1] * 1.03, middles[-1], f'{unit:g}', va='center', fontsize=9)
-    axes.set_xlim(0.0, time[-1])
-    axes.set_xlabel('time [model time], two cycles of the exact orbit')
-    axes.set_ylabel('potential v [1]')
-
-
 def draw_front(path: Path, front: Front) -> None:
-    """Draw objectives against each other, and the selected set's signals."""
+    """Draw objectives against each other, and the selected set's gait."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     names = objective_names(front.space.symmetry)
@@ -161,11 +135,9 @@ def draw_front(path: Path, front: Front) -> None:
         axes.spines[['top', 'right']].set_visible(False)
     upper.legend(*axes.get_legend_handles_labels(), fontsize=9, loc='outside lower center',
                  ncols=4, frameon=False)
-    axes = lower.subplots()
-    _signals(axes, front)
-    axes.spines[['top', 'right', 'left']].set_visible(False)
-    axes.tick_params(left=False)
-    orbit = front.best.orbit
+    axes, orbit = lower.subplots(), front.best.orbit
+    gait_diagram.draw(axes, orbit, 'Footfalls and cells of the exact orbit')
+    axes.set_xlabel('time [strides]')
     figure.suptitle(f'{front.space.gait.replace("_", " ")} of the {front.space.network.name}: '
                     f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
                     f'chosen: period {orbit.period:.3f} model time, leading multiplier '

@@ -41,13 +41,13 @@ def frequencies(a: complex, b: complex) -> list[float]:
             if omega > 0.0]
 
 
-def critical_delay(a: complex, b: complex, omega: float, n: int = 0) -> float:
-    """Return ``tau_n = (-arg((i omega - A)/B) mod 2 pi + 2 pi n) / omega``."""
-    return _delay((1j * omega - a) / b, omega, n)
+def critical_delay(a: complex, b: complex, omega: float) -> float:
+    """Return the smallest one, ``(-arg((i omega - A)/B) mod 2 pi) / omega``."""
+    return _delay((1j * omega - a) / b, omega)
 
 
-def _delay(z: complex, omega: float, n: int) -> float:
-    return (-cmath.phase(z) % (2.0 * math.pi) + 2.0 * math.pi * n) / omega
+def _delay(z: complex, omega: float) -> float:
+    return -cmath.phase(z) % (2.0 * math.pi) / omega
 
 
 def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, float]]:
@@ -78,7 +78,7 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
         z = complex(z / abs(z))
         for root in np.linalg.eigvals(now + past * z):
             close = ON_CIRCLE * (1.0 + abs(root))
-            crossing = ((float(root.imag), _delay(z, float(root.imag), 0))
+            crossing = ((float(root.imag), _delay(z, float(root.imag)))
                         if root.imag > close else None)
             if crossing and abs(root.real) < close and not any(
                     np.allclose(crossing, other, 1e-6, 0.0) for other in crossings):
@@ -162,15 +162,23 @@ def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     return w if exponent.real > 0.0 else np.where(n == 0, 0.0, w)
 
 
+def chebyshev(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return Chebyshev points of [0, 1], the derivative matrix there, and barycentric weights."""
+    k = np.arange(degree + 1)
+    points = 0.5 * (1.0 - np.cos(np.pi * k / degree))
+    weights = (-1.0) ** k
+    weights[[0, -1]] *= 0.5
+    gaps = points[:, None] - points + np.eye(degree + 1)
+    matrix = weights / weights[:, None] / gaps
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return points, matrix, weights
+
+
 def _generator(now: np.ndarray, past: np.ndarray, delay: float, points: int) -> np.ndarray:
     """Return the generator on Chebyshev points of [-tau, 0], the n components at 0 first."""
-    k = np.arange(points + 1)
-    x = np.cos(np.pi * k / points)
-    weights = np.where((k == 0) | (k == points), 2.0, 1.0) * (-1.0) ** k
-    slope = np.outer(weights, 1.0 / weights) / (x[:, None] - x + np.eye(points + 1))
-    slope -= np.diag(slope.sum(axis=1))
-    n = len(now)
-    whole = np.kron(2.0 / delay * slope, np.eye(n)).astype(now.dtype)
+    n, slope = len(now), chebyshev(points)[1][::-1, ::-1]
+    whole = np.kron(slope / delay, np.eye(n)).astype(now.dtype)
     whole[:n] = 0.0
     whole[:n, :n] = now
     whole[:n, -n:] += past

@@ -167,19 +167,28 @@ class Orbit(ShortRepr, ABC):
         """The largest value of cell 1."""
         return float(self.levels[0, 0].sum())
 
-    def _states(self, times: np.ndarray, order: int) -> np.ndarray:
+    def of_cells(self, times: np.ndarray, waveform: Waveforms) -> np.ndarray:
+        """Return a waveform at the phases of all cells, shape times.shape + (components,)."""
         theta = np.asarray(times, dtype=float)[..., None] / self.period + self.phases
         out = np.empty((*theta.shape[:-1], self.network.components))
         for wave in range(int(self.waves.max()) + 1):
             cells = np.flatnonzero(self.waves == wave)
             for variable in range(self.network.variables):
-                out[..., cells + variable * self.network.cells] = self.waveform(
-                    theta[..., cells], order, wave, variable)
+                out[..., cells + variable * self.network.cells] = waveform(
+                    theta[..., cells], wave, variable)
         return out
+
+    def _states(self, times: np.ndarray, order: int) -> np.ndarray:
+        return self.of_cells(times, lambda theta, wave, variable: self.waveform(
+            theta, order, wave, variable))
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
         """All states at model times, cell 1 peaking at 0; shape times.shape + (components,)."""
         return self._states(times, 0)
+
+    def cycle(self, points: int) -> np.ndarray:
+        """States at even times of a cycle from cell 1's peak on, shape (points, components)."""
+        return self(np.arange(points) / points * self.period)
 
     def derivative(self, times: np.ndarray) -> np.ndarray:
         """Slopes of all states, per model time; shape times.shape + (components,)."""

@@ -57,14 +57,9 @@ class PhaseResponse(ShortRepr):
             Cycles per unit, shape times.shape + (cells, variables).
 
         """
-        orbit = self.orbit
-        theta = np.asarray(times, dtype=float)[..., None] / orbit.period + orbit.phases
-        out = np.empty((*theta.shape, orbit.network.variables))
-        for wave in range(int(orbit.waves.max()) + 1):
-            cells = np.flatnonzero(orbit.waves == wave)
-            for variable in range(orbit.network.variables):
-                out[..., cells, variable] = self.waveform(theta[..., cells], wave, variable)
-        return out
+        network = self.orbit.network
+        out = self.orbit.of_cells(times, self.waveform)
+        return out.reshape(*np.shape(times), network.variables, network.cells).swapaxes(-1, -2)
 
 
 def phase_response(orbit: Orbit) -> PhaseResponse:

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.integration.simulate import History, LANES, simulate, Trajectory
-from cpg_ros.dynamics.orbit import signal_symmetry
+from cpg_ros.dynamics.orbit import Path, signal_symmetry
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -163,8 +163,6 @@ SMALLEST = 1e-3
 #: KEPT: largest relative error of the gait's shifts; ADDED: error up to which a further symmetry
 #: is there.
 KEPT, ADDED = 0.05, 0.01
-#: States over times in cycles, from a peak of cell 1 on.
-Path = Callable[[np.ndarray], np.ndarray]
 
 
 class _Past:

@@ -35,9 +35,9 @@ from cpg_ros.dynamics.continuation import Branch, BranchPoint, continue_from_hop
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import Multipliers, multipliers_within
 from cpg_ros.dynamics.hopf import first_hopf, hopf_points, HopfPoint
-from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit
+from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit, Path
 from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.dynamics.settling import find_orbit, Path, RANDOM, SIZES
+from cpg_ros.dynamics.settling import find_orbit, RANDOM, SIZES
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
@@ -383,7 +383,7 @@ class _Search:
 
 def _scaled(orbit: Orbit) -> Iterator[tuple[Path, float]]:
     """Yield guesses about an orbit, states over times in cycles, and their periods."""
-    mean = orbit(np.arange(COMPARED) / COMPARED * orbit.period).mean(axis=0)
+    mean = orbit.cycle(COMPARED).mean(axis=0)
     for size, slower in SCALED:
         def path(theta: np.ndarray, size: float = size) -> np.ndarray:
             return mean + size * (orbit(theta * orbit.period) - mean)
@@ -408,9 +408,8 @@ def _near(path: Path, period: float, orbit: Orbit) -> bool:
     """Whether the cycle of a simulation is an orbit that has been solved for."""
     if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
         return False
-    theta = np.arange(COMPARED) / COMPARED
-    exact = orbit(theta * orbit.period)
-    return bool(np.abs(path(theta) - exact).max() < NEAR_WAVEFORM * np.ptp(exact))
+    exact, states = orbit.cycle(COMPARED), path(np.arange(COMPARED) / COMPARED)
+    return bool(np.abs(states - exact).max() < NEAR_WAVEFORM * np.ptp(exact))
 
 
 def _below_threshold(network: Network, gait: str) -> str:

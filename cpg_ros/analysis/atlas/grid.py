@@ -213,8 +213,7 @@ def _proper(orbit: Orbit) -> Iterator[Orbit]:
 
 def _wave(orbit: Orbit) -> list[list[float]]:
     """Return the states at an odd number of even times of a cycle."""
-    theta = np.arange(KEPT) / KEPT
-    return np.round(orbit(theta * orbit.period), 5).tolist()
+    return np.round(orbit.cycle(KEPT), 5).tolist()
 
 
 def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period: float) -> Orbit:

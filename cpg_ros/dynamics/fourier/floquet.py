@@ -27,6 +27,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.characteristic import chebyshev
 from cpg_ros.dynamics.fourier import orbit as collocation
 from cpg_ros.dynamics.fourier.orbit import equations, FourierOrbit, MOST_NODES
 from cpg_ros.dynamics.isotypic import split
@@ -79,20 +80,7 @@ DEGREE, SPAN = 20, 0.4
 FEW = 90
 
 
-def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return Chebyshev points of [0, 1], the derivative matrix there, and barycentric weights."""
-    k = np.arange(degree + 1)
-    points = 0.5 * (1.0 - np.cos(np.pi * k / degree))
-    weights = (-1.0) ** k
-    weights[[0, -1]] *= 0.5
-    gaps = points[:, None] - points + np.eye(degree + 1)
-    matrix = weights / weights[:, None] / gaps
-    np.fill_diagonal(matrix, 0.0)
-    np.fill_diagonal(matrix, -matrix.sum(axis=1))
-    return points, matrix, weights
-
-
-POINTS, DERIVATIVE, _WEIGHTS = _differentiation(DEGREE)
+POINTS, DERIVATIVE, _WEIGHTS = chebyshev(DEGREE)
 
 
 def _interpolation(points: np.ndarray) -> np.ndarray:
