@@ -24,13 +24,13 @@ from fractions import Fraction
 from functools import cache
 from itertools import permutations
 
+from cpg_ros.analysis.papers.buono_hopf import AUTHORS, PRINTED
 from cpg_ros.analysis.papers.row import (
     cell_constants,
     Citation,
     disturbed_start,
     Picture,
     primary_gaits,
-    printed_values,
     ReproducedRow,
     Rhythm,
     rhythm,
@@ -42,9 +42,9 @@ from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.symmetry import admissible_pairs, compose, GAITS, label, Permutation, Z4_Z2
 import numpy as np
+from sympy.combinatorics import PermutationGroup
+from sympy.combinatorics import permutations as sympy_permutations
 
-AUTHORS = 'Buono & Golubitsky 2001'
-PRINTED = printed_values('buono_golubitsky')
 #: Periods in which a disturbed gait settles: for some gaits, and for the others.
 SETTLING = {'jump': 150.0}
 USUALLY = 60.0
@@ -198,16 +198,8 @@ def inverse(element: Permutation) -> Permutation:
 
 def generated(*generators: Permutation) -> Subgroup:
     """Return the subgroup that permutations generate."""
-    elements = {tuple(range(len(generators[0])))}
-    waiting = list(elements)
-    while waiting:
-        element = waiting.pop()
-        for generator in generators:
-            image = compose(generator, element)
-            if image not in elements:
-                elements.add(image)
-                waiting.append(image)
-    return frozenset(elements)
+    group = PermutationGroup(*(sympy_permutations.Permutation(list(g)) for g in generators))
+    return frozenset(tuple(element.array_form) for element in group.elements)
 
 
 def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
@@ -300,14 +292,8 @@ def four_cells() -> Iterator[ReproducedRow | Picture]:
 
 def _written(element: Permutation) -> str:
     """Return a permutation in cycles from 1, without fixed cells."""
-    left, text = [i for i in range(len(element)) if element[i] != i], ''
-    while left:
-        cycle = [left[0]]
-        while element[cycle[-1]] != cycle[0]:
-            cycle.append(element[cycle[-1]])
-        text += f'({" ".join(str(i + 1) for i in cycle)})'
-        left = [i for i in left if i not in cycle]
-    return text
+    cycles = sympy_permutations.Permutation(list(element)).cyclic_form
+    return ''.join(f'({" ".join(str(i + 1) for i in cycle)})' for cycle in cycles)
 
 
 @cache

@@ -22,8 +22,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
-from cpg_ros.analysis.papers.buono_gaits import AUTHORS, PRINTED
-from cpg_ros.analysis.papers.row import Citation, Picture, ReproducedRow, Value, value_of
+from cpg_ros.analysis.papers.row import (
+    Citation,
+    Picture,
+    printed_values,
+    ReproducedRow,
+    Value,
+    value_of,
+)
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.hopf import hopf_at, hopf_points, HopfPoint
 from cpg_ros.dynamics.isotypic import Block, blocks
@@ -32,6 +38,9 @@ from cpg_ros.networks.network import known, Network, ParameterLine
 from cpg_ros.networks.symmetry import GAITS
 import numpy as np
 from scipy.optimize import brentq
+
+AUTHORS = 'Buono & Golubitsky 2001'
+PRINTED = printed_values('buono_golubitsky')
 
 
 def square_root(phi: float, psi: float) -> complex:
@@ -43,7 +52,7 @@ def square_root(phi: float, psi: float) -> complex:
 #: X of Propositions 5.2 and 5.7.
 ROOT = 'sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)'
 UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
-#: NEAR_STAND: v and w at the stand of section 6, approximately.
+#: v and w at the stand of section 6, approximately.
 NEAR_STAND = np.array([0.31, 0.52])
 
 

@@ -47,7 +47,7 @@ import yaml
 
 # Buono & Golubitsky (2001), Models of central pattern generators for quadruped locomotion I.
 
-PAPER = Paper('buono_golubitsky', buono_gaits.AUTHORS,
+PAPER = Paper('buono_golubitsky', buono_hopf.AUTHORS,
               'P.-L. Buono, M. Golubitsky: Models of central pattern generators for quadruped '
               'locomotion. I. Primary gaits (2001)',
               (buono_gaits.constants, partial(buono_gaits.gaits, 'pronk', 'pace', 'bound', 'jump'),
