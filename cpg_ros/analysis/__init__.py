@@ -18,4 +18,4 @@ Imports ``fitting`` and the rooms below it; knows nothing of ROS.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'atlas', 'basin', 'branch_report',
-           'gait_diagram', 'nsga2', 'objectives', 'optimize', 'papers', 'phase_report']
+           'gait_diagram', 'nsga2', 'objectives', 'optimize', 'papers']

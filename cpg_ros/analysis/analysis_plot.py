@@ -20,9 +20,8 @@ from itertools import chain, count, pairwise
 from typing import Literal
 
 from cpg_ros.analysis import gait_diagram as footfall
-from cpg_ros.analysis.analysis_report import Analysis
+from cpg_ros.analysis.analysis_report import Analysis, cells, curves, PhaseReport
 from cpg_ros.analysis.branch_report import JudgedBranch, on_line
-from cpg_ros.analysis.phase_report import cells, curves, PhaseReport
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.report_page import rendered
 from cpg_ros.dynamics.continuation import Branch

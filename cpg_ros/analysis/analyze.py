@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 import sys
 
-from cpg_ros.analysis.analysis_report import Analysis
+from cpg_ros.analysis.analysis_report import Analysis, PhaseReport
 from cpg_ros.common.command_line import as_json, interval, number, Parser, progress_bar, run, say
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import write_atomically
@@ -133,7 +133,6 @@ def _analyze(args: Namespace) -> int:
         answer['stability_losses'] = [loss.as_dict() for loss in losses]
         text += ['', *(loss.text(str(analysis.along)) for loss in losses)] if losses else []
     if args.prc is not None:
-        from cpg_ros.analysis.phase_report import PhaseReport
         response = PhaseReport.of(analysis)
         if curves is not None:
             from cpg_ros.analysis import analysis_plot

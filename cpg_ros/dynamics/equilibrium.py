@@ -153,7 +153,7 @@ def _scanned(network: type[Network]) -> int | None:
     equations = equations_of(network)
     with np.errstate(all='ignore'):
         # Only the pattern of the derivatives matters.
-        second = equations.second([np.array(0.0)] * len(equations.arguments),
+        second = equations.higher(2, [np.array(0.0)] * len(equations.arguments),
                                   [np.array(1.0)] * len(equations.rows))
     pairs = [{equations.arguments[k].variable for k in indices} for _, *indices in second]
     return next((x for x in range(network.variables) if all(x in pair for pair in pairs)), None)

@@ -185,11 +185,11 @@ class HopfPoint(ShortRepr):
         still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
         double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
         ahead = expansion.inputs(q, chi, axis)
-        back, second = ahead.conj(), expansion.second
-        flat = expansion.inputs(_moved(still, second(ahead, back)), unit)
-        fast = expansion.inputs(_moved(double, second(ahead, ahead)), twice, 2.0 * axis)
-        k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
-                         + second(back, fast)))
+        back, form = ahead.conj(), expansion.multilinear
+        flat = expansion.inputs(_moved(still, form(ahead, back)), unit)
+        fast = expansion.inputs(_moved(double, form(ahead, ahead)), twice, 2.0 * axis)
+        k2 = 0.5 * (p @ (form(ahead, ahead, back) + 2.0 * form(ahead, flat)
+                         + form(back, fast)))
 
         return NormalForm(self._speed(self.line), complex(k2))
 
@@ -205,7 +205,8 @@ class HopfPoint(ShortRepr):
         still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
         moves = expansion.inputs(_moved(still, expansion.along(line)), unit)
         now, past = expansion.linear_along(line, chi)
-        change = (now + past * late) @ q + expansion.second(moves, expansion.inputs(q, chi, axis))
+        change = (now + past * late) @ q + expansion.multilinear(
+            moves, expansion.inputs(q, chi, axis))
         if self.network.delay_parameter in line.names:
             sign = line.signs[line.names.index(self.network.delay_parameter)]
             change = change - sign * axis * late * (self.block.past @ q)

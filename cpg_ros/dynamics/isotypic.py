@@ -84,18 +84,11 @@ class Expansion:
         self._equations = equations_of(type(network))
         self._x = [state[argument.variable] for argument in self._equations.arguments]
         self._p = [value.flat[0] for value in values_of(network)]
+        self._higher: dict[int, Mapping[Any, float]] = {}
 
     @cached_property
     def _slopes(self) -> Mapping[tuple[int, int], float]:
         return self._equations.slopes(self._x, self._p)[1]
-
-    @cached_property
-    def _second(self) -> Mapping[Any, float]:
-        return self._equations.second(self._x, self._p)
-
-    @cached_property
-    def _third(self) -> Mapping[Any, float]:
-        return self._equations.third(self._x, self._p)
 
     def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """L0 and L1 of a class, complex: ``h' = L0 h(t) + L1 h(t - tau)``, (variables, variables).
@@ -131,17 +124,12 @@ class Expansion:
                          * (past if argument.delayed else 1.0)
                          for argument in self._equations.arguments])
 
-    def second(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Second derivative of the rates, B(a, b), at two sets of arguments, (variables,)."""
-        return self._multilinear(self._second, a, b)
-
-    def third(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
-        """Third derivative of the rates, C(a, b, c), shape (variables,)."""
-        return self._multilinear(self._third, a, b, c)
-
-    def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray) -> np.ndarray:
-        out = np.zeros(self.network.variables, dtype=complex)
-        for v, rate in multilinear(derivatives, list(sets)).items():
+    def multilinear(self, *sets: np.ndarray) -> np.ndarray:
+        """Derivative of the rates, B(a, b) or C(a, b, c), at sets of arguments, (variables,)."""
+        order, out = len(sets), np.zeros(self.network.variables, dtype=complex)
+        if order not in self._higher:
+            self._higher[order] = self._equations.higher(order, self._x, self._p)
+        for v, rate in multilinear(self._higher[order], sets).items():
             out[v] = rate
         return out
 

@@ -129,13 +129,9 @@ class Linearised:
         solution = self._systems[factor][0].solve(self.equation.right(rates, factor))
         return self.equation.values(solution, rates, factor)
 
-    def second(self, a: States, b: States) -> np.ndarray:
-        """Return the rates' second derivative B(a, b) along the orbit."""
-        return self._field.multilinear(self.equation.at, a, b)
-
-    def third(self, a: States, b: States, c: States) -> np.ndarray:
-        """Return the rates' third derivative C(a, b, c) along the orbit."""
-        return self._field.multilinear(self.equation.at, a, b, c)
+    def form(self, *sets: States) -> np.ndarray:
+        """Return the rates' second or third derivative, B(a, b) or C(a, b, c), on the orbit."""
+        return self._field.multilinear(self.equation.at, *sets)
 
     def moved(self, y: States) -> np.ndarray:
         """Return ``E y = y + tau B y(t - tau)``."""
@@ -261,21 +257,21 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
         return complex(linear.fractions(factor, rates)[0] / scale)
 
     other = _conj(v) if pair else v
-    first = linear.second(v, other)
+    first = linear.form(v, other)
     if alike and abs(fraction(first)) > NOTHING * np.abs(first).max():
         raise NoOrbit('a branch crosses this one (transcritical)')
     a = complex(np.linalg.solve(weights, linear.fractions(1.0, first))[0])
     mixed = linear.solve(first - a * linear.moved(along), 1.0)
-    cubic = linear.third(v, v, other)
+    cubic = linear.form(v, v, other)
     if pair:
-        double = linear.solve(linear.second(v, v), factor**2)
-        terms = [linear.second(v, mixed), 0.5 * linear.second(other, double), 0.5 * cubic]
+        double = linear.solve(linear.form(v, v), factor**2)
+        terms = [linear.form(v, mixed), 0.5 * linear.form(other, double), 0.5 * cubic]
     else:
         # The term of second order is that of z^2 / 2, and a that of z^2.
         a *= 0.5
-        terms = [0.5 * linear.second(v, mixed), cubic / 6.0]
+        terms = [0.5 * linear.form(v, mixed), cubic / 6.0]
     slope = equation.derivative(v, factor)
-    terms += [-a * linear.moved(slope), -a * linear.second(v, linear.late(along))]
+    terms += [-a * linear.moved(slope), -a * linear.form(v, linear.late(along))]
     components = [fraction(term) for term in terms]
     if abs(sum(components).real) <= NOTHING * max(map(abs, components)):
         raise NoOrbit('its cubic term is 0')

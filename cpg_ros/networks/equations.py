@@ -176,20 +176,19 @@ class Equations:
         """Return (variable, row, argument) -> mixed second derivative, those not 0."""
         return dict(zip(self._higher.MIXED, self._higher.mixed(*x, *p), strict=True))
 
-    def second(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int, int], Any]:
-        """Return (variable, argument, argument) -> second derivative, arguments rising."""
-        return dict(zip(self._higher.SECOND, self._higher.second(*x, *p), strict=True))
-
-    def third(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int, int, int], Any]:
-        """Return (variable, three arguments) -> third derivative, arguments rising."""
-        return dict(zip(self._higher.THIRD, self._higher.third(*x, *p), strict=True))
+    def higher(self, order: int, x: Sequence[Any], p: Sequence[Any]
+               ) -> dict[tuple[int, ...], Any]:
+        """Return (variable, arguments) -> derivative of order 2 or 3, arguments rising."""
+        indices, derive = ((self._higher.SECOND, self._higher.second) if order == 2 else
+                           (self._higher.THIRD, self._higher.third))
+        return dict(zip(indices, derive(*x, *p), strict=True))
 
 
 def multilinear(derivatives: Mapping[Any, Any], sets: Sequence[Any]) -> dict[int, Any]:
     """Return variable -> second or third derivative of its rate at two or three disturbances.
 
     Args:
-        derivatives: as ``second`` and ``third`` return them.
+        derivatives: as ``Equations.higher`` returns them.
         sets: disturbances of the arguments.
 
     """
@@ -311,10 +310,10 @@ class Field(Generic[AnyDefinition]):
             sets: two or three disturbances of them, which may be complex.
 
         """
-        find = self._equations.second if len(sets) == 2 else self._equations.third
         out = np.zeros(sets[0][0].shape, dtype=complex)
-        for v, rate in multilinear(find(self._arguments(*at), self._p),
-                                   [self._arguments(*states) for states in sets]).items():
+        derivatives = self._equations.higher(len(sets), self._arguments(*at), self._p)
+        for v, rate in multilinear(derivatives, [self._arguments(*states)
+                                                 for states in sets]).items():
             out[..., v * self.size:(v + 1) * self.size] = rate
         return out
 

@@ -67,7 +67,7 @@ def taylor_terms() -> Iterator[ReproducedRow | Picture]:
         inputs = np.array([(past if argument.delayed else now)[
             cell if argument.source is None else argument.source[cell]]
             for argument in equations_of(Delayed).arguments])
-        return tau * float(expansion.third(inputs, inputs, inputs)[0].real)
+        return tau * float(expansion.multilinear(inputs, inputs, inputs)[0].real)
 
     for cell, behind in enumerate(BEHIND):
         value, wrong = cubes(cell, behind), cell == 2

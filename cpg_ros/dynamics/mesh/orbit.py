@@ -323,7 +323,7 @@ class MeshOrbit(Orbit):
         return positions.ravel() * self.solution.length
 
 
-def _columns(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
+def columns_of(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
     """Return the columns of the reduced state that hold u_wave, in each m-th of the cycle."""
     columns, cell = [], int(symmetry.first[wave])
     for _ in range(symmetry.order):
@@ -356,7 +356,7 @@ def evaluate(symmetry: Symmetry, mesh: np.ndarray, coefficients: np.ndarray, the
     interval = np.clip(np.searchsorted(mesh, positions, side='right') - 1, 0, mesh.size - 2)
     length = np.diff(mesh)[interval]
     xi = (positions - mesh[interval]) / length
-    column = np.array(_columns(symmetry, wave, variable))[part]
+    column = np.array(columns_of(symmetry, wave, variable))[part]
     terms = coefficients
     for _ in range(order):
         terms = terms[1:] * np.arange(1, terms.shape[0]).reshape(-1, *[1] * (terms.ndim - 1))

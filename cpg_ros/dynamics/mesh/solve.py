@@ -33,6 +33,7 @@ from cpg_ros.dynamics.mesh.collocation import aligned, sign_changes
 from cpg_ros.dynamics.mesh.orbit import (
     bordered,
     coefficients_of,
+    columns_of,
     FEW,
     FEWEST,
     finer,
@@ -217,17 +218,10 @@ class MeshCurve(ShortRepr):
             answers.append(np.concatenate([moved.ravel(), inner.ravel(), solution[d:]]))
         return answers[0], answers[1]
 
-    def _columns(self, reduced: Reduced) -> list[int]:
-        """Return the columns of cell 1's first variable, in each m-th of the cycle."""
-        columns = [0]
-        for _ in range(self.symmetry.order - 1):
-            columns.append(int(reduced.turn[columns[-1]]))
-        return columns
-
     def amplitude(self, z: np.ndarray) -> float:
         """Return half the range of cell 1's first variable at the mesh points."""
-        reduced, now = self._solution(z)
-        return float(0.5 * np.ptp(now.points[:, self._columns(reduced)]))
+        now = self._solution(z)[1]
+        return float(0.5 * np.ptp(now.points[:, columns_of(self.symmetry, 0, 0)]))
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['MeshCurve', np.ndarray, np.ndarray] | None:
@@ -235,7 +229,7 @@ class MeshCurve(ShortRepr):
         reduced, now = self._solution(z)
         mesh = remeshed(reduced, now, finer(now.mesh) if again else FEWEST)
         path = path_of(reduced, now)
-        start = self._highest(reduced, now, path)
+        start = self._highest(now, path)
         if mesh is None and not start:
             return None
         mesh = now.mesh if mesh is None else mesh
@@ -249,9 +243,9 @@ class MeshCurve(ShortRepr):
                  for states, ends in ((path, z[-2:]), (slanted, border[-2:]))]
         return curve, moved[0], moved[1]
 
-    def _highest(self, reduced: Reduced, now: Solution, path: Callable) -> float:
+    def _highest(self, now: Solution, path: Callable) -> float:
         """Return the time of cell 1's peak, in m-ths of the cycle, or 0 if it is at the start."""
-        columns = self._columns(reduced)
+        columns = columns_of(self.symmetry, 0, 0)
         peaks = now.points[:, columns]
         node, index = divmod(int(peaks.argmax()), len(columns))
         if peaks.max() <= now.points[0, 0] + 1e-9 * np.ptp(peaks):
