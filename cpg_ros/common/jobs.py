@@ -181,11 +181,19 @@ class ResilientExecutor(Executor):
     def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
             chunksize: int = 1) -> Iterator[Any]:
         """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
-        jobs = list(zip(*iterables, strict=False))
+        jobs = [(number, function, job)
+                for number, job in enumerate(zip(*iterables, strict=False))]
+        waiting: dict[int, Any] = {}
+        following = 0
         with JobProgress(self.what, len(jobs), bool(self.what)) as tally:
-            for result in in_order(self, function, jobs, tally.tick):
-                tally.add()
-                yield result
+            for outcome in outcomes(self, _applied, jobs, tally.tick):
+                if outcome.error is not None:
+                    raise outcome.error
+                waiting[outcome.job[0]] = outcome.value
+                while following in waiting:
+                    tally.add()
+                    yield waiting.pop(following)
+                    following += 1
 
     def lost(self, error: BaseException) -> bool:
         """Return whether an error means that the executor broke, not that the job failed."""
@@ -304,26 +312,6 @@ def outcomes(executor: Executor, function: Callable[[Job], Any], jobs: Iterable[
     finally:
         for future in stream.flying:
             future.cancel()
-
-
-def in_order(executor: Executor, function: Callable[..., Any], jobs: Iterable[tuple[Any, ...]],
-             tick: Callable[[], None] = lambda: None) -> Iterator[Any]:
-    """Yield the results of jobs, given by their arguments, in the order of the jobs.
-
-    Raises:
-        Exception: the first that a job raised.
-
-    """
-    waiting: dict[int, Any] = {}
-    following = 0
-    numbered = ((number, function, job) for number, job in enumerate(jobs))
-    for outcome in outcomes(executor, _applied, numbered, tick):
-        if outcome.error is not None:
-            raise outcome.error
-        waiting[outcome.job[0]] = outcome.value
-        while following in waiting:
-            yield waiting.pop(following)
-            following += 1
 
 
 def _applied(job: tuple[int, Callable[..., Any], tuple[Any, ...]]) -> Any:

@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator
 from functools import cache
+from typing import cast
 
 from cpg_ros.analysis.papers.row import (
     cell_constants,
@@ -73,9 +74,12 @@ def printed(gait: str) -> Biped:
 
 def settled(gait: str) -> Rhythm:
     """Return a gait: primary ones by Table 2, the others by the shipped presets."""
-    network = printed(gait) if gait in PRIMARY else Biped.presets()[gait].network
-    assert isinstance(network, Biped)
-    return simulated(network, disturbed(gait))
+    return simulated(printed(gait), disturbed(gait)) if gait in PRIMARY else after(gait, gait)
+
+
+def after(before: str, gait: str) -> Rhythm:
+    """Return what the weights of a shipped preset make of a gait."""
+    return simulated(cast(Biped, Biped.presets()[gait].network), disturbed(before))
 
 
 def signals(seen: Rhythm) -> list[str]:
@@ -208,9 +212,7 @@ def secondary() -> Iterator[ReproducedRow | Picture]:
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {roots.leading:.3g} a cycle')
     for number, (before, gait) in PRINTED['transitions'].items():
-        network = Biped.presets()[gait].network
-        assert isinstance(network, Biped)
-        seen = simulated(network, disturbed(before))
+        seen = after(before, gait)
         yield Citation(AUTHORS, f'Figure {number}').word(
             f'gait that follows the {named(before)} with other weights', named(gait),
             named(seen.gait), note='weights are ours: none are printed')
@@ -228,9 +230,7 @@ def predicted() -> Iterator[ReproducedRow | Picture]:
                        bool(kept) and all(whole[name] == shift for name, shift in kept.items()),
                        note=', '.join(f'{name} by {shift}' for name, shift in kept.items()))
     for before, gait in PRINTED['predicted']:
-        network = Biped.presets()[gait].network
-        assert isinstance(network, Biped)
-        seen = simulated(network, disturbed(before))
+        seen = after(before, gait)
         note = 'weights are ours: none are printed'
         yield at.word(f'gait that follows the {named(before)}, as predicted', named(gait),
                       named(seen.gait), note=note)

@@ -22,11 +22,11 @@ from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from html import escape
-from itertools import starmap
 import json
 import os
 from pathlib import Path
 import sys
+from typing import Any
 
 from cpg_ros.analysis.papers import (
     buono_gaits,
@@ -40,7 +40,6 @@ from cpg_ros.common import command_line
 from cpg_ros.common.command_line import Parser, progress_bar, run, say
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.common.jobs import in_order
 from cpg_ros.common.report_page import html_table, image, page, rendered
 from cpg_ros.common.workers import closing, processes
 import yaml
@@ -149,9 +148,8 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
     tasks = [(paper, number, draw) for paper in papers for number in range(len(paper.sections))]
     parts: list[tuple[list[ReproducedRow], list[Picture]]] = []
     with (nullcontext() if jobs == 1 else closing(processes(min(jobs, len(tasks))))) as fleet:
-        results = (starmap(_section, tasks) if fleet is None
-                   else in_order(fleet, _section, tasks))
-        for part in results:
+        run_all: Callable[..., Any] = map if fleet is None else fleet.map
+        for part in run_all(_section, *zip(*tasks, strict=True)):
             parts.append(part)
             progress(len(parts))
     return Reproduction(papers, tuple(row for rows, _ in parts for row in rows),
