@@ -38,6 +38,7 @@ from cpg_ros.motion.robot_file import read_robot
 from feedback_figures import subject
 
 sys.path.append(str(Path(__file__).with_name('leaderboard')))
+from motors import limit_motors  # noqa: E402
 from policies import entries, LearnedPolicy, Missing  # noqa: E402
 from rules import draws, ROWS  # noqa: E402
 
@@ -69,7 +70,7 @@ def make(entrant: str, go1: Path | None, plain: bool, motors: bool
         velocity = 'true' if 'velocity' in entry['observes'] else 'not observed'
     body = bodies.body
     if motors:
-        bodies.no_load = body.robot.column('velocity')[body.robot.places]
+        limit_motors(bodies, body.robot.column('velocity')[body.robot.places])
     if plain:
         joints = slice(6, None)
         body.model.dof_frictionloss[joints] = 0.0

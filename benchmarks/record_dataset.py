@@ -107,16 +107,19 @@ def walks(plan: GaitPlan, model: str, seconds: float, seed: Sequence[int]
     met = _scenarios(np.random.default_rng(seed), seconds, plan.own_speed)
     loop = ClosedLoopBatch(model, plan)
     gains = None if plan.motion.efference is None else robot_gains(plan.robot)
+    measured: list[list[np.ndarray]] = []
     ran = loop.run(list(met.values()), seconds, gains, noise=SensorNoise(**NOISE, seed=seed[0]),
-                   keep_senses=True)
-    assert ran.senses is not None and ran.efforts is not None
+                   observe=lambda senses, efforts: measured.append(
+                       [np.copy(values) for values in (*senses, efforts)]))
     found = []
     for row, (ground, scenario) in enumerate(met.items()):
-        steps = ran.senses.foot_forces.shape[1]
+        steps = len(measured)
         if np.isfinite(ran.fell[row]):
             steps = round(float(ran.fell[row]) / loop.timestep)
-        senses = SensorData(*(np.ascontiguousarray(one[row, :steps]) for one in ran.senses))
-        found.append(LabelledWalk(ground, senses, ran.efforts[row, :steps], loop.timestep, _truth(
+        *values, efforts = (np.array([tick[k][row] for tick in measured[:steps]])
+                            for k in range(len(measured[0])))
+        senses = SensorData(*values)
+        found.append(LabelledWalk(ground, senses, efforts, loop.timestep, _truth(
             plan, scenario, float(ran.fell[row]),
             senses.foot_forces[steps // 3:] > LOADED * loop.geometry.weight)
             | {'servo': dict(zip(('kp', 'kd'), loop.body.gains, strict=True))}))

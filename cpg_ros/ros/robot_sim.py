@@ -18,7 +18,6 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 import signal
-import sys
 import time
 
 from cpg_ros.motion.robot import Robot
@@ -32,12 +31,11 @@ from cpg_ros.ros.node.node_base import run, StartedNode, StartError, termination
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 from cpg_ros.ros.node.polled import latched
 from cpg_ros.ros.node.ticker import Ticker, TickThread
-from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.body import Approach, Body
 from cpg_ros.simulation.recorder import RunLog, summary, without_opengl
 from cpg_ros.simulation.robot_model import legs, SimulationError
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.sensors import SimulatedSensors
-from cpg_ros.simulation.soft_start import Approach
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 from cpg_ros.simulation.terrain import KINDS as GROUNDS
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -273,8 +271,8 @@ SPECS = fixed({
     'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
     'joint_delay': Spec(0.0, 'the same of joint_states, foot_contacts and odom [s]', 0.0, 1.0),
-    'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a share of the '
-                        'force', 0.0, 1.0),
+    'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a fraction of '
+                        'the force', 0.0, 1.0),
     'noise_seed': Spec(0, 'seed of all noise', 0, 2**31 - 1),
     'base_frame': Spec('base', "frame of the robot's base in odom, imu and /tf; by default the "
                        "root of the shipped URDFs and of Unitree's"),
@@ -314,7 +312,7 @@ class RobotSim(StartedNode):
         if film is not None and (missing := without_opengl()):
             self.get_logger().warning(f'no film this time: {missing}')
             film = None
-        self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
+        self._run_log = RunLog(self._body, self._rate, film, footfalls, terrain)
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
         self._held = HeldSubscription(self, robot) if robot.held else None
@@ -348,7 +346,7 @@ class RobotSim(StartedNode):
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_subscription(String, 'cpg_generator/gait',
-                                 lambda message: self._diary.gait(message.data), latched(10))
+                                 lambda message: self._run_log.gait(message.data), latched(10))
         self._before = time.monotonic(), 0, 0
         self._diagnostics = HealthPublisher(self, 'simulation', robot.name, self._health)
         self._warn_of_unknown()
@@ -431,7 +429,7 @@ class RobotSim(StartedNode):
             self._begin_again()
         self._time = body.time
         self._measurements.publish(stamp)
-        self._diary.look(self._now / self._rate)
+        self._run_log.update(self._now / self._rate)
         if body.fallen:
             if not self._fallen:
                 self.get_logger().error(f'the robot has fallen: {self._summary()}; ~/reset '
@@ -492,7 +490,7 @@ class RobotSim(StartedNode):
         for number in termination_signals():
             signal.signal(number, lambda number, _: repeated.append(number))
         try:
-            for path in self._diary.write(self._value('model'), lambda: bool(repeated)):
+            for path in self._run_log.write(self._value('model'), lambda: bool(repeated)):
                 self.get_logger().info(f'written: {path}')
         except (SimulationError, OSError) as error:
             self.get_logger().error(str(error))
@@ -502,7 +500,3 @@ class RobotSim(StartedNode):
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it, or its duration is over; return the exit code."""
     return run(RobotSim, NAME, 'Simulates a robot that a generator moves.', SPECS, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

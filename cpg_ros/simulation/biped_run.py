@@ -31,7 +31,7 @@ from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 import numpy as np
 
-#: LOW: height of the centre of mass, as a share of the wanted one, below which the robot has
+#: LOW: height of the centre of mass, as a fraction of the commanded one, below which the robot has
 #: fallen.
 LOW = 0.6
 #: SETTLING: time after the first step from which on a run is measured, s.
@@ -47,11 +47,11 @@ class BipedOutcome(ShortRepr):
         speed: mean velocity forward and left, heading's axes, m/s, after SETTLING.
         tilt: largest angle of the base to the vertical, rad.
         steps: touchdowns by the clock.
-        flight: share of the time after SETTLING in which no foot touches the ground.
+        flight: fraction of the time after SETTLING in which no foot touches the ground.
         cost: of transport: mechanical work of the motors, those of the arms too and none
             regained, per weight and metre.
         path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
-        poses: all of ``qpos`` at these times, shape (n, ...), as ``camera.shoot`` takes it.
+        poses: all of ``qpos`` at these times, shape (n, ...), as ``recorder.shoot`` takes it.
 
     """
 

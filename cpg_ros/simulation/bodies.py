@@ -33,9 +33,6 @@ from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import lay, set_friction, Terrain
 import numpy as np
 
-#: SLOW: share of a motor's no-load speed up to which it has its full torque.
-SLOW = 1e-3
-
 
 class BatchPhysics:
     """Any number of bodies, all of which begin in the stand.
@@ -45,9 +42,6 @@ class BatchPhysics:
         parts: where its parts are in the model.
         timestep: s.
         start: state in the stand, as of mjSTATE_FULLPHYSICS, shape (states,).
-        no_load: speeds at which motors have no torque left, rad/s, in the order of controllers,
-            shape (joints,): what they can have that drives a joint on falls in a line from the
-            model's limit at standstill. None for that limit at any speed.
 
     """
 
@@ -60,7 +54,6 @@ class BatchPhysics:
                               else os.cpu_count() or 1)
         self._data = [mujoco.MjData(body.model) for _ in range(threads)]
         self._pool = rollout.Rollout(nthread=threads)
-        self.no_load: np.ndarray | None = None
         self._models: dict[tuple[float, float, float, Terrain | None, float], Any] = {}
         self._spec = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED)
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -85,36 +78,8 @@ class BatchPhysics:
     def rollout(self, models: Sequence[Any], state: np.ndarray, control: np.ndarray,
                 warmstart: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Take steps from states, (runs, states); return states and sensors after each."""
-        if self.no_load is None:
-            return self._pool.rollout(models, self._data, state, control, control_spec=self._spec,
-                                      initial_warmstart=warmstart)
-        nq, nv = self.body.model.nq, self.body.model.nv
-        moving, results = slice(1 + nq, 1 + nq + nv), []
-        for k in range(control.shape[1]):
-            step = control[:, k:k + 1].copy()
-            joints = step[:, 0, :len(self.no_load)]
-            joints[:] = self._within_curve(models, joints, state[:, 1 + self.parts.angles],
-                                           state[:, moving][:, self.parts.speeds], self.no_load)
-            results.append(self._pool.rollout(models, self._data, state, step,
-                                            control_spec=self._spec, initial_warmstart=warmstart))
-            before, state = state, results[-1][0][:, 0]
-            warmstart = (state[:, moving] - before[:, moving]) / self.timestep
-        states, sensors = zip(*results, strict=True)
-        return np.concatenate(states, axis=1), np.concatenate(sensors, axis=1)
-
-    def _within_curve(self, models: Sequence[Any], target: np.ndarray, angles: np.ndarray,
-                      speeds: np.ndarray, no_load: np.ndarray) -> np.ndarray:
-        """Return the targets, rad, (runs, joints), that ask motors for no more than they have."""
-        count = target.shape[1]
-        kp = np.array([model.actuator_gainprm[:count, 0] for model in models])
-        kd = -self.body.model.actuator_biasprm[:count, 2]
-        most = self.body.model.actuator_forcerange[:count, 1]
-        left = most * np.clip(1.0 - np.abs(speeds) / no_load, 0.0, 1.0)
-        torque = kp * (target - angles) - kd * speeds
-        # Voltage limits torques that drive the motion; at standstill the model's limit holds.
-        short = ((torque * speeds > 0.0) & (np.abs(torque) > left)
-                 & (np.abs(speeds) > SLOW * no_load))
-        return np.where(short, angles + (np.sign(torque) * left + kd * speeds) / kp, target)
+        return self._pool.rollout(models, self._data, state, control, control_spec=self._spec,
+                                  initial_warmstart=warmstart)
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
         """Return the model of a body that meets a scenario, its servos' kp scaled."""
@@ -160,11 +125,11 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
 
     """
     robot = plan.robot
-    drive, stride = None, np.ones(len(robot.legs))
+    command, stride = None, np.ones(len(robot.legs))
     if len(strides) or pace != 1.0:
-        drive, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
-        drive.set_target(stride, pace, at_once=True)
-    pattern = Pattern(plan, ramp, drive=drive)
+        command, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
+        command.set_target(stride, pace, at_once=True)
+    pattern = Pattern(plan, ramp, drive=command)
     table = np.empty((round(duration / timestep), len(robot.order)))
     for row in table:
         pattern.advance(timestep)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot's body in MuJoCo: wanted angles in, its motion and measurements out."""
+"""A robot's body in MuJoCo: target angles in, its motion and measurements out."""
 
 from collections.abc import Callable
 import math
@@ -20,6 +20,7 @@ from typing import Any
 
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.rotations import rpy_of
+from cpg_ros.motion.strides import smoothstep
 from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
 import numpy as np
 
@@ -82,7 +83,7 @@ class Body:
         self._trunk = self.data.sensordata[3 * count:]
         self._feet = np.zeros(count)
         self._position, self._velocity, self._torque = np.zeros((3, n))
-        self._turn, self._twist = np.zeros(9), np.zeros(6)
+        self._rotation, self._twist = np.zeros(9), np.zeros(6)
         self._height: float | None = None
         self.reset()
 
@@ -244,8 +245,8 @@ class Body:
     @property
     def axes(self) -> np.ndarray:
         """Rotation from the base's frame to the world's, shape (3, 3)."""
-        engine().mju_quat2Mat(self._turn, self.quaternion)
-        return self._turn.reshape(3, 3)
+        engine().mju_quat2Mat(self._rotation, self.quaternion)
+        return self._rotation.reshape(3, 3)
 
 
 # Indices of a robot's parts in its model: base, joints and feet.
@@ -291,14 +292,14 @@ class Anatomy:
             if model.geom_type[foot] == mujoco.mjtGeom.mjGEOM_SPHERE:
                 ends[3:] = data.geom_xpos[foot]
             body_id = model.geom_bodyid[foot]
-            turn = data.xmat[body_id].reshape(3, 3)
-            soles.append((ends[3:] - data.xpos[body_id]) @ turn)
+            rotation = data.xmat[body_id].reshape(3, 3)
+            soles.append((ends[3:] - data.xpos[body_id]) @ rotation)
         self.bodies, self.soles = model.geom_bodyid[self.feet], np.array(soles)
 
-    def places(self, data: Any) -> np.ndarray:
-        """Return the places of the soles in a ``mujoco.MjData``, m, shape (legs, 3)."""
-        turn = data.xmat[self.bodies].reshape(-1, 3, 3)
-        return data.xpos[self.bodies] + (turn @ self.soles[:, :, None])[:, :, 0]
+    def sole_positions(self, data: Any) -> np.ndarray:
+        """Return the positions of the soles in a ``mujoco.MjData``, m, shape (legs, 3)."""
+        rotations = data.xmat[self.bodies].reshape(-1, 3, 3)
+        return data.xpos[self.bodies] + (rotations @ self.soles[:, :, None])[:, :, 0]
 
 
 def _ancestors(model: object, body: int) -> list[int]:
@@ -306,3 +307,51 @@ def _ancestors(model: object, body: int) -> list[int]:
     while bodies[-1]:
         bodies.append(model.body_parentid[bodies[-1]])  # type: ignore[attr-defined]
     return bodies
+
+
+# Soft start: the path to commanded angles that are far from the joints, or already moving.
+
+#: NEAR: distance up to which commanded angles are followed at once, rad.
+NEAR = 0.05
+
+
+class Approach:
+    """Leads joints from their present angles to commanded ones, each leg in a smooth step.
+
+    So a driver does that is switched on under a running controller: nothing jerks, and a gait
+    that is in full swing grows out of the stand. What begins where a leg is, as with a generator
+    that ramps in from the stand, is followed from the first instant on. A leg may be commanded
+    earlier than another.
+    """
+
+    def __init__(self, steps: int, angles: np.ndarray, legs: np.ndarray) -> None:
+        """Be ready at the angles where the joints are.
+
+        Args:
+            steps: calls of ``towards`` that an approach takes, at least one.
+            angles: rad, shape (joints,).
+            legs: index from 0 of each joint's leg, shape (joints,).
+
+        """
+        self._steps, self._legs = steps, legs
+        self.begin(angles)
+
+    def begin(self, angles: np.ndarray) -> None:
+        """Be at these angles, rad; the next ones that differ are approached."""
+        self._start = np.array(angles, dtype=float)
+        self._done = np.zeros(self._legs.max() + 1, dtype=int)
+        self._there = False
+
+    def towards(self, commanded: np.ndarray) -> np.ndarray:
+        """Return the target angles of this step, rad, shape (joints,)."""
+        if self._there:
+            return commanded
+        way, done, steps = commanded - self._start, self._done, self._steps
+        far = np.zeros(len(done))
+        np.maximum.at(far, self._legs, np.abs(way))
+        done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
+        done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
+        self._there = bool((done == steps).all())
+        fraction = smoothstep(done / steps)
+        return np.where((done == steps)[self._legs], commanded,
+                        self._start + fraction[self._legs] * way)

@@ -18,7 +18,7 @@ All of them take a step of physics together, a ``rollout`` of one step, and one 
 many runs takes their sensor data. A run that has ended takes no more steps.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import math
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
@@ -162,7 +162,8 @@ class ClosedLoopBatch(BatchPhysics):
     def run(self, scenarios: Sequence[Scenario], duration: float, gains: Gains | None = None,
             expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None = None,
             noise: SensorNoise | None = None, goal: float = math.inf,
-            keep_senses: bool = False) -> Outcome:
+            observe: Callable[[SensorData, np.ndarray], None] = lambda senses, efforts: None
+            ) -> Outcome:
         """Simulate bodies that walk off from the stand.
 
         Args:
@@ -173,7 +174,9 @@ class ClosedLoopBatch(BatchPhysics):
                 expected.
             noise: of the sensors.
             goal: way forward at which a run ends, m.
-            keep_senses: whether the outcome has the measurements and the efforts.
+            observe: takes the measurements before each step, arrays (runs, ...) that the next
+                step may overwrite, and the efforts of the servos in it, N m, shape (runs,
+                joints); of a run that has ended they mean nothing.
 
         """
         model, dt, parts = self.body.model, self.timestep, self.parts
@@ -201,16 +204,11 @@ class ClosedLoopBatch(BatchPhysics):
         earlier = state[:, base].copy()
         angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
         senses = SensorData.zeros(runs, legs, len(order))
-        sensor_log = SensorData(*(np.zeros((steps, *item.shape)) for item in senses
-                                )) if keep_senses else None
-        efforts = np.zeros((steps, runs, len(order))) if keep_senses else None
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
         fell, arrived = np.full((2, runs), np.inf)
         going, some, all_models = np.arange(runs), slice(None), models
-        record = {key: np.zeros((steps, runs, size)) for key, size in
-                  (('place', 2), ('rpy', 3), ('velocity', 3), ('estimated', 3),
-                   ('angular_velocity', 3), ('phase', 1), ('kp_scale', 1), ('stiff', 1))}
+        record: dict[str, np.ndarray] = {}
         delay = 0.0 if noise is None else noise.delay
         for k in range(steps):
             pattern.plan()
@@ -220,8 +218,6 @@ class ClosedLoopBatch(BatchPhysics):
             fill_sensor_data(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt,
                              velocity)
             noticed = senses if noisy is None else noisy(senses)
-            for rows, value in zip(sensor_log or (), noticed, strict=sensor_log is not None):
-                rows[k] = value
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
             else:
@@ -231,19 +227,20 @@ class ClosedLoopBatch(BatchPhysics):
             if gains is not None and gains.virtual_stiffness and memory.stiff.any():
                 angles = targets(angles, noticed.joint_positions, memory.stiff, gains, limits)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
-            for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('rpy', senses.rpy),
-                               ('velocity', velocity), ('estimated', estimated),
-                               ('angular_velocity', senses.angular_velocity),
-                               ('phase', pattern.planned.phase[:, None]),
-                               ('kp_scale', memory.kp_scale[:, None]),
-                               ('stiff', memory.stiff[:, None])):
+            signals = {'place': state[:, 1 + parts.pose[:2]], 'rpy': senses.rpy,
+                       'velocity': velocity, 'estimated': estimated,
+                       'angular_velocity': senses.angular_velocity,
+                       'phase': pattern.planned.phase, 'kp_scale': memory.kp_scale,
+                       'stiff': memory.stiff}
+            for key, value in signals.items():
+                if not k:
+                    record[key] = np.zeros((steps, *value.shape))
                 record[key][k] = value
             speeds = senses.joint_velocities[:, places]
             _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
                                  memory.kp_scale)
             work[k] = motor_power(applied, speeds)
-            if efforts is not None:
-                efforts[k] = applied[:, order]
+            observe(noticed, applied[:, order])
             earlier, before = state[:, base].copy(), state[some, moving]
             if stiff:
                 models = [(stiff if memory.kp_scale[run] > 1.0 else all_models)[run]
@@ -268,11 +265,5 @@ class ClosedLoopBatch(BatchPhysics):
         late = slice(min(round(BEGINNING / dt), steps // 2), None)
         cost = cost_of_transport(work[late].sum(axis=0) * dt, self.geometry.weight,
                                  record['velocity'][late, :, 0].sum(axis=0) * dt)
-        rows_of = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
-        for key in ('phase', 'kp_scale', 'stiff'):
-            rows_of[key] = rows_of[key][:, :, 0]
-        return Outcome(fell=fell, arrived=arrived, senses=None if sensor_log is None
-                       else SensorData(
-            *(rows.swapaxes(0, 1) for rows in sensor_log)),
-                       efforts=None if efforts is None else efforts.swapaxes(0, 1),
-                       cost=cost, **rows_of)
+        return Outcome(fell=fell, arrived=arrived, cost=cost,
+                       **{key: rows.swapaxes(0, 1) for key, rows in record.items()})

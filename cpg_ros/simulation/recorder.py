@@ -16,14 +16,15 @@
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, suppress
 import importlib
+from itertools import chain
 import math
 import os
 from pathlib import Path
 import shutil
 import subprocess
-from typing import Any, BinaryIO, Protocol
+from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.motion.rotations import rpy_of
@@ -32,7 +33,7 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
 from cpg_ros.simulation.terrain import add_ground, lay, Terrain
 import numpy as np
-from PIL import GifImagePlugin, Image
+from PIL import Image
 
 # Recording of a run for its film, its footfall diagram and its summary.
 
@@ -50,7 +51,7 @@ class RunLog:
         """Prepare to record for these files; a file that is None is not written.
 
         Args:
-            body: looked at.
+            body: to be recorded.
             rate: of the periods, Hz.
             film: .gif or .mp4.
             footfalls: .png, .svg or .pdf.
@@ -63,8 +64,7 @@ class RunLog:
         self._body, self._film, self._footfalls = body, film, footfalls
         self._terrain = terrain
         self._fps = min(FRAMES, rate)
-        self._frames = _Every(rate, FRAMES)
-        self._samples = _Every(rate, SAMPLE_RATE)
+        self._frame_due = self._sample_due = 0.0
         self._poses: deque[np.ndarray] = deque(maxlen=round(KEPT * FRAMES))
         self._steps: deque[tuple] = deque(maxlen=round(KEPT * SAMPLE_RATE))
         self._gaits: list[tuple[float, str]] = []
@@ -84,12 +84,14 @@ class RunLog:
         if not self._gaits or self._gaits[-1][1] != name:
             self._gaits.append((self._now, name))
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Record the body at a time, s, that grows from call to call."""
         self._now, body = now, self._body
-        if self._film is not None and self._frames.due():
+        if self._film is not None and now >= self._frame_due:
+            self._frame_due += 1.0 / FRAMES
             self._poses.append(body.data.qpos.copy())
-        if self._footfalls is not None and self._samples.due():
+        if self._footfalls is not None and now >= self._sample_due:
+            self._sample_due += 1.0 / SAMPLE_RATE
             self._steps.append((now, body.feet.copy(), body.base[:2].copy()))
 
     def write(self, name: str, enough: Callable[[], bool] = lambda: False) -> list[Path]:
@@ -102,14 +104,14 @@ class RunLog:
         written = []
         if self._footfalls is not None and len(self._steps) > 2:
             from cpg_ros.analysis.gait_diagram import plot_footfalls
-            times, forces, places = (np.array(each) for each in zip(*self._steps, strict=True))
+            times, forces, positions = (np.array(each) for each in zip(*self._steps, strict=True))
             begun = [gait for gait in self._gaits if gait[0] <= times[0]][-1:]
             gaits = [(max(float(times[0]), when), gait) for when, gait in
                      begun + [gait for gait in self._gaits if gait[0] > times[0]]]
             robot = self._body.robot
             measured, shown = legs(robot), footfall_order(robot.legs, robot.sides, robot.girdles)
             plot_footfalls(self._footfalls, shown, times,
-                           forces[:, [measured.index(leg) for leg in shown]], places, gaits)
+                           forces[:, [measured.index(leg) for leg in shown]], positions, gaits)
             written.append(self._footfalls)
         if self._film is not None and self._poses:
             terrain = self._terrain
@@ -119,18 +121,6 @@ class RunLog:
             shoot(self._film, model, self._poses, self._fps, enough=enough)
             written.append(self._film)
         return written
-
-
-class _Every:
-    """Selects from the periods of one rate those that are due at a lower one."""
-
-    def __init__(self, rate: float, target: float) -> None:
-        self._share, self._sum = min(1.0, target / rate), 1.0
-
-    def due(self) -> bool:
-        due = self._sum >= 1.0 - 1e-9
-        self._sum += self._share - (1.0 if due else 0.0)
-        return due
 
 
 def summary(body: Body, since: float) -> str:
@@ -149,7 +139,7 @@ COLOURS = 96
 AZIMUTH, ELEVATION = -125.0, -14.0
 #: DISTANCE: of the camera, as a multiple of the base's height in the stand.
 DISTANCE = 4.7
-#: FOLLOW: share of the robot's turn by which the camera follows from picture to picture.
+#: FOLLOW: fraction of the robot's yaw by which the camera follows from picture to picture.
 FOLLOW = 0.1
 NO_OPENGL = ('pictures need OpenGL without a screen; on Debian and Ubuntu: apt install libegl1 '
              'libgl1-mesa-dri, or libosmesa6')
@@ -226,12 +216,6 @@ class Camera:
         self._context.free()
         self._opengl.free()
 
-    def __enter__(self) -> 'Camera':
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
 
 def without_opengl() -> str:
     """Return why no picture can be drawn, or ''."""
@@ -263,71 +247,6 @@ def _opengl(width: int, height: int) -> Any:
     raise SimulationError(f'{NO_OPENGL} ({"; ".join(reasons)})')
 
 
-class Film(Protocol):
-    """Takes pictures of one size, uint8, shape (height, width, 3), one after the other."""
-
-    def add(self, picture: np.ndarray) -> None:
-        """Put one picture at the end."""
-
-    def close(self) -> None:
-        """End the film."""
-
-
-class _Gif:
-    """A GIF with the colours of its first picture, written as the pictures come."""
-
-    def __init__(self, file: BinaryIO, fps: float) -> None:
-        self._file, self._shown, self._taken, self._fps = file, 0, 0, fps
-        self._palette: Image.Image | None = None
-
-    def add(self, picture: np.ndarray) -> None:
-        image = Image.fromarray(np.ascontiguousarray(picture))
-        if self._palette is None:
-            self._palette = image.quantize(COLOURS, dither=Image.Dither.NONE)
-            self._palette.info.update(loop=0)
-            header, _ = GifImagePlugin.getheader(self._palette)
-            self._file.write(b''.join(header))
-        # A GIF counts in hundredths of a second: what rounding leaves over is made up for.
-        self._taken += 1
-        end = round(100 * self._taken / self._fps)
-        frame = image.quantize(palette=self._palette, dither=Image.Dither.NONE)
-        for part in GifImagePlugin.getdata(frame, duration=10 * (end - self._shown)):
-            self._file.write(part)
-        self._shown = end
-
-    def close(self) -> None:
-        self._file.write(b';')
-
-
-class _Mp4:
-    """An MP4 by ffmpeg."""
-
-    def __init__(self, path: Path, fps: float) -> None:
-        self._path, self._fps = path, fps
-        self._ffmpeg: subprocess.Popen | None = None
-
-    def add(self, picture: np.ndarray) -> None:
-        if self._ffmpeg is None:
-            height, width, _ = picture.shape
-            self._ffmpeg = subprocess.Popen(
-                ['ffmpeg', '-y', '-loglevel', 'error', '-f', 'rawvideo', '-pix_fmt', 'rgb24',
-                 '-s', f'{width}x{height}', '-r', str(self._fps), '-i', '-', '-an', '-pix_fmt',
-                 'yuv420p', '-movflags', '+faststart', '-f', 'mp4', str(self._path)],
-                stdin=subprocess.PIPE, stderr=subprocess.PIPE)
-        assert self._ffmpeg.stdin is not None
-        try:
-            self._ffmpeg.stdin.write(picture.tobytes())
-        except BrokenPipeError:
-            self.close()
-
-    def close(self) -> None:
-        if self._ffmpeg is not None:
-            _, complaint = self._ffmpeg.communicate()
-            if self._ffmpeg.returncode:
-                words = ' '.join(complaint.decode(errors='replace').split())
-                raise SimulationError(f'ffmpeg: {words or self._ffmpeg.returncode}')
-
-
 def check_film(path: Path) -> None:
     """Check that a film can be written later.
 
@@ -344,9 +263,14 @@ def check_film(path: Path) -> None:
                               'nothing more')
 
 
-@contextmanager
-def film(path: Path, fps: float) -> Iterator[Film]:
-    """Open a film, GIF or MP4, that is at ``path`` when it is whole, and not before.
+def write_film(path: Path, pictures: Iterator[np.ndarray], count: int, fps: float) -> None:
+    """Write a film, GIF or MP4, that is at ``path`` when it is whole, and not before.
+
+    Args:
+        path: ends in .gif or .mp4.
+        pictures: at least one, all of one size, uint8, shape (height, width, 3).
+        count: largest number of pictures.
+        fps: pictures per second.
 
     Raises:
         SimulationError: as ``check_film``, or ffmpeg failed.
@@ -356,15 +280,45 @@ def film(path: Path, fps: float) -> Iterator[Film]:
     check_film(path)
     beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
-        with beside.open('wb') as file:
-            roll: Film = _Gif(file, fps) if path.suffix == '.gif' else _Mp4(beside, fps)
-            yield roll
-            roll.close()
+        if path.suffix == '.gif':
+            _write_gif(beside, pictures, count, fps)
+        else:
+            _write_mp4(beside, pictures, fps)
         beside.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _write_gif(path: Path, pictures: Iterator[np.ndarray], count: int, fps: float) -> None:
+    """Write a GIF with the colours of its first picture."""
+    images = (Image.fromarray(np.ascontiguousarray(picture)) for picture in pictures)
+    first = next(images).quantize(COLOURS, dither=Image.Dither.NONE)
+    # A GIF counts in hundredths of a second: what rounding leaves over is made up for.
+    ends = np.round(100.0 / fps * np.arange(count + 1)).astype(int)
+    first.save(path, 'GIF', save_all=True, loop=0, duration=(10 * np.diff(ends)).tolist(),
+               append_images=(image.quantize(palette=first, dither=Image.Dither.NONE)
+                              for image in images))
+
+
+def _write_mp4(path: Path, pictures: Iterator[np.ndarray], fps: float) -> None:
+    """Write an MP4 by ffmpeg."""
+    first = next(pictures)
+    height, width, _ = first.shape
+    with subprocess.Popen(
+        ['ffmpeg', '-y', '-loglevel', 'error', '-f', 'rawvideo', '-pix_fmt', 'rgb24', '-s',
+         f'{width}x{height}', '-r', str(fps), '-i', '-', '-an', '-pix_fmt', 'yuv420p',
+         '-movflags', '+faststart', '-f', 'mp4', str(path)],
+        stdin=subprocess.PIPE, stderr=subprocess.PIPE) as ffmpeg:
+        assert ffmpeg.stdin is not None
+        with suppress(BrokenPipeError):
+            for picture in chain([first], pictures):
+                ffmpeg.stdin.write(picture.tobytes())
+        _, complaint = ffmpeg.communicate()
+    if ffmpeg.returncode:
+        words = ' '.join(complaint.decode(errors='replace').split())
+        raise SimulationError(f'ffmpeg: {words or ffmpeg.returncode}')
 
 
 def shoot(path: Path, model: Any, poses: Sequence[np.ndarray], fps: float = 20.0,
@@ -375,10 +329,14 @@ def shoot(path: Path, model: Any, poses: Sequence[np.ndarray], fps: float = 20.0
     It is as short as one picture where ``enough`` says so. Without a graphics card a picture
     takes 0.1 to 0.2 s, so films are made after a run and not while it has to be in time.
     """
-    with (Camera(model, width, height) as camera, film(path, fps) as roll,
+    with (closing(Camera(model, width, height)) as camera,
           progress_bar(f'drawing {path.name}', len(poses)) as bar):
-        for k, pose in enumerate(poses):
-            roll.add(camera.picture(pose))
-            bar(k + 1)
-            if enough():
-                return
+
+        def pictures() -> Iterator[np.ndarray]:
+            for k, pose in enumerate(poses):
+                yield camera.picture(pose)
+                bar(k + 1)
+                if enough():
+                    return
+
+        write_film(path, pictures(), len(poses), fps)

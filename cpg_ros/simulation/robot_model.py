@@ -372,10 +372,11 @@ def _coarsened(spec: Any, model: Any) -> Any:
     for k, mesh in enumerate(list(spec.meshes)):
         first, count = model.mesh_vertadr[k], model.mesh_vertnum[k]
         faces = model.mesh_face[model.mesh_faceadr[k]:][:model.mesh_facenum[k]]
-        turn = np.zeros(9)
-        engine().mju_quat2Mat(turn, model.mesh_quat[k])
-        places = model.mesh_vert[first:first + count] @ turn.reshape(3, 3).T + model.mesh_pos[k]
-        coarse = merged(Mesh(places, faces), GRAIN)
+        rotation = np.zeros(9)
+        engine().mju_quat2Mat(rotation, model.mesh_quat[k])
+        points = (model.mesh_vert[first:first + count] @ rotation.reshape(3, 3).T
+                  + model.mesh_pos[k])
+        coarse = merged(Mesh(points, faces), GRAIN)
         if len(coarse.triangles) < 20:
             continue
         name = f'{mesh.name} coarse'

@@ -49,9 +49,9 @@ class RunMetrics:
         sway: * root mean square of roll and pitch together, degrees.
         fell: when it fell, s; infinite if it did not.
         hops: times that all feet left the floor.
-        duty: * share of the time that a foot is on the floor, mean of all.
+        duty: * fraction of the time that a foot is on the floor, mean of all.
         cost: * of transport: mechanical work of the motors, none regained, per weight and metre.
-        saturation: share of time and motors at the limit of torque.
+        saturation: fraction of time and motors at the limit of torque.
         slip: * way that feet slide on the floor per metre that the body goes.
         lift: * height that a foot exceeds for a tenth of the time, least of all legs, m.
 
@@ -168,14 +168,14 @@ def _hops(touching: np.ndarray, dt: float) -> int:
     return int(((last - first + 1) * dt >= AIRBORNE).sum())
 
 
-def _feet(body: Body, parts: Anatomy, places: np.ndarray) -> np.ndarray:
-    """Return the places of the feet, m, shape (places, legs, 3)."""
+def _feet(body: Body, parts: Anatomy, poses: np.ndarray) -> np.ndarray:
+    """Return the positions of the feet, m, shape (poses, legs, 3)."""
     mujoco, data = engine(), engine().MjData(body.model)
-    feet = np.empty((len(places), len(parts.soles), 3))
-    for row, position in zip(feet, places, strict=True):
+    feet = np.empty((len(poses), len(parts.soles), 3))
+    for row, position in zip(feet, poses, strict=True):
         data.qpos[:] = position
         mujoco.mj_kinematics(body.model, data)
-        row[:] = parts.places(data)
+        row[:] = parts.sole_positions(data)
     return feet
 
 

@@ -17,7 +17,6 @@
 from dataclasses import dataclass
 
 from cpg_ros.common.errors import ShortRepr
-from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
@@ -36,7 +35,7 @@ class Scenario:
             seconds; see `impulse`.
         terrain: ground that is not flat, of a closed loop only, as is what follows.
         phase: of the first leg at the start of the gait, cycles.
-        speed: wanted, forward, m/s; ignored where the gait cannot be steered.
+        speed: commanded, forward, m/s; ignored where the gait cannot be steered.
         commands: later wishes, each (s, m/s forward, m/s to the left, rad/s of turning).
         switches: later gaits, each (s, name).
         payload: on the base, where its own mass is, kg; less than 0 for a lighter base.
@@ -112,9 +111,6 @@ class Outcome(ShortRepr):
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
         stiff: 1 while the feedback makes servos stiff, by gains or targets, else 0, the same.
         cost: of transport after BEGINNING, shape (runs,).
-        senses: measurements before each step, arrays (runs, steps, ...), if they were kept;
-            after a run's end it means nothing.
-        efforts: of the joints' servos in each step, N m, shape (runs, steps, joints), the same.
 
     """
 
@@ -129,8 +125,6 @@ class Outcome(ShortRepr):
     kp_scale: np.ndarray
     stiff: np.ndarray
     cost: np.ndarray
-    senses: SensorData | None = None
-    efforts: np.ndarray | None = None
 
     @property
     def upright(self) -> np.ndarray:

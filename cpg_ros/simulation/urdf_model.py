@@ -52,7 +52,7 @@ def trouble(path: Path) -> str:
 
 
 def hull(path: Path) -> bytes:
-    """Return the convex hull of a mesh as OBJ, m.
+    """Return the corners of a mesh's convex hull, m, as MSH, which MuJoCo takes for the hull.
 
     Raises:
         MeshError: the file cannot be read, or its points are in a plane.
@@ -66,28 +66,22 @@ def hull(path: Path) -> bytes:
         convex = ConvexHull(points)
     except QhullError as error:
         raise MeshError(f'{path}: its points enclose no volume') from error
-    corners = points[convex.vertices]
-    index = {int(vertex): k + 1 for k, vertex in enumerate(convex.vertices)}
-    outward = convex.equations[:, :3]
-    lines = [f'v {x:.9g} {y:.9g} {z:.9g}' for x, y, z in corners]
-    for (a, b, c), normal in zip(convex.simplices, outward, strict=True):
-        if np.cross(points[b] - points[a], points[c] - points[a]) @ normal < 0.0:
-            b, c = c, b
-        lines.append(f'f {index[int(a)]} {index[int(b)]} {index[int(c)]}')
-    return ('\n'.join(lines) + '\n').encode()
+    corners = points[convex.vertices].astype('<f4')
+    # The numbers of points, normals, texture coordinates and faces.
+    return np.array([len(corners), 0, 0, 0], '<i4').tobytes() + corners.tobytes()
 
 
 # Corrections of masses and inertias in URDF files that no body can have.
 
-#: THINNEST: least second moment in any direction, as a share of their sum.
+#: THINNEST: least second moment in any direction, as a fraction of their sum.
 THINNEST = 1e-3
-#: ROUNDING: violation, as a share of the sum, up to which it is corrected without a message.
+#: ROUNDING: violation, as a fraction of the sum, up to which it is corrected without a message.
 ROUNDING = 1e-4
 #: POINT: radius of gyration below which a body counts as a point, m.
 POINT = 1e-4
 #: DENSITY: assumed for a body with a mass but no extent, and for one without mass, kg/m^3.
 DENSITY = 1000.0
-#: Mass of a link without mass that a joint moves. LEAST: share of the robot's mass; LIGHTEST:
+#: Mass of a link without mass that a joint moves. LEAST: fraction of the robot's mass; LIGHTEST:
 #: least mass, kg.
 LEAST, LIGHTEST = 1e-3, 1e-2
 
@@ -259,7 +253,7 @@ class _Meshes:
             return str(path.resolve()), ''
         if kind == 'collision':
             try:
-                name = f'{len(self.assets)}_{path.stem}.obj'
+                name = f'{len(self.assets)}_{path.stem}.msh'
                 self.assets[name] = hull(path)
                 return name, f'{why}, convex hulls take the place of meshes'
             except MeshError as error:

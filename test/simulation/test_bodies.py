@@ -15,6 +15,8 @@
 """Many bodies at once: motors whose torque falls with speed."""
 
 import importlib.util
+from pathlib import Path
+import sys
 
 from four_legs import ROBOT
 import numpy as np
@@ -28,13 +30,17 @@ from cpg_ros.simulation.bodies import BatchPhysics  # noqa: E402, I100
 from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
+sys.path.insert(0, str(Path(__file__).parents[2] / 'benchmarks' / 'leaderboard'))
+from motors import limit_motors  # noqa: E402
+
 STEPS, AHEAD = 400, 0.6
 
 
 def swung(no_load):
     """Angles and speeds of all joints, rad and rad/s, that are sent ahead in free fall."""
     bodies = BatchPhysics(Body('go2', ROBOT, timestep=2e-4), 1)
-    bodies.no_load = None if no_load is None else np.full(len(bodies.parts.angles), no_load)
+    if no_load is not None:
+        limit_motors(bodies, np.full(len(bodies.parts.angles), no_load))
     state = bodies.start.copy()
     state[1 + bodies.parts.pose[2]] += 3.0
     control, joints, _ = bodies.controls(1, STEPS)

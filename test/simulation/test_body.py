@@ -278,21 +278,19 @@ def test_a_film_without_opengl_says_what_to_install(monkeypatch, body):
 
 
 def test_mp4_goes_through_ffmpeg(tmp_path, monkeypatch):
-    from cpg_ros.simulation.recorder import film
+    from cpg_ros.simulation.recorder import write_film
     monkeypatch.setenv('PATH', str(tmp_path))
-    with pytest.raises(SimulationError, match='needs ffmpeg'), film(tmp_path / 'a.mp4', 20.0):
-        pass
+    with pytest.raises(SimulationError, match='needs ffmpeg'):
+        write_film(tmp_path / 'a.mp4', iter(()), 0, 20.0)
     fake = tmp_path / 'ffmpeg'
     fake.write_text('#!/bin/sh\nfor last; do :; done\n/bin/cat > "$last"\n')
     fake.chmod(0o755)
-    with film(tmp_path / 'a.mp4', 20.0) as roll:
-        for value in (1, 2):
-            roll.add(np.full((2, 3, 3), value, np.uint8))
+    write_film(tmp_path / 'a.mp4', (np.full((2, 3, 3), value, np.uint8) for value in (1, 2)), 2,
+               20.0)
     assert (tmp_path / 'a.mp4').read_bytes() == b'\1' * 18 + b'\2' * 18
     fake.write_text('#!/bin/sh\necho no such codec >&2\nexit 1\n')
-    with (pytest.raises(SimulationError, match='ffmpeg: no such codec'),
-          film(tmp_path / 'b.mp4', 20.0) as roll):
-        roll.add(np.zeros((400, 300, 3), np.uint8))
+    with pytest.raises(SimulationError, match='ffmpeg: no such codec'):
+        write_film(tmp_path / 'b.mp4', iter([np.zeros((400, 300, 3), np.uint8)]), 1, 20.0)
     assert not list(tmp_path.glob('*.part')) and not list(tmp_path.glob('.*'))
 
 
@@ -303,6 +301,6 @@ def test_a_film_is_as_long_as_the_run(tmp_path, monkeypatch, body, rate, fps):
                         lambda _, __, poses, rate, **___: shot.append((len(poses), rate)))
     diary = RunLog(body, rate, tmp_path / 'a.gif')
     for k in range(round(4.0 * rate)):
-        diary.look((k + 1) / rate)
+        diary.update((k + 1) / rate)
     diary.write('go2')
     assert shot == [(round(4.0 * fps), fps)]

@@ -152,7 +152,7 @@ def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, caps
             body.data.qpos[body.model.jnt_qposadr[body.model.joint(joint.name).id]] = (
                 joint.offset + column * weights[order])
         mujoco.mj_kinematics(body.model, body.data)
-        return parts.places(body.data) - body.data.xpos[parts.base]
+        return parts.sole_positions(body.data) - body.data.xpos[parts.base]
 
     stand = feet(0.0, 0)
     side = np.array([1.0 if leg[0] == 'l' else -1.0 for leg in legs(robot)])

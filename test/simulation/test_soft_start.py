@@ -17,8 +17,7 @@
 import importlib.util
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.soft_start import Approach, NEAR
+from cpg_ros.simulation.body import Approach, Body, NEAR
 from go2 import DT, GO2, program
 from hypothesis import given
 from hypothesis import strategies as st

@@ -33,7 +33,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.biped_run import BipedOutcome, BipedRun
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
-from cpg_ros.simulation.tuning.gaits import cma_search, more_than_chance, scaled_gains
+from cpg_ros.simulation.tuning.gaits import cma_search, scaled_gains, Survivors
 import numpy as np
 
 #: SEARCHED: names of the gains that are searched for.
@@ -99,35 +99,24 @@ class TunedBiped:
     """Results of fresh runs with the gains before and after a search.
 
     Attributes:
-        pushes: how many were met.
-        before: how many of them were survived with the gains that the search began with.
-        after: with those that it found.
-        walks: how many were without a push.
-        fell_before: how many of these ended in a fall before.
-        fell_after: and after.
-        won: runs that only the gains after survive.
-        lost: runs that only those before survive.
+        pushes: walks with a push.
+        walks: walks without one.
 
     """
 
-    pushes: int
-    before: int
-    after: int
-    walks: int
-    fell_before: int
-    fell_after: int
-    won: int
-    lost: int
+    pushes: Survivors
+    walks: Survivors
 
     @property
     def better(self) -> bool:
-        """Whether more runs are survived than chance would have it (p < 0.05, sign test)."""
-        return more_than_chance(self.won, self.lost)
+        """Whether significantly more runs are survived."""
+        return (self.pushes + self.walks).better
 
     def __str__(self) -> str:
-        return (f'fresh pushes survived: {self.before} of {self.pushes} before, {self.after} '
-                f'after; of {self.walks} walks without a push, {self.fell_before} ended in a fall '
-                f'before, {self.fell_after} after')
+        pushes, walks = self.pushes, self.walks
+        return (f'fresh pushes survived: {pushes.before} of {pushes.runs} before, {pushes.after} '
+                f'after; of {walks.runs} walks without a push, {walks.runs - walks.before} ended '
+                f'in a fall before, {walks.runs - walks.after} after')
 
 
 def walked(job: WalkJob) -> list[list[BipedOutcome]]:
@@ -246,7 +235,5 @@ def _compared(walks: Sequence[Walk], outcomes: Sequence[Sequence[BipedOutcome]])
     """Compare the outcomes of walks with the gains before and after, in this order."""
     before, after = (np.array([math.isinf(outcome.fell) for outcome in some]) for some in outcomes)
     pushed = np.array([walk.push is not None for walk in walks])
-    return TunedBiped(int(pushed.sum()), int(before[pushed].sum()), int(after[pushed].sum()),
-                      int((~pushed).sum()), int((~before[~pushed]).sum()),
-                      int((~after[~pushed]).sum()), int((after & ~before).sum()),
-                      int((before & ~after).sum()))
+    return TunedBiped(Survivors.of(before[pushed], after[pushed]),
+                      Survivors.of(before[~pushed], after[~pushed]))

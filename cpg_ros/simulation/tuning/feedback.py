@@ -33,12 +33,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
-from cpg_ros.simulation.tuning.gaits import (
-    cma_es,
-    cma_search,
-    more_than_chance,
-    scaled_gains,
-)
+from cpg_ros.simulation.tuning.gaits import cma_es, cma_search, scaled_gains, Survivors
 import numpy as np
 from scipy.stats import binomtest
 
@@ -51,8 +46,9 @@ BENEFIT_IMPULSES = (0.2, 0.4, 0.6)
 #: s.
 BENEFIT_PUSHES, UNDISTURBED, WALKED = 8, 4, 5.0
 PUSHED, WATCHED = 1.6, 3.4
-#: FROUDE: v / sqrt(g l) of the commanded speed; SHARE: its largest share of the fastest speed.
-FROUDE, SHARE = 0.2, 0.8
+#: FROUDE: v / sqrt(g l) of the commanded speed; FRACTION: the largest commanded speed, as a
+#: fraction of the fastest one.
+FROUDE, FRACTION = 0.2, 0.8
 #: DELAYS: of the sensors, s, by turns from run to run; SENSORS: their other errors.
 DELAYS = (0.01, 0.02)
 SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
@@ -70,36 +66,23 @@ class Benefit:
     Attributes:
         gait: its name.
         upright: undisturbed runs with feedback that did not fall, of UNDISTURBED.
-        survived: pushes with feedback, of all.
-        without: the same without feedback.
-        lost: those survived without feedback only.
+        pushes: survived without feedback (before) and with it (after).
 
     """
 
     gait: str
     upright: int
-    survived: int
-    without: int
-    lost: int
-
-    @property
-    def won(self) -> int:
-        """Pushes survived with feedback only."""
-        return self.survived - self.without + self.lost
+    pushes: Survivors
 
     @property
     def helps(self) -> bool:
-        """Whether it fells no undisturbed robot, and more of the same pushes are survived.
-
-        More than chance would have it (p < 0.05, one-sided sign test of the pushes that end in
-        two ways: the exact form of McNemar's test).
-        """
-        return self.upright == UNDISTURBED and more_than_chance(self.won, self.lost)
+        """Whether it fells no undisturbed robot, and significantly more pushes are survived."""
+        return self.upright == UNDISTURBED and self.pushes.better
 
     def __str__(self) -> str:
-        pushes = BENEFIT_PUSHES * len(BENEFIT_IMPULSES)
-        return (f'{self.gait}: {self.survived} of {pushes} pushes survived (without feedback '
-                f'{self.without}; {self.won} with it only, {self.lost} without it only), '
+        pushes = self.pushes
+        return (f'{self.gait}: {pushes.after} of {pushes.runs} pushes survived (without feedback '
+                f'{pushes.before}; {pushes.won} with it only, {pushes.lost} without it only), '
                 f'{self.upright} of {UNDISTURBED} undisturbed runs, sensors '
                 f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
@@ -140,7 +123,7 @@ class FeedbackTrial:
         self.length = leg_length(self.loop.geometry)
         self.speed = FROUDE * math.sqrt(GRAVITY * self.length)
         if plan.motion.steering is not None:
-            self.speed = min(self.speed, SHARE * plan.speeds[1])
+            self.speed = min(self.speed, FRACTION * plan.speeds[1])
 
     def pushed(self, rng: np.random.Generator, count: int, impulses: Sequence[float]
                ) -> list[Scenario]:
@@ -212,8 +195,7 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
             upright, old = trial.upright(gains), before[gait]
             new = (trial.survived(gains, pushed[gait]) if upright == UNDISTURBED
                    else np.zeros_like(old))
-            benefits.append(Benefit(gait, upright, int(new.sum()), int(old.sum()),
-                                 int((old & ~new).sum())))
+            benefits.append(Benefit(gait, upright, Survivors.of(old, new)))
             if not benefits[-1].helps:
                 break
         first = first or benefits
@@ -241,11 +223,11 @@ FACTOR, SPREAD = 8.0, 0.35
 TOGETHER, PUSHES, FIELDS = 3, 8, 3
 #: IMPULSES: of pushes, as shares of m sqrt(g l); harder than most robots survive.
 IMPULSES = (0.6, 1.0, 1.4)
-#: ROUGH: height of the fields, as a share of the legs' length.
+#: ROUGH: height of the fields, as a fraction of the legs' length.
 ROUGH = 0.12
-#: Weights of a price. PUSH, CALM, GROUND: of the share of falls after pushes, undisturbed and on
-#: rough ground; SPEED: of the relative error of the speed; COST: of the relative rise of the cost
-#: of transport by feedback.
+#: Weights of a price. PUSH, CALM, GROUND: of the fraction of falls after pushes, undisturbed and
+#: on rough ground; SPEED: of the relative error of the speed; COST: of the relative rise of the
+#: cost of transport by feedback.
 PUSH, CALM, GROUND, SPEED, COST = 1.0, 1.0, 0.5, 0.5, 0.1
 #: JUDGED: pushes of each impulse that judge the result; FRESH: seed that draws them.
 JUDGED, FRESH = 64, 10_000_019
@@ -298,40 +280,29 @@ def prices(job: PriceJob) -> list[float]:
 
 @dataclass(frozen=True)
 class TunedFeedback:
-    """Results of pushes on fresh seeds: survivors in all gaits, and number of pushes.
+    """Results of pushes on fresh seeds, in all gaits.
 
     Attributes:
-        pushes: how many.
-        without: survivors without feedback.
-        before: with the gains that the search began with.
-        after: with those that it found.
-        lost: survivors before that are not survivors after.
-        fell: undisturbed runs that fell with these.
+        pushes: survived with the gains before the search and with those that it found.
+        without: pushes survived without feedback.
+        fell: undisturbed runs that fell with the gains that it found.
 
     """
 
-    pushes: int
+    pushes: Survivors
     without: int
-    before: int
-    after: int
-    lost: int
     fell: int
 
     @property
     def better(self) -> bool:
-        """Whether the new gains survive more pushes and fell no undisturbed robot.
-
-        The same pushes were met before and after: of those that only one survives, more than
-        chance would have it (p < 0.05, one-sided sign test) must be survived after.
-        """
-        won = self.after - self.before + self.lost
-        return not self.fell and more_than_chance(won, self.lost)
+        """Whether significantly more pushes are survived, and no undisturbed robot fell."""
+        return not self.fell and self.pushes.better
 
     def __str__(self) -> str:
         spans = []
-        for count in (self.without, self.before, self.after):
-            span = binomtest(count, self.pushes).proportion_ci(0.95, 'wilson')
-            spans.append(f'{count} of {self.pushes} (95 %: {100.0 * span.low:.0f} to '
+        for count in (self.without, self.pushes.before, self.pushes.after):
+            span = binomtest(count, self.pushes.runs).proportion_ci(0.95, 'wilson')
+            spans.append(f'{count} of {self.pushes.runs} (95 %: {100.0 * span.low:.0f} to '
                          f'{100.0 * span.high:.0f} %)')
         return (f'fresh pushes survived: without feedback {spans[0]}, before {spans[1]}, after '
                 f'{spans[2]}; {self.fell} undisturbed runs fell')
@@ -411,7 +382,6 @@ def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed
         return np.concatenate([trial.survived(gains, pushed)
                                for trial, pushed in zip(trials, fresh, strict=True)])
 
-    old, new = survivors(before), survivors(after)
-    return TunedFeedback(len(old), int(survivors(None).sum()), int(old.sum()), int(new.sum()),
-                         int((old & ~new).sum()),
+    return TunedFeedback(Survivors.of(survivors(before), survivors(after)),
+                         int(survivors(None).sum()),
                          sum(UNDISTURBED - trial.upright(after) for trial in trials))

@@ -35,7 +35,7 @@ from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 import numpy as np
 
-#: CENTRED: distance of the centre of mass from the middle of the feet, as a share of half the
+#: CENTRED: distance of the centre of mass from the middle of the feet, as a fraction of half the
 #: distance from hind to fore feet, that is ignored.
 CENTRED = 0.1
 
@@ -46,14 +46,14 @@ def centre_ahead(body: Body, parts: Anatomy) -> float:
     It is 0 where that is less than CENTRED of half the distance from hind to fore feet.
     """
     body.reset()
-    feet = parts.places(body.data)[:, 0]
+    feet = parts.sole_positions(body.data)[:, 0]
     ahead = float(body.data.subtree_com[parts.base, 0] - feet.mean())
     return ahead if abs(ahead) > 0.5 * CENTRED * np.ptp(feet) else 0.0
 
 
 #: POINTS: points of a cycle at which curves are fitted.
 POINTS = 128
-#: OWN: share of the cycle that a leg stands by the weights alone, without a duty factor.
+#: OWN: fraction of the cycle that a leg stands by the weights alone, without a duty factor.
 OWN = 0.5
 #: DIGITS: decimals of weights and offsets, rad, in the file.
 DIGITS = 4
@@ -85,7 +85,7 @@ class FootTrajectory:
     lead: float = 0.0
 
     def __call__(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the foot's places forward and upward of the joint, m, at phases in cycles."""
+        """Return the foot's positions forward and upward of the joint, m, at phases in cycles."""
         phase = (phase + self.lead) % 1.0
         s = phase / self.duty
         r = (phase - self.duty) / (1.0 - self.duty)

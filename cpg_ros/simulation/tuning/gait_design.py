@@ -34,7 +34,7 @@ import numpy as np
 
 #: STRIDES: strides that are tried; SLOWER: by how much the legs move slower at a stride of 0;
 #: FASTER: factors of the frequency that are tried at a stride of 1; ROOM: least distance from the
-#: joints' speed limits, as a share, with which they are.
+#: joints' speed limits, as a fraction, with which they are.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 SLOWER = 0.2
 FASTER, ROOM = (1.1, 1.2, 1.3, 1.4), 0.05
@@ -47,10 +47,10 @@ DURATION = 8.0
 #: FLOORS: floors over which speeds and yaw rates are averaged.
 FLOORS = (Scenario(), Scenario(0.7))
 #: A gait counts as steered if its speed rises by RISE per row, m/s, and its yaw rate is at least
-#: TURN for a difference of strides of 1, rad/s; for slow gaits, RISE_SHARE and TURN_SHARE of the
-#: top speed, m/s, are enough.
+#: TURN for a difference of strides of 1, rad/s; for slow gaits, RISE_FRACTION and
+#: TURN_FRACTION of the top speed, m/s, are enough.
 RISE, TURN = 0.01, 0.1
-RISE_SHARE, TURN_SHARE = 0.05, 0.5
+RISE_FRACTION, TURN_FRACTION = 0.05, 0.5
 
 
 def measure(batch: OpenLoopBatch, plan: GaitPlan,
@@ -93,7 +93,7 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
     zero = STRIDES.index(0.0)
     first = last = zero
     top = max(rows[len(STRIDES) - 1][0], 0.0)
-    rise, turning = min(RISE, RISE_SHARE * top), min(TURN, TURN_SHARE * top)
+    rise, turning = min(RISE, RISE_FRACTION * top), min(TURN, TURN_FRACTION * top)
     good = [upright and turn >= turning for *_, turn, upright in rows]
     while last + 1 < len(rows) and good[last + 1] and (
             rows[last + 1][0] >= rows[last][0] + rise):
@@ -109,7 +109,7 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
 
 #: LENGTH: of a leg in the stand, m.
 LENGTH = 0.2664
-#: SHORTER: share by which strides of the gentlest start are shorter.
+#: SHORTER: fraction by which strides of the gentlest start are shorter.
 SHORTER = 0.5
 #: CLEAR: height that feet should exceed for a tenth of the time, m.
 CLEAR = 0.02
@@ -121,10 +121,10 @@ class Design:
 
     Attributes:
         frequency: Hz.
-        stride, lift, height: as of Path.
-        duty, lead, late: as of Path.
-        fore, hind: of fore and hind legs, how far ahead of the joint the foot is, as of Path.
-        push_fore, push_hind: of fore and hind legs, as of Path.
+        stride, lift, height: as of FootTrajectory.
+        duty, lead, late: as of FootTrajectory.
+        fore, hind: how far ahead of the joint fore and hind feet are, m.
+        push_fore, push_hind: of fore and hind legs, as of FootTrajectory.
 
     """
 
@@ -173,7 +173,7 @@ class GaitTarget:
         return Design(*(float(value) for value in low + point * (high - low)))
 
     def gentler(self, fraction: float) -> 'GaitTarget':
-        """Return the same with a start that demands less of the joints, least at a share of 1."""
+        """Return the same with a start that demands less of the joints, least for 1."""
         start, low = self.start, self.low
         return replace(self, start=replace(
             start, frequency=start.frequency + fraction * (low.frequency - start.frequency),
@@ -184,7 +184,7 @@ class GaitTarget:
             height=start.height + fraction * (low.height - start.height)))
 
     def slower(self, fraction: float) -> 'GaitTarget':
-        """Return the same at this share of all frequencies, and of the speed that follows."""
+        """Return the same at this fraction of all frequencies, and of the speed that follows."""
         low, start, high = (replace(design, frequency=fraction * design.frequency)
                             for design in (self.low, self.start, self.high))
         return GaitTarget(fraction * self.speed, self.hops, low, start, high)

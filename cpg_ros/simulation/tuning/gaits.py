@@ -20,7 +20,7 @@ different friction, with different loads and with pushes.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from itertools import cycle
 import math
 from pathlib import Path
@@ -53,7 +53,7 @@ from scipy.stats import binomtest
 #: GENERATION: number of points of a generation of CMA-ES.
 GENERATION = 12
 
-#: GOOD: share of the target speed from which on a gait is good.
+#: GOOD: fraction of the target speed from which on a gait is good.
 GOOD = 0.3
 
 
@@ -156,8 +156,8 @@ MASS = 15.2
 #: limit, which leads the search back within it; NO_GAIT: price of a design without a gait.
 REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
 #: For slow joints. SLOWEST: least factor of a gait's usual frequencies that is tried; SMALLEST: of
-#: the strides of the nearest design where it is the slowest; ROOM: share of their speed limit with
-#: which the gentlest start begins.
+#: the strides of the nearest design where it is the slowest; ROOM: fraction of their speed limit
+#: with which the gentlest start begins.
 SLOWEST, SMALLEST, ROOM = 0.3, 0.5, 0.9
 #: SPREAD: initial standard deviation of the designs about the start (1: the whole range).
 SPREAD = 0.15
@@ -170,7 +170,7 @@ class Tuner:
 
     def __init__(self, robot: Robot, model: str, kp: float | None = None, kd: float | None = None,
                  threads: int = 0, say: Callable[[str], None] = lambda line: None) -> None:
-        """Load the model; arguments as of Batch.
+        """Load the model; arguments as of OpenLoopBatch.
 
         Raises:
             SimulationError: MuJoCo or CMA-ES is missing, the model cannot be used, or the robot
@@ -373,7 +373,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         seed: the same one finds the same, on whatever workers.
         executor: any, for all gaits and seeds at once; None for this process.
         seeds: searches for each gait, from this seed and those after it; the cheapest counts.
-        kp: gain of the joints, as of Batch.
+        kp: gain of the joints, as of OpenLoopBatch.
         kd: the same.
         threads: of each search; 0 for all cores.
         say: takes a line for each thing that the model lacks.
@@ -461,13 +461,46 @@ def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,
                       limits[name].high) for name, log in zip(names, logs, strict=True)}
 
 
-def more_than_chance(won: int, lost: int) -> bool:
-    """Return whether significantly more runs are won than lost (p < 0.05, sign test).
+@dataclass(frozen=True)
+class Survivors:
+    """How many of the same runs are survived before a change and after it.
 
-    The test is one-sided; it is the exact form of McNemar's test.
+    Attributes:
+        runs: how many were tried.
+        before: survived before it.
+        after: survived after it.
+        lost: survived before it only.
+
     """
-    changed = won + lost
-    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
+
+    runs: int
+    before: int
+    after: int
+    lost: int
+
+    @classmethod
+    def of(cls, before: np.ndarray, after: np.ndarray) -> 'Survivors':
+        """Count runs by whether each was survived, before and after."""
+        return cls(len(before), int(before.sum()), int(after.sum()), int((before & ~after).sum()))
+
+    def __add__(self, other: 'Survivors') -> 'Survivors':
+        """Return the counts of both sets of runs together."""
+        return Survivors(*(sum(pair) for pair in zip(astuple(self), astuple(other), strict=True)))
+
+    @property
+    def won(self) -> int:
+        """Runs survived after the change only."""
+        return self.after - self.before + self.lost
+
+    @property
+    def better(self) -> bool:
+        """Whether significantly more runs are won than lost (p < 0.05, sign test).
+
+        The test is one-sided; it is the exact form of McNemar's test.
+        """
+        changed = self.won + self.lost
+        return changed > 0 and bool(
+            binomtest(self.won, changed, alternative='greater').pvalue < 0.05)
 
 
 def cma_es() -> ModuleType:

@@ -34,8 +34,8 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.ros.bridges.unitree.messages import JOINTS as MOTORS
 from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
-from cpg_ros.ros.bridges.unitree.models import JOINTS as MOTORS
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_setup import calibrate
 from cpg_ros.simulation.robot_setup.calibrate import main

@@ -31,6 +31,7 @@ from cpg_ros.simulation.biped_run import BipedOutcome
 from cpg_ros.simulation.tuning import biped  # noqa: I100
 from cpg_ros.simulation.tuning import tune as tool
 from cpg_ros.simulation.tuning.biped import tune_biped, TunedBiped, Walk, walked, WalkJob
+from cpg_ros.simulation.tuning.gaits import Survivors
 
 HUMANOID = load_robot('humanoid')
 BAD = replace(HUMANOID, biped=replace(HUMANOID.biped, gains={'place_x': 0.5}))
@@ -61,8 +62,8 @@ def test_better_gains_are_found_and_found_again(monkeypatch):
     monkeypatch.setattr(biped, 'walked', body := Body())
     told = []
     robot, found = tune_biped(BAD, 'humanoid', 240, 5, update=told.append)
-    assert found.better and found.after > found.before and told[-1] == 240
-    assert found.pushes == 72 and found.walks == 20
+    assert found.better and found.pushes.after > found.pushes.before and told[-1] == 240
+    assert found.pushes.runs == 72 and found.walks.runs == 20
     assert robot.biped.gains['place_x'] == pytest.approx(BEST, rel=0.15)
     assert tune_biped(BAD, 'humanoid', 240, 5) == (robot, found)
     # What judges has not been met by the search, whatever its speed or push.
@@ -77,8 +78,12 @@ def test_gains_that_are_no_better_stay(monkeypatch):
     robot, found = tune_biped(BAD, 'humanoid', 12, 1)
     assert not found.better and robot is BAD
     # One more of two is chance.
-    assert not TunedBiped(72, 40, 41, 20, 0, 0, 2, 1).better
-    assert TunedBiped(72, 40, 52, 20, 0, 0, 13, 1).better
+    walks = Survivors(20, 20, 20, 0)
+    assert not TunedBiped(Survivors(72, 40, 41, 1), walks).better
+    assert TunedBiped(Survivors(72, 40, 52, 1), walks).better
+    # Neither pushes nor walks are enough alone.
+    assert TunedBiped(Survivors(72, 40, 43, 0), Survivors(20, 15, 17, 0)).better
+    assert not Survivors(72, 40, 43, 0).better
 
 
 def test_pushes_and_speeds_go_with_the_size_of_the_robot():
@@ -104,7 +109,7 @@ def test_walks_are_those_of_the_gains():
 
 
 def test_the_file_says_what_it_was_found_by(tmp_path, capsys, monkeypatch):
-    found = TunedBiped(72, 40, 55, 20, 3, 0, 16, 1)
+    found = TunedBiped(Survivors(72, 40, 55, 1), Survivors(20, 17, 20, 0))
     monkeypatch.setattr(tool, 'tune_biped', lambda robot, *_, **__: (
         biped.with_gains(robot, {'place_x': 0.8}), found))
     out = tmp_path / 'own.yaml'

@@ -26,6 +26,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 
 from cpg_ros.simulation.tuning import feedback  # noqa: I100
 from cpg_ros.simulation.tuning.feedback import Benefit, judge_feedback
+from cpg_ros.simulation.tuning.gaits import Survivors
 
 
 @pytest.fixture
@@ -37,11 +38,12 @@ def quick(monkeypatch):
 
 def test_feedback_that_saves_a_robot_is_on(quick):
     robot, (one,) = judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
-    assert one.helps and one.upright == 4 and one.survived > one.without
-    assert one.won - one.lost == one.survived - one.without
+    pushes = one.pushes
+    assert one.helps and one.upright == 4 and pushes.after > pushes.before
+    assert pushes.won - pushes.lost == pushes.after - pushes.before
     assert robot.feedback.enabled and not robot.feedback.laws
     assert robot.feedback.made == f'in simulation, {one}'
-    assert f'{one.survived} of 8 pushes survived (without feedback {one.without};' in str(one)
+    assert f'{pushes.after} of 8 pushes survived (without feedback {pushes.before};' in str(one)
     assert replace(robot, feedback=None) == replace(GO2, feedback=None)
 
 
@@ -57,7 +59,7 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
 @pytest.mark.parametrize(('survived', 'without', 'lost', 'helps'), [
     (12, 11, 0, False), (12, 7, 0, True), (12, 7, 3, False), (24, 24, 0, False)])
 def test_one_survivor_more_does_not_say_that_it_helps(survived, without, lost, helps):
-    assert Benefit('trot', 4, survived, without, lost).helps is helps
+    assert Benefit('trot', 4, Survivors(24, without, survived, lost)).helps is helps
 
 
 def test_it_is_judged_on_late_and_noisy_sensors(quick, monkeypatch):

@@ -30,6 +30,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'cma')):
 
 from cpg_ros.simulation.tuning import feedback  # noqa: I100
 from cpg_ros.simulation.tuning.feedback import FeedbackTrial, tune_feedback, UNDISTURBED
+from cpg_ros.simulation.tuning.gaits import Survivors
 
 #: The step, s, with which the bodies survive most, and that of robots before the search.
 BEST, BEGIN = 0.2, 0.08
@@ -75,7 +76,7 @@ def test_the_search_finds_gains_that_survive_more_on_draws_that_it_has_not_seen(
     told = []
     robot, found = tune_feedback(ROBOT, 'go2', ['trot', 'walk'], 160, 5, update=told.append)
     assert told[-1] == 160
-    assert found.better and found.after > found.before > found.without
+    assert found.better and found.pushes.after > found.pushes.before > found.without
     assert abs(math.log(robot_gains(robot).step / BEST)) < 0.5 * math.log(BEST / BEGIN)
     own = robot.feedback
     assert own.enabled and 'trot, walk, seed 5' in own.made and str(found) in own.made
@@ -83,7 +84,7 @@ def test_the_search_finds_gains_that_survive_more_on_draws_that_it_has_not_seen(
     assert not own.laws['speed'] and 'speed_share' not in own.gains and 'roll' in own.gains
     # Of two gaits each: pushes that compare, and those that judge whether feedback helps at all.
     *trained, judged, again, _, _ = body.draws
-    assert judged == again and len(judged) == found.pushes // 2
+    assert judged == again and len(judged) == found.pushes.runs // 2
     assert not any(set(judged) & set(draw) for draw in trained)
     # Every generation meets others, each of its jobs and gaits the same ones.
     assert len({tuple(draw) for draw in trained}) == 1 + math.ceil(157 / 12)
@@ -94,7 +95,7 @@ def test_the_search_finds_gains_that_survive_more_on_draws_that_it_has_not_seen(
 def test_where_nothing_is_better_gains_stay(body, monkeypatch):
     monkeypatch.setattr(body, 'flat', True)
     robot, found = tune_feedback(ROBOT, 'go2', ['trot'], 20, 5)
-    assert not found.better and found.after == found.before
+    assert not found.better and found.pushes.after == found.pushes.before
     assert robot_gains(robot) == robot_gains(ROBOT)
     assert robot.feedback.enabled
 
@@ -118,7 +119,7 @@ def test_better_gains_of_a_feedback_that_does_not_help_leave_it_off(body, monkey
     (45, 5, 0, False), (70, 0, 1, False)])
 def test_gains_are_better_only_where_chance_does_not_make_them_so(after, lost, fell, better):
     """Of n pushes that only one survives, all n after: p = 2^-n, below 0.05 from n = 5 on."""
-    assert feedback.TunedFeedback(96, 20, 50, after, lost, fell).better is better
+    assert feedback.TunedFeedback(Survivors(96, 50, after, lost), 20, fell).better is better
 
 
 def test_every_gain_that_is_searched_for_exists():

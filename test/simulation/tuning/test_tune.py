@@ -44,6 +44,7 @@ from cpg_ros.simulation.tuning.gaits import (  # noqa: E402  # noqa: E402
     ClosestDesign,
     NoDesign,
     REFUSED,
+    Survivors,
     Tuned,  # noqa: E402
     Tuner,
 )
@@ -119,7 +120,7 @@ def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_
 
 
 def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, monkeypatch):
-    found, out, asked = TunedFeedback(96, 20, 50, 61, 2, 0), tmp_path / 'a.yaml', []
+    found, out, asked = TunedFeedback(Survivors(96, 50, 61, 2), 20, 0), tmp_path / 'a.yaml', []
     own = OwnFeedback(made=str(found), gains={'step': 0.9})
 
     def searched(robot, model, gaits, evaluations, seed, **options):
@@ -137,7 +138,7 @@ def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, m
     # Wilson's interval of 20 of 96 by the formula: 0.1394 to 0.3001.
     assert re.search(r'without feedback 20 of 96 \(95 %: 14 to 30 %\), before 50 of .*, after 61 ',
                      capsys.readouterr().out)
-    found = replace(found, after=51)
+    found = replace(found, pushes=replace(found.pushes, after=51))
     assert tool.main([*given, '--gaits', 'walk']) == 1 and asked[1][0] == ['walk']
     assert 'nothing better was found: the gains stay' in capsys.readouterr().out
 
