@@ -73,11 +73,8 @@ def _setting(value: Any) -> bool | int | float | str:
     """Return the value for a parameter; its node checks kind and range."""
     if isinstance(value, str):
         return _text(value)
-    if isinstance(value, bool):
-        return value
-    if isinstance(value, int) and -2**63 <= value < 2**63:
-        return value
-    if isinstance(value, float) and math.isfinite(value):
+    if (isinstance(value, bool) or (isinstance(value, int) and -2**63 <= value < 2**63)
+            or (isinstance(value, float) and math.isfinite(value))):
         return value
     raise RequestError('must be true or false, text or a finite number')
 
@@ -93,8 +90,15 @@ ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'record': {'on': _flag}, 'fit': {}}
 
 
-def _constant(name: str) -> float:
+def _refuse(name: str) -> float:
     raise RequestError(f'{name} is not a number')
+
+
+def _checked(action: str, name: str, check: Callable[[Any], Any], value: Any) -> Any:
+    try:
+        return check(value)
+    except RequestError as error:
+        raise RequestError(f'{action}: {name} {error}') from error
 
 
 def read(text: str | bytes) -> Request:
@@ -107,7 +111,7 @@ def read(text: str | bytes) -> Request:
     if not isinstance(text, str):
         raise RequestError('a request must be text')
     try:
-        message = json.loads(text, parse_constant=_constant)
+        message = json.loads(text, parse_constant=_refuse)
     except RequestError:
         raise
     except (ValueError, RecursionError) as error:
@@ -120,19 +124,11 @@ def read(text: str | bytes) -> Request:
     fields = ACTIONS[action]
     stamp = message.pop('stamp', None)
     if stamp is not None:
-        try:
-            stamp = _number(0.0, 1e12)(stamp)
-        except RequestError as error:
-            raise RequestError(f'{action}: stamp {error}') from error
+        stamp = _checked(action, 'stamp', _number(0.0, 1e12), stamp)
     if set(message) != set(fields):
         raise RequestError(f"'{action}' takes {', '.join(fields) or 'nothing'}")
-    values = {}
-    for name, check in fields.items():
-        try:
-            values[name] = check(message[name])
-        except RequestError as error:
-            raise RequestError(f'{action}: {name} {error}') from error
-    return Request(action, values, stamp)
+    return Request(action, {name: _checked(action, name, check, message[name])
+                            for name, check in fields.items()}, stamp)
 
 
 #: MOST: largest number of pages with all rights; MOST_STOPPING: of further pages that can only

@@ -16,15 +16,16 @@
 
 import asyncio
 from collections.abc import Callable, Iterable
+from contextlib import closing
 import os
 from pathlib import Path
+import shutil
 import socket
 import sys
 import threading
 import time
 import traceback
 from typing import Any
-import zipfile
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import is_loopback
@@ -43,54 +44,18 @@ from cpg_ros.ros.node.console import aside
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
-from cpg_ros.ros.node.polled import best_effort, PolledSubscription
 from cpg_ros.ros.panel import pages as requests
 from cpg_ros.ros.panel.pages import MOST, Page, Pages, Request, RequestError, SLOW
-from cpg_ros.ros.panel.robot_view import BridgeViews, RobotView, STOPS
+from cpg_ros.ros.panel.robot_view import BridgeViews, HEALTH, RobotView, STOPS, Subscriptions
 from cpg_ros.ros.panel.teleop import LeaseError
 from cpg_ros.ros.panel.web_server import AccessControl, token_for, WebServer
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-# Progress of generators that are still starting, from /diagnostics.
-
 #: FRESH: time after its last status for which a node counts as starting, s.
 FRESH = 4.0
-
-
-class StartWatch:
-    """Follows starts, while it is on: it need not be, once there is a generator."""
-
-    def __init__(self, watch: Node) -> None:
-        """Follow nothing yet; ``watch`` subscribes, and is not spun."""
-        self._watch = watch
-        self._topic: PolledSubscription | None = None
-        self._text, self._when = '', 0.0
-
-    def update(self, on: bool) -> str:
-        """Return the text on the progress of the node that starts, '' if it is not known."""
-        if not on:
-            self.close()
-            return ''
-        if self._topic is None:
-            self._topic = PolledSubscription(self._watch, DiagnosticArray, '/diagnostics',
-                                             best_effort(20), overridable=False)
-        for message, _ in self._topic.receive():
-            for status in message.status:
-                node, _, part = status.name.partition(': ')
-                if part == START:
-                    self._text = f'{node} is starting: {status.message}'
-                    self._when = time.monotonic()
-        return self._text if time.monotonic() < self._when + FRESH else ''
-
-    def close(self) -> None:
-        """End the subscription."""
-        if self._topic is not None:
-            self._topic.close()
-            self._topic = None
-
 
 # Records the topics of a robot into bags, one after another, in a thread of its own.
 
@@ -156,18 +121,14 @@ class Recorder:
     def _record(self, recorder: BagRecorder) -> None:
         why = ''
         try:
-            while not self._stop.wait(EVERY):
-                recorder.take()
-                if recorder.size > self._largest:
-                    why = f'{self.bag} is full ({recorder.size / 1e6:.0f} MB)'
-                    break
+            with closing(recorder):
+                while not self._stop.wait(EVERY):
+                    recorder.poll()
+                    if recorder.size > self._largest:
+                        why = f'{self.bag} is full ({recorder.size / 1e6:.0f} MB)'
+                        break
         except BagError as error:
-            why = self._shown(error)
-        finally:
-            try:
-                recorder.close()
-            except BagError as error:
-                why = why or self._shown(error)
+            why = why or self._shown(error)
         if why:
             self._ended(why)
 
@@ -197,11 +158,9 @@ class Recorder:
             # Several pages may download it at once.
             with self._packing:
                 if not archive.is_file():
-                    part = archive.with_suffix('.part')
-                    with zipfile.ZipFile(part, 'w', zipfile.ZIP_DEFLATED) as packed:
-                        for file in sorted(path.iterdir()):
-                            packed.write(file, f'{bag}/{file.name}')
-                    part.replace(archive)
+                    part = shutil.make_archive(str(archive.with_suffix('.part')), 'zip',
+                                               self._folder, bag)
+                    Path(part).replace(archive)
             return archive.read_bytes()
         except OSError as error:
             raise BagError(self._shown(error)) from error
@@ -272,12 +231,12 @@ class RequestHandler:
             await asyncio.to_thread(view.push, values['force'], values['direction'])
         elif action == 'record':
             await self._record(view, values['on'])
-        elif action in ('reset', 'fit'):
-            nodes, robot = {'reset': (view.graph.simulations, 'simulated robot'),
-                           'fit': (view.graph.inversions, 'inversion node')}[action]
-            node = view.graph.beside(view.name, nodes)
+        elif action == 'reset':
+            await self.command(page, view.simulation(), Trigger, action, FIT)
+        elif action == 'fit':
+            node = view.graph.beside(view.name, view.graph.inversions)
             if not node:
-                raise RequestError(f'there is no {robot} for {view.name}')
+                raise RequestError(f'there is no inversion node for {view.name}')
             await self.command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
@@ -336,8 +295,8 @@ def _stamp(request: Request) -> float:
 
 
 NAME = 'cpg_panel'
-#: FRAMES: frames per second that pages get; LOOK: period in which the graph is searched, s.
-FRAMES, LOOK = 30.0, 0.5
+#: FRAMES: frames per second that pages get; UPDATE: period in which the graph is searched, s.
+FRAMES, UPDATE = 30.0, 0.5
 
 SPECS = fixed({
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
@@ -380,7 +339,8 @@ class Panel(StartedNode):
         self._calls = ServiceClients(self)
         self._views: dict[str, RobotView] = {}
         self._bridges = BridgeViews(self._watch, self._calls)
-        self._graph, self._starting, self._starts = Graph(), '', StartWatch(self._watch)
+        self._graph, self._starting, self._start = Graph(), '', ('', 0.0)
+        self._health = Subscriptions(self._watch)
         self._recorder = Recorder(
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
@@ -429,17 +389,20 @@ class Panel(StartedNode):
             self.get_logger().warning('anyone on this network who has the token can '
                                       'open the page, and nothing is encrypted')
         loop = asyncio.get_running_loop()
-        due, looked = loop.time(), -LOOK
+        due, updated = loop.time(), -UPDATE
         while not self.stop.is_set():
-            if due - looked >= LOOK:
-                looked = due
-                self._look()
+            if due - updated >= UPDATE:
+                updated = due
+                self._update()
+            statuses = [status for message in self._health.receive('/diagnostics')
+                        for status in message.status]
+            self._note_starts(statuses)
             for view in self._views.values():
                 view.teleop.beat(loop.time())
                 if pages := self._pages.of(view.name):
-                    view.news()
+                    view.news(statuses)
                     self._pages.frame(pages, view.frame(), loop.time())
-            if message := self._bridges.news():
+            if message := self._bridges.news(statuses):
                 self._pages.send(self._pages.everyone, message)
             self._lease_news()
             due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
@@ -451,9 +414,10 @@ class Panel(StartedNode):
         server.close()
         await server.wait_closed()
 
-    def _look(self) -> None:
-        graph = discover(self)
-        starting = self._starts.update(not graph.generators)
+    def _update(self) -> None:
+        graph, (text, when) = discover(self), self._start
+        starting = text if not graph.generators and time.monotonic() < when + FRESH else ''
+        self._health.follow(HEALTH if self._pages.everyone or not graph.generators else {})
         if (graph, starting) != (self._graph, self._starting):
             self._graph, self._starting = graph, starting
             self._pages.send(self._pages.everyone, self._state())
@@ -470,6 +434,13 @@ class Panel(StartedNode):
             # A page never changes to another robot by itself.
             if not page.node and (first := self._first()):
                 self._choose(page, first)
+
+    def _note_starts(self, statuses: Iterable[DiagnosticStatus]) -> None:
+        """Note the progress of a node that is still starting."""
+        for status in statuses:
+            node, _, part = status.name.partition(': ')
+            if part == START:
+                self._start = f'{node} is starting: {status.message}', time.monotonic()
 
     def _lease_news(self) -> None:
         """Send each page the state of its robot's lease, if that has changed."""
@@ -569,7 +540,3 @@ def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     return run(Panel, NAME, 'Shows, drives and records what is on the graph in a browser.', SPECS,
                args, 'panel')
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -15,7 +15,7 @@
 """A generator with its robot, and the bridges on the graph, as pages show them."""
 
 import asyncio
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 import math
 import re
 import time
@@ -41,6 +41,7 @@ from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent, ParameterType
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import SetBool, Trigger
@@ -60,6 +61,43 @@ def unit(text: str) -> str:
     """Return the unit in a description, as in ``rate [Hz]``; '' if it has none."""
     match = re.search(r'\[([^\]]+)\]', text)
     return match[1] if match else ''
+
+
+#: HEALTH: topic on which nodes publish their health, with its type and quality.
+HEALTH = {'/diagnostics': (DiagnosticArray, best_effort(20))}
+
+
+class Subscriptions:
+    """Topics that are subscribed to and polled."""
+
+    def __init__(self, watch: Node) -> None:
+        """Follow no topic; ``watch`` subscribes, and is not spun."""
+        self._watch = watch
+        self._topics: dict[str, PolledSubscription] = {}
+
+    def follow(self, topics: Mapping[str, tuple[type, QoSProfile | None]]) -> None:
+        """Subscribe to these topics, name -> type and quality, and to no others."""
+        for name in set(self._topics) - set(topics):
+            self._topics.pop(name).close()
+        for name, (kind, quality) in topics.items():
+            if name not in self._topics:
+                self._topics[name] = PolledSubscription(self._watch, kind, name, quality,
+                                                        overridable=False)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the topics."""
+        return list(self._topics)
+
+    def receive(self, name: str) -> list[Any]:
+        """Return the messages that have arrived on a topic, none of one that is not followed."""
+        topic = self._topics.get(name)
+        return [message for message, _ in topic.receive()] if topic else []
+
+    def newest(self, name: str) -> Any:
+        """Return the newest message that has arrived on a topic, None for none."""
+        topic = self._topics.get(name)
+        return topic.newest() if topic else None
 
 
 class Controls:
@@ -203,16 +241,16 @@ async def robot_info(watch: Node, services: ServiceClients, graph: Graph, genera
 
 async def _once(watch: Node, kind: type, name: str) -> Any:
     """Return a topic's next or latched message, None if none arrives in time."""
-    topic = PolledSubscription(watch, kind, name, latched() if kind is String else None,
-                               overridable=False)
+    topic = Subscriptions(watch)
+    topic.follow({name: (kind, latched() if kind is String else None)})
     try:
         for _ in range(round(SILENCE / 0.02)):
-            if (message := topic.newest()) is not None:
+            if (message := topic.newest(name)) is not None:
                 return message
             await asyncio.sleep(0.02)
         return None
     finally:
-        topic.close()
+        topic.follow({})
 
 
 class RobotView:
@@ -241,7 +279,7 @@ class RobotView:
         """
         self.name, self._space = name, namespace(name)
         self._node, self._watch, self._services = node, watch, services
-        self._report, self._send = report, send
+        self._report, self._send, self._topics = report, send, Subscriptions(watch)
         self.controls = Controls(NodeClient(services, name), report)
         # A client that the generator does not know yet would delay a stop.
         services.client(SetBool, f'{name}/enable')
@@ -250,7 +288,6 @@ class RobotView:
             node, f'{self._space}/cmd_vel', fastest,
             lambda: self.controls.value('stamped_cmd_vel') is True)
         self.graph = Graph()
-        self._topics: dict[str, PolledSubscription] = {}
         self._latest: dict[str, dict[str, Any]] = {}
         self._joints: dict[str, float] = {}
         self._names: dict[str, list[str]] = {}
@@ -316,7 +353,6 @@ class RobotView:
                             and name.removeprefix(f'{space}/').count('/') == 1]
         topics = {**{name: (JointState, best_effort()) for name in joints},
                   f'{self.name}/gait': (String, latched()),
-                  '/diagnostics': (DiagnosticArray, best_effort(20)),
                   '/parameter_events': (ParameterEvent, best_effort(100))}
         optional = {f'{self.name}/phase': Float64MultiArray, f'{self.name}/cells':
                     Float64MultiArray, f'{space}/foot_contacts': Float64MultiArray}
@@ -324,24 +360,15 @@ class RobotView:
                        if (name, floats) in graph.topics})
         if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
             topics[f'{space}/odom'] = Odometry, best_effort()
-        topics = topics if listening else {}
-        for name in set(self._topics) - set(topics):
-            self._topics.pop(name).close()
-        for name, (kind, quality) in topics.items():
-            if name not in self._topics:
-                self._topics[name] = PolledSubscription(self._watch, kind, name, quality,
-                                                        overridable=False)
-
-    def _newest(self, name: str) -> Any:
-        topic = self._topics.get(name)
-        return topic.newest() if topic else None
+        self._topics.follow(topics if listening else {})
 
     def frame(self) -> dict[str, Any]:
         """Return the values that changed since the last frame."""
         values: dict[str, Any] = {}
         fresh = False
-        for name in [name for name in self._topics if name.endswith('/joint_states')]:
-            if (joints := self._newest(name)) is not None:
+        for name in self._topics.names:
+            if (name.endswith('/joint_states')
+                    and (joints := self._topics.newest(name)) is not None):
                 self._joints.update(zip(joints.name, joints.position, strict=False))
                 values['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
                 fresh = True
@@ -350,7 +377,7 @@ class RobotView:
             values['angles'] = _short(self._joints.values())
         for key, name in (('phases', f'{self.name}/phase'), ('cells', f'{self.name}/cells'),
                           ('forces', f'{self._space}/foot_contacts')):
-            if (message := self._newest(name)) is not None:
+            if (message := self._topics.newest(name)) is not None:
                 dimensions = message.layout.dim
                 if dimensions:
                     self._names_message(key, dimensions[0].label.split(',')
@@ -358,7 +385,7 @@ class RobotView:
                                         [f'{dimension.label}:{dimension.size}'
                                          for dimension in dimensions])
                 values[key] = _short(message.data)
-        if (moved := self._newest(f'{self._space}/odom')) is not None:
+        if (moved := self._topics.newest(f'{self._space}/odom')) is not None:
             position, rotation = moved.pose.pose.position, moved.pose.pose.orientation
             speed = moved.twist.twist
             values['base'] = _short((position.x, position.y, position.z,
@@ -374,35 +401,29 @@ class RobotView:
             self._names[key] = names
             self._keep({'type': 'names', **self._names})
 
-    def news(self) -> None:
-        """Send the pages the gait, changed parameters and health."""
-        if (gait := self._newest(f'{self.name}/gait')) is not None:
+    def news(self, statuses: Iterable[DiagnosticStatus]) -> None:
+        """Send the pages the gait, changed parameters and, of new statuses, the health."""
+        if (gait := self._topics.newest(f'{self.name}/gait')) is not None:
             self._keep({'type': 'gait', 'gait': gait.data})
-        if events := self._topics.get('/parameter_events'):
-            for event, _ in events.receive():
-                # A node of the same name has started again.
-                self._stale |= event.node == self.name and bool(event.new_parameters)
-                if values := self.controls.update(event):
-                    self._send({'type': 'values', 'values': values})
-        if health := self._topics.get('/diagnostics'):
-            beside = (self.graph.beside(self.name, kind)
-                      for kind in (self.graph.simulations, self.graph.bridges))
-            owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
-            for message, _ in health.receive():
-                for status in message.status:
-                    if status.name.startswith(owners):
-                        self._keep_health(status)
-
-    def _keep_health(self, status: Any) -> None:
-        parts = {**self._latest.get('health', {}).get('parts', {}), status.name: {
-            'level': level(status), 'text': status.message,
-            'values': {value.key: value.value for value in status.values}}}
-        self._keep({'type': 'health', 'parts': parts})
+        for event in self._topics.receive('/parameter_events'):
+            # A node of the same name has started again.
+            self._stale |= event.node == self.name and bool(event.new_parameters)
+            if values := self.controls.update(event):
+                self._send({'type': 'values', 'values': values})
+        beside = (self.graph.beside(self.name, kind)
+                  for kind in (self.graph.simulations, self.graph.bridges))
+        owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
+        if parts := {status.name: {
+                'level': level(status), 'text': status.message,
+                'values': {value.key: value.value for value in status.values}}
+                for status in statuses if status.name.startswith(owners)}:
+            self._keep({'type': 'health', 'parts': {
+                **self._latest.get('health', {}).get('parts', {}), **parts}})
 
     # -- actions ----------------------------------------------------------------------------
 
-    def push(self, force: float, direction: float) -> None:
-        """Push the robot with a force, N, in a direction, degrees from ahead to the left.
+    def simulation(self) -> str:
+        """Return the node that simulates the robot.
 
         Raises:
             CallError: it is not simulated.
@@ -411,6 +432,16 @@ class RobotView:
         simulation = self.graph.beside(self.name, self.graph.simulations)
         if not simulation:
             raise CallError(f'there is no simulated robot for {self.name}')
+        return simulation
+
+    def push(self, force: float, direction: float) -> None:
+        """Push the robot with a force, N, in a direction, degrees from ahead to the left.
+
+        Raises:
+            CallError: it is not simulated.
+
+        """
+        simulation = self.simulation()
         if self._pushes is None:
             self._pushes = self._node.create_publisher(Wrench, f'{simulation}/push', 10)
         end = time.monotonic() + 1.0
@@ -460,9 +491,7 @@ class BridgeViews:
             services: clients of other nodes.
 
         """
-        self._watch, self._services = watch, services
-        self._health: PolledSubscription | None = None
-        self._states: dict[str, PolledSubscription] = {}
+        self._services, self._states = services, Subscriptions(watch)
         self._shown: dict[str, dict[str, Any]] = {}
         self._when: dict[str, float] = {}
         self.message: dict[str, Any] = {}
@@ -481,30 +510,19 @@ class BridgeViews:
             # A client that the bridge does not know yet would delay a stop.
             for service in STOPS.values():
                 self._services.client(Trigger, f'{name}/{service}')
-        followed = names if listening else set()
-        for name in set(self._states) - followed:
-            self._states.pop(name).close()
-        for name in followed - set(self._states):
-            self._states[name] = PolledSubscription(self._watch, String, f'{name}/state',
-                                                    latched(), overridable=False)
-        if followed and self._health is None:
-            self._health = PolledSubscription(self._watch, DiagnosticArray, '/diagnostics',
-                                              best_effort(20), overridable=False)
-        elif not followed and self._health is not None:
-            self._health.close()
-            self._health = None
+        self._states.follow({f'{name}/state': (String, latched())
+                             for name in (names if listening else ())})
 
-    def news(self) -> dict[str, Any] | None:
-        """Return the message for pages if it has changed, otherwise None."""
-        for name, topic in self._states.items():
-            if (state := topic.newest()) is not None:
-                self._shown[name]['state'] = state.data[:LONGEST]
+    def news(self, statuses: Iterable[DiagnosticStatus]) -> dict[str, Any] | None:
+        """Return the message for pages, None if new statuses and states do not change it."""
         now = time.monotonic()
-        for message, _ in self._health.receive() if self._health is not None else ():
-            for status in message.status:
-                if (name := status.name.partition(': ')[0]) in self._shown:
-                    self._when[name] = now
-                    self._shown[name].update(_read(status))
+        for name in self._shown:
+            if (state := self._states.newest(f'{name}/state')) is not None:
+                self._shown[name]['state'] = state.data[:LONGEST]
+        for status in statuses:
+            if (name := status.name.partition(': ')[0]) in self._shown:
+                self._when[name] = now
+                self._shown[name].update(_read(status))
         for name, when in self._when.items():
             if now > when + STALE:
                 self._shown[name].update(level='stale', text=f'no status for {STALE:g} s')
@@ -521,20 +539,16 @@ class BridgeViews:
 
 def _read(status: DiagnosticStatus) -> dict[str, Any]:
     """Return the part of a bridge's status that pages show."""
-    bridge: dict[str, Any] = {'level': level(status),
-                              'text': status.message[:LONGEST], 'battery': None, 'hottest': None}
-    heat: list[tuple[float, str]] = []
-    for pair in status.values:
-        try:
-            value = float(pair.value)
-        except ValueError:
-            continue
-        if not math.isfinite(value):
-            continue
-        if pair.key == 'battery [%]':
-            bridge['battery'] = value
-        elif pair.key.endswith('[deg C]'):
-            heat.append((value, pair.key.removesuffix('[deg C]').strip()[:LONGEST]))
-    if heat:
-        bridge['hottest'] = max(heat)
-    return bridge
+    values = {pair.key: value for pair in status.values
+              if math.isfinite(value := _number(pair.value))}
+    heat = [(value, key.removesuffix('[deg C]').strip()[:LONGEST])
+            for key, value in values.items() if key.endswith('[deg C]')]
+    return {'level': level(status), 'text': status.message[:LONGEST],
+            'battery': values.get('battery [%]'), 'hottest': max(heat, default=None)}
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

@@ -42,7 +42,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, RobotError
 from cpg_ros.motion.rotations import rotation
 from cpg_ros.ros.panel.pages import LONGEST
-from cpg_ros.simulation.robot_model import engine, legs, load
+from cpg_ros.simulation.robot_model import engine, load
 import numpy as np
 
 #: Number of corners of a circle.
@@ -109,8 +109,8 @@ class Shape:
         """Return the message for a page: base64 of float32 triangles and uint8 colours."""
         links = []
         for link in self.links:
-            corners = (np.concatenate(link.vertices) if link.vertices else np.zeros((0, 3, 3)))
-            colours = (np.concatenate(link.colours) if link.colours else np.zeros((0, 3)))
+            corners = np.concatenate([np.zeros((0, 3, 3)), *link.vertices])
+            colours = np.concatenate([np.zeros((0, 3)), *link.colours])
             links.append({
                 'name': link.name, 'parent': link.parent, 'joint': link.joint,
                 'slides': link.slides, 'zero': link.zero,
@@ -272,9 +272,6 @@ def from_model(name: str, robot: Robot) -> Shape:
             continue
         index[body] = _links(mujoco, model, body, parent, shape)
         _draw(mujoco, model, body, shape.links[index[body]])
-    for leg in legs(robot):
-        end = max(model.joint(joint.name).bodyid[0] for joint in robot.legs[leg])
-        shape.feet[leg] = index[end], _lowest(shape.links[index[end]])
     return shape
 
 
@@ -334,15 +331,6 @@ def _triangles(mujoco: Any, model: Any, k: int) -> np.ndarray | None:
     if kind == kinds.mjGEOM_ELLIPSOID:
         return sphere(1.0) * size
     return None
-
-
-def _lowest(link: Link) -> np.ndarray:
-    """Return the point of a link's triangles that is farthest from its joint."""
-    if not link.vertices:
-        return np.zeros(3)
-    corners = np.concatenate(link.vertices).reshape(-1, 3)
-    away = np.linalg.norm(corners, axis=1)
-    return corners[away > 0.95 * away.max()].mean(axis=0)
 
 
 def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
@@ -552,16 +540,20 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
 
     """
     robot = shipped_robot(info.robot)
-    for make in (_from_urdf, _from_description, _from_model):
+    for make in (
+            lambda: from_file(Path(info.urdf).expanduser(), report) if info.urdf else None,
+            lambda: (from_text(info.description, 'robot_description', report)
+                     if info.description else None),
+            lambda: _from_model(info, robot, report) if robot else None):
         try:
-            shape = make(info, robot, report)
-            if shape is not None and (size := len(json.dumps(shape.message()))) > LONGEST:
+            shape = make()
+            if shape and (size := len(json.dumps(shape.message()))) > LONGEST:
                 raise ShapeError(f'{shape.source} is not drawn: its shape has {size / 1e6:.3g} '
                                  f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
         except (CpgError, OSError) as error:
             report(str(error))
             continue
-        if shape is not None:
+        if shape:
             # The generator respects the robot file's limits.
             shape.limits.update(_limits(robot))
             _with_feet(shape, info, robot)
@@ -573,34 +565,17 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     return _sticks(info, robot)
 
 
-def _from_urdf(info: RobotInfo, _: Robot | None, report: Callable[[str], None]) -> Shape | None:
-    return from_file(Path(info.urdf).expanduser(), report) if info.urdf else None
-
-
-def _from_description(info: RobotInfo, _: Robot | None, report: Callable[[str], None]
-                      ) -> Shape | None:
-    if not info.description:
-        return None
-    return from_text(info.description, 'robot_description', report)
-
-
-def _from_model(info: RobotInfo, robot: Robot | None,
-                report: Callable[[str], None]) -> Shape | None:
-    if robot is None:
-        return None
+def _from_model(info: RobotInfo, robot: Robot, report: Callable[[str], None]) -> Shape | None:
     model = info.model
     if '/' in model or model.endswith(('.xml', '.urdf')):
         report(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
                         'node names; publish robot_description, or start the panel with '
                         '-p urdf:=FILE'))
         model = ''
-    shipped = not model
     model = model or SHIPPED.get(info.robot, '')
-    if not model:
-        return None
-    if shipped and model.endswith('.urdf'):
+    if model.endswith('.urdf'):
         return from_file(resource_folder('urdf') / model, report)
-    return from_model(model, robot)
+    return from_model(model, robot) if model else None
 
 
 def _limits(robot: Robot | None) -> dict[str, tuple[float, float]]:
@@ -620,25 +595,22 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
         if not ends or leg in shape.feet:
             continue
         end = max(ends)
-        # A link that is fixed to the last joint's link is the foot.
-        position = shape.links[end].position * 0.0
+        # A link that is fixed to the last joint's link is the foot; else it is what is farthest
+        # from the joint.
         tips = [link for link in shape.links if link.parent == end and not link.joint]
-        if tips:
-            position = tips[-1].position
-        elif shape.links[end].vertices:
-            corners = shape.links[end].vertices[-1].reshape(-1, 3)
-            position = corners.mean(axis=0)
-        shape.feet[leg] = end, position
+        corners = np.concatenate([np.zeros((1, 3, 3)), *shape.links[end].vertices]).reshape(-1, 3)
+        away = np.linalg.norm(corners, axis=1)
+        shape.feet[leg] = end, (tips[-1].position if tips else
+                                corners[away >= 0.95 * away.max()].mean(axis=0))
 
 
 def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
+    legs, name = _legs(info, robot), robot.name if robot else info.robot or 'a robot'
     if robot is None:
-        legs, name = info.legs, info.robot or 'a robot'
         # Corners of the body for legs named as in the shipped networks: lh rh lf rf, left right.
         quarters = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
                   for leg in legs}
     else:
-        legs, name = _legs(info, robot), robot.name
         quarters = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
                         -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
     return draw(name, legs, quarters, _limits(robot))

@@ -51,9 +51,7 @@ class Lease:
     """
 
     def __init__(self) -> None:
-        self.holder: Hashable | None = None
-        self.confirmed: frozenset[bytes] = frozenset()
-        self._last_command = 0.0
+        self._pass_to(None, 0.0)
 
     def acquire(self, who: Hashable, now: float) -> None:
         """Give the lease to ``who``, if it is free or already theirs; now is in s.
@@ -63,10 +61,10 @@ class Lease:
 
         """
         if self.holder is None:
-            self._pass_to(who, frozenset())
+            self._pass_to(who, now)
         elif self.holder != who:
             raise LeaseError(f'{self.holder} has control of the robot: take over first')
-        self._last_command = now
+        self.renew(who, now)
 
     def take_over(self, who: Hashable, now: float,
                   others: frozenset[bytes] = frozenset()) -> Hashable | None:
@@ -77,8 +75,7 @@ class Lease:
 
         """
         lost = None if self.holder == who else self.holder
-        self._pass_to(who, others)
-        self._last_command = now
+        self._pass_to(who, now, others)
         return lost
 
     def renew(self, who: Hashable, now: float) -> None:
@@ -90,7 +87,7 @@ class Lease:
         """Give the lease back; return whether ``who`` held it."""
         held = self.holder is not None and who == self.holder
         if held:
-            self._pass_to(None, frozenset())
+            self._pass_to(None, 0.0)
         return held
 
     def expire(self, now: float) -> Hashable | None:
@@ -98,11 +95,12 @@ class Lease:
         holder = self.holder
         if holder is None or now - self._last_command <= SILENCE:
             return None
-        self._pass_to(None, frozenset())
+        self._pass_to(None, now)
         return holder
 
-    def _pass_to(self, who: Hashable | None, others: frozenset[bytes]) -> None:
-        self.holder, self.confirmed = who, others
+    def _pass_to(self, who: Hashable | None, now: float,
+                 others: frozenset[bytes] = frozenset()) -> None:
+        self.holder, self._last_command, self.confirmed = who, now, others
 
 
 #: HOLD: largest age of a command when it is published, s; an older one counts as zero.
