@@ -84,7 +84,7 @@ class BagRecorder:
         self.counts[topic] = 0
         return True
 
-    def take(self) -> None:
+    def poll(self) -> None:
         """Write what has arrived, in the order of arrival.
 
         Raises:

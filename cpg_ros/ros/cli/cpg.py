@@ -71,12 +71,12 @@ def shell_code() -> str:
     return str(shellcode(['cpg']))
 
 
-def _looked_up(look: Callable[['Node'], list[Any]]) -> list[Any]:
+def _completed(query: Callable[['Node'], list[Any]]) -> list[Any]:
     import rclpy
     from rclpy.utilities import try_shutdown
     rclpy.init(args=[])
     try:
-        return look(rclpy.create_node('cpg_completion', enable_rosout=False))
+        return query(rclpy.create_node('cpg_completion', enable_rosout=False))
     except CpgError:
         # No node responds, so there is nothing to offer.
         return []
@@ -84,17 +84,11 @@ def _looked_up(look: Callable[['Node'], list[Any]]) -> list[Any]:
         try_shutdown()
 
 
-def _of_node(args: Namespace, look: Callable[['NodeClient'], Coroutine[Any, Any, list[Any]]]
+def _of_node(args: Namespace, query: Callable[['NodeClient'], Coroutine[Any, Any, list[Any]]]
              ) -> list[Any]:
     from cpg_ros.ros.node.client import NodeClient, ServiceClients
-    return _looked_up(lambda node: asyncio.run(
-        look(NodeClient(ServiceClients(node, PATIENCE), args.node))))
-
-
-def _choices(args: Namespace, name: str) -> list[str]:
-    from cpg_ros.ros.node.parameters import choices
-    return [word for value in _of_node(args, lambda other: other.descriptors([name]))
-            for word in choices(value.additional_constraints)]
+    return _completed(lambda node: asyncio.run(
+        query(NodeClient(ServiceClients(node, PATIENCE), args.node))))
 
 
 def complete_parameters(parsed_args: Namespace, **_: Any) -> list[str]:
@@ -102,25 +96,19 @@ def complete_parameters(parsed_args: Namespace, **_: Any) -> list[str]:
     return _of_node(parsed_args, lambda other: other.parameters())
 
 
-def gaits(parsed_args: Namespace, **_: Any) -> list[str]:
-    """Return the gaits of the node."""
-    return _choices(parsed_args, 'gait')
-
-
 def values(parsed_args: Namespace, **_: Any) -> list[str]:
-    """Return the values of a parameter that has a list of choices."""
-    return _choices(parsed_args, parsed_args.parameter)
+    """Return the values of the parameter, or of the gait, that has a list of choices."""
+    from cpg_ros.ros.node.parameters import choices
+    name = getattr(parsed_args, 'parameter', 'gait')
+    return [word for value in _of_node(parsed_args, lambda other: other.descriptors([name]))
+            for word in choices(value.additional_constraints)]
 
 
 def complete_topics(parsed_args: Namespace, **_: Any) -> list[str]:
     """Return the graph's topics."""
     from cpg_ros.ros.cli.graph import topics as graph_topics
-    return _looked_up(lambda node: list(graph_topics(node)))
+    return _completed(lambda node: list(graph_topics(node)))
 
-
-if TYPE_CHECKING:
-    from cpg_ros.ros.node.client import NodeClient
-    from rclpy.node import Node
 
 DESCRIPTION = """\
 Run an executable of the package, or inspect, change, record and play back a running graph: a small
@@ -165,9 +153,11 @@ def parser() -> Parser:
     # Without defaults, which would replace what stands before the action.
     anywhere = _common(SUPPRESS, SUPPRESS)
 
-    def add(group: Any, name: str, text: str) -> Any:
-        return group.add_parser(name, help=text, description=text.capitalize() + '.',
-                                parents=[] if name in ('run', 'completion') else [anywhere])
+    def add(group: Any, name: str, text: str, do: Any = _called) -> Any:
+        action = group.add_parser(name, help=text, description=text.capitalize() + '.',
+                                  parents=[] if name in ('run', 'completion') else [anywhere])
+        action.set_defaults(do=do)
+        return action
 
     action = add(actions, 'run', 'run an executable of the package')
     action.add_argument('executable', choices=[name for name in EXECUTABLES if name != 'cpg'],
@@ -175,7 +165,7 @@ def parser() -> Parser:
     action.add_argument('arguments', nargs=REMAINDER, metavar='...',
                         help='arguments of the executable')
     gait = add(actions, 'gait', 'switch the gait')
-    gait.add_argument('gait', metavar='NAME').completer = gaits
+    gait.add_argument('gait', metavar='NAME').completer = values
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
                        ('reset', 'reset robot_sim to its start (--node /robot_sim)')):
         add(actions, name, text).set_defaults(service='reset')
@@ -195,18 +185,19 @@ def parser() -> Parser:
 
     topics = add(actions, 'topic', "a graph's topics").add_subparsers(
         dest='what', required=True, metavar='{list,echo,hz}')
-    add(topics, 'list', 'print all topics and their types')
-    echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
+    add(topics, 'list', 'print all topics and their types', _listened)
+    echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C', _listened)
     echo.add_argument('--once', action='store_true', help='print the next message only')
-    for action in (echo, add(topics, 'hz', 'measure the message rate of a topic for 3 s')):
+    for action in (echo, add(topics, 'hz', 'measure the message rate of a topic for 3 s',
+                            _listened)):
         action.add_argument('topic', metavar='TOPIC').completer = complete_topics
 
-    record = add(actions, 'record', 'record topics into a bag until Ctrl-C')
+    record = add(actions, 'record', 'record topics into a bag until Ctrl-C', _recorded)
     record.add_argument('bag', type=Path, metavar='BAG', help='folder to create')
     recorded = record.add_argument('topics', nargs='*', metavar='TOPIC',
                                    help='topics to record (default: all published topics)')
     recorded.completer = complete_topics
-    play = add(actions, 'play', 'publish the messages of a bag')
+    play = add(actions, 'play', 'publish the messages of a bag', _played)
     play.add_argument('bag', type=Path, metavar='BAG', help='folder, or one of its files')
     play.add_argument('topics', nargs='*', metavar='TOPIC', help='topics to play (default: all)')
     play.add_argument('--rate', type=rate, default=1.0, metavar='R',
@@ -274,19 +265,17 @@ async def _call(args: Namespace, other: 'NodeClient') -> str:
         from cpg_ros.ros.cli.graph import play_schedule
         return await play_schedule(args.schedule, other, args.rate)
     if args.action == 'gait':
-        await other.set_parameters({'gait': args.gait}, ANSWER)
-    elif args.what == 'set':
+        args.what, args.parameter, args.value = 'set', 'gait', args.gait
+    if args.what == 'set':
         await other.set_parameters({args.parameter: args.value}, ANSWER)
-    elif args.what == 'get':
+        return f'{other.name}: {args.parameter} is {args.value}'
+    if args.what == 'get':
         value, = await other.values([args.parameter])
         if value is None:
             raise CallError(f"{other.name} has no parameter '{args.parameter}'")
         return str(value)
-    else:
-        names = await other.parameters()
-        return '\n'.join(f'{descriptor.name}  {descriptor.description}'
-                         for descriptor in await other.descriptors(names))
-    return ''
+    return '\n'.join(f'{descriptor.name}  {descriptor.description}'
+                     for descriptor in await other.descriptors(await other.parameters()))
 
 
 def _listened(args: Namespace, node: 'Node') -> str:
@@ -317,11 +306,6 @@ def _played(args: Namespace, node: 'Node') -> str:
     from cpg_ros.ros.cli.graph import play
     counts = play(node, args.bag, args.topics, args.rate)
     return '\n'.join(f'{topic}: {count} messages' for topic, count in counts.items())
-
-
-_DOERS = {'param': _called, 'gait': _called, 'enable': _called, 'disable': _called,
-          'reset': _called, 'call': _called, 'play-schedule': _called, 'topic': _listened,
-          'record': _recorded, 'play': _played}
 
 
 @contextmanager
@@ -358,7 +342,7 @@ def _do(args: Namespace) -> int:
         answer = shell_code()
     else:
         with _graph() as node:
-            answer = _DOERS[args.action](args, node)
+            answer = args.do(args, node)
     if answer:
         say(answer)
     return 0
@@ -375,7 +359,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if argv[0] in EXECUTABLES and argv[0] != 'cpg':
         argv.insert(0, 'run')
     return run(top, _do, argv, stopped='')
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -46,7 +46,6 @@ from cpg_ros.ros.cli.demo_parts import (
 )
 from geometry_msgs.msg import Twist, Wrench
 import rclpy
-from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
@@ -74,15 +73,8 @@ def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
         check: called repeatedly; an exception from it ends the run.
 
     """
-    steer = robot.create_publisher(Twist, 'cmd_vel', 10)
-    try:
-        return _walk(robot, check, steer)
-    finally:
-        robot.destroy_publisher(steer)
-
-
-def _walk(robot: Operator, check: Callable[[], None], steer: Publisher) -> bool:
-    push = robot.create_publisher(Wrench, 'robot_sim/push', 10)
+    steer, push = (robot.create_publisher(Twist, 'cmd_vel', 10),
+                   robot.create_publisher(Wrench, 'robot_sim/push', 10))
     forward = Twist()
     forward.linear.x = SPEED
     stages, pushes, began = list(STAGES), list(PUSHES), robot.time
@@ -92,27 +84,30 @@ def _walk(robot: Operator, check: Callable[[], None], steer: Publisher) -> bool:
         say(f'{robot.time - began:5.1f} s  {text:<24} at x {x:5.2f} m, y {y:+5.2f} m')
 
     report('flat ground')
-    while robot.time < began + LONGEST:
-        rclpy.spin_once(robot, timeout_sec=0.05)
-        check()
-        steer.publish(forward)
-        x, _ = robot.place
-        if robot.upright < FALLEN:
-            report('the robot has fallen')
-            return False
-        if stages and x > stages[0][0]:
-            report(stages.pop(0)[1])
-        if pushes and x > pushes[0][0]:
-            impulse = pushes.pop(0)[1]
-            wrench = Wrench()
-            wrench.force.y = impulse / PUSH
-            push.publish(wrench)
-            report(f'a push of {impulse:+.0f} N s')
-        if x > END:
-            report('the end of the course')
-            return True
-    report('time is up')
-    return False
+    try:
+        while robot.time < began + LONGEST:
+            rclpy.spin_once(robot, timeout_sec=0.05)
+            check()
+            steer.publish(forward)
+            x, _ = robot.place
+            if robot.upright < FALLEN:
+                report('the robot has fallen')
+                return False
+            if stages and x > stages[0][0]:
+                report(stages.pop(0)[1])
+            if pushes and x > pushes[0][0]:
+                impulse = pushes.pop(0)[1]
+                wrench = Wrench()
+                wrench.force.y = impulse / PUSH
+                push.publish(wrench)
+                report(f'a push of {impulse:+.0f} N s')
+            if x > END:
+                report('the end of the course')
+                return True
+        report('time is up')
+        return False
+    finally:
+        robot.destroy_publisher(steer)
 
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
@@ -354,8 +349,7 @@ def demonstrate(args: Namespace) -> int:
                 robot = (HEXAPOD if args.hexapod else _humanoid() if args.humanoid else GO2)
             robot = replace(robot, gaits=tuple(args.tour or robot.gaits))
             operator = Operator(robot.gaits[0])
-            for node in _nodes(args, robot):
-                nodes.append(stack.enter_context(running(*node)))
+            nodes += [stack.enter_context(running(*words)) for words in _nodes(args, robot)]
             if not name:
                 address()
             wait_for(operator, interruption)
@@ -384,7 +378,3 @@ def demonstrate(args: Namespace) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the demonstration; return the exit code."""
     return run(parser(), demonstrate, arguments)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

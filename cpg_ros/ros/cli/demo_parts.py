@@ -123,8 +123,8 @@ class Operator(Node):
     @property
     def upright(self) -> float:
         """Cosine of the angle by which the base leans."""
-        turn = Quaternion() if self.pose is None else self.pose.orientation
-        return float(1.0 - 2.0 * (turn.x**2 + turn.y**2))
+        rotation = Quaternion() if self.pose is None else self.pose.orientation
+        return float(1.0 - 2.0 * (rotation.x**2 + rotation.y**2))
 
 
 # Processes of the demonstration, and what ends it.

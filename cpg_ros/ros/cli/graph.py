@@ -123,15 +123,15 @@ def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
         BagError: something is there already, or the folder cannot be written to.
 
     """
-    recorder, looked = BagRecorder(node, path), 0.0
+    recorder, searched = BagRecorder(node, path), 0.0
     names = [node.resolve_topic_name(name) for name in topics]
     try:
         while True:
-            if time.monotonic() > looked + SEARCH_PERIOD:
-                looked = time.monotonic()
+            if time.monotonic() > searched + SEARCH_PERIOD:
+                searched = time.monotonic()
                 for topic in _subscribed(node, recorder, names):
                     print(f'recording {topic}', file=sys.stderr, flush=True)
-            recorder.take()
+            recorder.poll()
             time.sleep(EVERY)
     except KeyboardInterrupt:
         pass

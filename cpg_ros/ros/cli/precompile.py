@@ -20,6 +20,7 @@ first used.
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 import os
 import subprocess
 import sys
@@ -63,25 +64,26 @@ def compile_part(part: str) -> None:
 
 def compile_parts(parts: Sequence[str]) -> None:
     """Compile parts in a process each, as many at once as there are cores."""
-    began, waiting = time.monotonic(), list(parts)
-    running: dict[str, subprocess.Popen] = {}
+    began = time.monotonic()
     say(f'compiling the numerical kernels, so that no start waits for it: {", ".join(parts)} '
         f'(at most {LIMIT:g} s)')
-    while (waiting or running) and time.monotonic() < began + LIMIT:
-        while waiting and len(running) < (os.cpu_count() or 1):
-            part = waiting.pop(0)
-            running[part] = subprocess.Popen([sys.executable, '-P', '-m', __spec__.name, part])
-        for part in [part for part, process in running.items() if process.poll() is not None]:
-            code = running.pop(part).returncode
-            say(f'  {time.monotonic() - began:3.0f} s  {part}'
-                + (f' failed with exit code {code}' if code else ''))
-        time.sleep(0.1)
-    for process in running.values():
-        process.terminate()
-        process.wait()
-    if unfinished := [*running, *waiting]:
-        say(f'  {time.monotonic() - began:3.0f} s  out of time: {", ".join(unfinished)} will be '
-            'compiled at the first start')
+
+    def compiled(part: str) -> bool:
+        try:
+            code = subprocess.run([sys.executable, '-P', '-m', __spec__.name, part], check=False,
+                                  timeout=max(began + LIMIT - time.monotonic(), 0.0)).returncode
+        except subprocess.TimeoutExpired:
+            return False
+        say(f'  {time.monotonic() - began:3.0f} s  {part}'
+            + (f' failed with exit code {code}' if code else ''))
+        return True
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        in_time = list(threads.map(compiled, parts))
+    if not all(in_time):
+        say(f'  {time.monotonic() - began:3.0f} s  out of time: '
+            + ', '.join(part for part, done in zip(parts, in_time, strict=True) if not done)
+            + ' will be compiled at the first start')
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

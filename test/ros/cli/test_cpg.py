@@ -71,11 +71,12 @@ def unhurried(running):
 def test_parameters_and_topics_of_a_running_generator(unhurried):
     process, watcher = unhurried
     domain = process.domain
-    assert ask(domain, 'gait', 'walk') == (0, '', '')
+    assert ask(domain, 'gait', 'walk') == (0, '/cpg_generator: gait is walk', '')
     assert ask(domain, 'param', 'get', 'gait') == (0, 'walk', '')
     assert watcher.get('gait') == ['walk']
     # An integer for a double.
-    assert ask(domain, 'param', 'set', 'frequency', '2') == (0, '', '')
+    assert ask(domain, 'param', 'set', 'frequency', '2') == (
+        0, '/cpg_generator: frequency is 2', '')
     code, _, why = ask(domain, 'param', 'set', 'delayed.tau', '0.2')
     assert code == 1 and "below the walk's critical delay" in why and '\n' not in why
     code, told, _ = ask(domain, 'param', 'list')
