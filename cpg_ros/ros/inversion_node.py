@@ -97,7 +97,7 @@ class Inversion(StartedNode):
         for topic in topics:
             # The subscription may fall behind during a fit.
             self.create_subscription(
-                JointState, topic, partial(self._hear, topic), best_effort(2000), raw=True,
+                JointState, topic, partial(self._receive, topic), best_effort(2000), raw=True,
                 qos_overriding_options=OVERRIDABLE)
         self._result = self.create_publisher(String, '~/result', latched())
         # Another request is answered while one waits for its fit.
@@ -135,7 +135,7 @@ class Inversion(StartedNode):
         if every > 0.0:
             self._timer = self.create_timer(every, self._again, callback_group=self._group)
 
-    def _hear(self, topic: str, message: bytes) -> None:
+    def _receive(self, topic: str, message: bytes) -> None:
         self._live.add(topic, self.get_clock().now().nanoseconds, message)
 
     async def _again(self) -> None:
@@ -222,14 +222,14 @@ class Inversion(StartedNode):
                       + (f'start it with --params-file {written}' if written else
                          "start this node with 'out', and it with the file written there"))
 
-    async def _set(self, target: NodeClient, found: RecordingFit) -> bool:
+    async def _set(self, target: NodeClient, result: RecordingFit) -> bool:
         """Set the parameters of a generator; return whether its robot can take the readouts."""
         robot = self._robot
         theirs, = await target.values(['robot'])
         # The fit's cells are then those of its joints.
         whole = (robot is not None and theirs == self._value('robot')
-                 and robot.harmonics == found.fit.harmonics)
-        await target.set_parameters(running_parameters(found, robot if whole else None), PATIENCE)
+                 and robot.harmonics == result.fit.harmonics)
+        await target.set_parameters(running_parameters(result, robot if whole else None), PATIENCE)
         return whole
 
 

@@ -286,8 +286,8 @@ class BridgeNode(StartedNode):
 
     def _tick(self, dt: float, stamp: int) -> None:
         now, supervisor = time.monotonic(), self.supervisor
-        self._take_state(now)
-        self._take_targets(now)
+        self._receive_state(now)
+        self._receive_targets(now)
         supervisor.kp_scale = self._kp_scale.receive(now)
         while self._requests:
             self._requests.popleft()(now)
@@ -312,7 +312,7 @@ class BridgeNode(StartedNode):
             self.stop.set()
             self.ticker.end()
 
-    def _take_state(self, now: float) -> None:
+    def _receive_state(self, now: float) -> None:
         last = None
         for message, _ in self._states.receive():
             last = message
@@ -323,7 +323,7 @@ class BridgeNode(StartedNode):
             if reason := self.stop_pressed():
                 self._halt(reason, now)
 
-    def _take_targets(self, now: float) -> None:
+    def _receive_targets(self, now: float) -> None:
         complete = self._commands.receive()
         if self._commands.refused:
             self.supervisor.reject_target(self._commands.refused, now)

@@ -114,8 +114,8 @@ class JointCommand:
     Each motor applies tau + kp (q - angle) + kd (dq - speed).
 
     Attributes:
-        q: angles wanted, rad, shape (joints,), in the order of the robot's motors.
-        dq: speeds wanted, rad/s.
+        q: target angles, rad, shape (joints,), in the order of the robot's motors.
+        dq: target speeds, rad/s.
         tau: torques added, N m.
         kp: N m / rad.
         kd: N m s / rad.

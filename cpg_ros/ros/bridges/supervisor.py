@@ -226,7 +226,7 @@ STALE = 2.5
 
 
 def _between(start: np.ndarray, end: np.ndarray, fraction: float) -> np.ndarray:
-    """Interpolate smoothly between two poses; a share beyond 1 counts as 1."""
+    """Interpolate smoothly between two poses; a fraction beyond 1 counts as 1."""
     return start + smoothstep(min(fraction, 1.0)) * (end - start)
 
 

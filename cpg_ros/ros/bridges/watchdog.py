@@ -21,7 +21,6 @@ processes of its own user only.
 """
 
 import contextlib
-import os
 from pathlib import Path
 import pkgutil
 import select
@@ -50,15 +49,6 @@ from rclpy.signals import SignalHandlerOptions
 LOOK = 1.0
 #: SPARED: oom_score_adj at which the kernel spares a process when memory runs out, see proc(5).
 SPARED = '-1000'
-
-
-def alive(process: int) -> bool:
-    """Return whether a process exists."""
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    return True
 
 
 def spared() -> bool:
@@ -121,7 +111,7 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
             elif not receive(line, monitor):
                 line.close()
                 lines.remove(line)
-        if not ready and wait is None and not alive(process):
+        if not ready and wait is None and not Path(f'/proc/{process}').exists():
             return
         before = monitor.alarms
         if monitor.due(time.monotonic()):

@@ -21,8 +21,8 @@ from cpg_ros.fitting.recordings.bag_reader import read_bag
 from cpg_ros.fitting.recordings.formats import read_recording
 from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.fitting.recordings.rosbags_library import ZSTD
+from cpg_ros.ros.bridges.unitree.messages import JOINTS as MOTORS
 from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
-from cpg_ros.ros.bridges.unitree.models import JOINTS as MOTORS
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer

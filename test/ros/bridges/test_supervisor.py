@@ -20,8 +20,7 @@ import math
 from cpg_ros.common.errors import CpgError
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.bridges.supervisor import BridgeState, Supervisor
-from cpg_ros.ros.bridges.unitree.messages import LowCmd, LowState
-from cpg_ros.ros.bridges.unitree.models import JOINTS, MODELS, settings_of
+from cpg_ros.ros.bridges.unitree.messages import JOINTS, LowCmd, LowState, MODELS, settings_of
 from cpg_ros.ros.bridges.watchdog_link import TickMonitor
 import numpy as np
 import pytest

@@ -24,11 +24,12 @@ from cpg_ros.motion.pattern import Pattern  # noqa: E402, I100
 from cpg_ros.motion.plan import plan  # noqa: E402
 from cpg_ros.networks.registry import PRESETS  # noqa: E402
 from cpg_ros.ros.bridges.supervisor import BridgeState, Supervisor  # noqa: E402
-from cpg_ros.ros.bridges.unitree.messages import (
+from cpg_ros.ros.bridges.unitree.messages import (  # noqa: E402
     LowCmd,  # noqa: E402
     LowState,  # noqa: E402
+    MODELS,
+    settings_of,
 )
-from cpg_ros.ros.bridges.unitree.models import MODELS, settings_of  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402
 from depth import in_depth  # noqa: E402
 from go2 import DT, GO2  # noqa: E402

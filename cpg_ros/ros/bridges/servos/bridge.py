@@ -15,7 +15,6 @@
 """The node ``servo_bridge``: drives a robot of servo motors from a generator's output."""
 
 import secrets
-import sys
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.motion.robot import Robot
@@ -85,7 +84,3 @@ def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     return run(ServoBridge, NAME, "Drives a robot with servos from a generator's output.", SPECS,
                args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

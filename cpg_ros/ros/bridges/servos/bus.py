@@ -14,13 +14,12 @@
 
 """The node ``servo_bus``: angles from ``servo/commands`` to servos on I2C or a serial bus.
 
-It obeys one sender, and lets the servos go when that commands it, when commands stop, and when
+It obeys one sender, and disables servo torque when that commands it, when commands stop, and when
 anything fails. It is a process of its own so that the bridge's watchdog reaches the servos if the
 bridge is killed.
 """
 
 import math
-import sys
 import time
 
 from cpg_ros.common.errors import CpgError, InputError
@@ -125,8 +124,8 @@ SPECS = fixed({
 QUIET = 5.0
 #: QUEUE: most commands that wait for a tick.
 QUEUE = 100
-#: LOOK: period in which the graph is checked for others who command the servos, s.
-LOOK = 0.25
+#: CHECK: period in which the graph is checked for others who command the servos, s.
+CHECK = 0.25
 #: SHOWN: time for which /diagnostics reports a refused command, s.
 SHOWN = 2.0
 
@@ -168,15 +167,15 @@ class ServoBus(StartedNode):
         self.thread = self._ticker = Ticker(self, self._value('rate'), self._tick, lambda: None,
                                             self._failed, lambda _: None)
         self._health = HealthPublisher(self, 'bus', self._calibration.board, self._report_health)
-        self._timer = self.create_timer(LOOK, self._look, clock=STEADY)
+        self._timer = self.create_timer(CHECK, self._check_senders, clock=STEADY)
         self._warn_of_unknown()
 
     @property
     def _driven(self) -> bool:
         return self._owner.sender is not None
 
-    def _look(self) -> None:
-        """Look for other nodes that command the servos."""
+    def _check_senders(self) -> None:
+        """Find other nodes that command the servos."""
         watchdog = f'{self.get_namespace().rstrip("/")}/{Servos.watchdog_name()}'
         self._others = others_on(self, self._commands.topic, 0, 1, watchdog)
         self._senders = others_on(self, self._commands.topic, 0, 1)
@@ -194,7 +193,7 @@ class ServoBus(StartedNode):
     def _tick(self, dt: float, stamp: int) -> None:
         now = time.monotonic()
         for message, _ in self._commands.receive():
-            self._take(sender_of(message), np.array(message.data, dtype=float), now)
+            self._receive(sender_of(message), np.array(message.data, dtype=float), now)
         if self._driven and now - self._commanded_at > self._timeout:
             self._release(f'no command for {1e3 * self._timeout:.0f} ms', self._owner.sender)
         if self._driven:
@@ -212,7 +211,7 @@ class ServoBus(StartedNode):
                 header=Header(stamp=Time(nanoseconds=stamp).to_msg()),
                 name=self._calibration.joints, position=angles.tolist()))
 
-    def _take(self, sender: str, angles: np.ndarray, now: float) -> None:
+    def _receive(self, sender: str, angles: np.ndarray, now: float) -> None:
         """Apply a command, or disable torque if it has no angles or cannot be used."""
         count, owner = len(self._calibration.joints), self._owner
         if not angles.size:
@@ -286,7 +285,3 @@ class ServoBus(StartedNode):
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     return run(ServoBus, NAME, 'Drives servos on I2C or a serial bus.', SPECS, args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())

@@ -80,5 +80,5 @@ class Servos(RobotInterface):
 
     @staticmethod
     def make_command() -> ServoCommand:
-        """Return a command for no joints, which lets all servos go: a watchdog needs no other."""
+        """Return the watchdog's command, without joints: it disables the torque of all."""
         return ServoCommand(0, Servos.watchdog_name())

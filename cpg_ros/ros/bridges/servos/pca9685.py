@@ -21,7 +21,6 @@ revision 4 (16 April 2015), sections 7.3 to 7.3.5.
 import fcntl
 import os
 import time
-from typing import Protocol
 
 from cpg_ros.ros.bridges.servos.serial_board import ServoBoard
 import numpy as np
@@ -39,16 +38,6 @@ OSCILLATOR, COUNTS = 25e6, 4096
 STARTED = 0.001
 #: Request of ioctl that sets the address of a device, linux/i2c-dev.h.
 I2C_SLAVE = 0x0703
-
-
-class Bus(Protocol):
-    """Writes to one device on an I2C bus."""
-
-    def write(self, data: bytes) -> None:
-        """Write a register's number and its content."""
-
-    def close(self) -> None:
-        """Give the bus back."""
 
 
 class LinuxI2c:
@@ -80,7 +69,7 @@ def prescale(frequency: float) -> int:
 class Pca9685(ServoBoard):
     """Up to 16 servos by pulses, in microseconds; where they are cannot be measured."""
 
-    def __init__(self, bus: Bus, channels: tuple[int, ...], frequency: float) -> None:
+    def __init__(self, bus: LinuxI2c, channels: tuple[int, ...], frequency: float) -> None:
         """Switch all pulses off, and set their frequency.
 
         Args:

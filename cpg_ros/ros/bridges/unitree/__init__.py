@@ -14,4 +14,4 @@
 
 """The bridge to Unitree's robots, and their messages as bytes."""
 
-__all__ = ['bridge', 'messages', 'models']
+__all__ = ['bridge', 'messages']

@@ -15,6 +15,7 @@
 """The node ``unitree_bridge``: drives a Unitree robot from a generator's output."""
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib import import_module
 import json
 from pathlib import Path
@@ -29,8 +30,16 @@ from cpg_ros.common.errors import MissingLibraryError
 from cpg_ros.motion.robot import Robot
 from cpg_ros.ros.bridges.bridge import BridgeNode, StartRefused, Wait
 from cpg_ros.ros.bridges.robot_state import bridge_specs, BridgeSettings
-from cpg_ros.ros.bridges.unitree.messages import BUTTONS, FootForces, LowCmd, LowState
-from cpg_ros.ros.bridges.unitree.models import JOINTS, MODELS, PARTS, settings_of
+from cpg_ros.ros.bridges.unitree.messages import (
+    BUTTONS,
+    FootForces,
+    JOINTS,
+    LowCmd,
+    LowState,
+    MODELS,
+    PARTS,
+    settings_of,
+)
 from cpg_ros.ros.bridges.watchdog_link import RobotInterface
 from cpg_ros.ros.generator_io import joint_state, labelled
 from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
@@ -114,19 +123,13 @@ class Announcements:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             self._socket.bind(('', 7400 + 250 * domain))
-            for _, interface in socket.if_nameindex():
-                self._join(interface)
+            for index, _ in socket.if_nameindex():
+                group = struct.pack('4s4si', socket.inet_aton(_GROUP), bytes(4), index)
+                # An interface without multicast has no announcements.
+                with suppress(OSError):
+                    self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
         except OSError:
             self._socket.close()
-
-    def _join(self, interface: str) -> None:
-        index = socket.if_nametoindex(interface)
-        group = struct.pack('4s4si', socket.inet_aton(_GROUP), bytes(4), index)
-        try:
-            self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
-        except OSError:
-            # An interface without multicast has no announcements.
-            return
 
     def check(self) -> str:
         """Return which harmful participant has announced itself since the last call, or ''."""
@@ -386,7 +389,3 @@ def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     return run(UnitreeBridge, NAME, "Drives a Unitree robot from a generator's output.", SPECS,
                args)
-
-
-if __name__ == '__main__':
-    sys.exit(main())
