@@ -53,6 +53,16 @@ def here(monkeypatch, capsys):
     return run_here
 
 
+@pytest.mark.parametrize(('text', 'low'), [('-0.6:0.2', -0.6), ('-.5:0.2', -0.5), ('-1e-3:0.2',
+                                                                                   -1e-3)])
+def test_a_range_from_below_zero_is_a_value_and_no_option(text, low):
+    parser = Parser(prog='tool')
+    parser.add_argument('--range', type=interval)
+    assert parser.parse_args(['--range', text]).range == (low, 0.2)
+    with pytest.raises(SystemExit):
+        parser.parse_args(['-x'])
+
+
 @pytest.mark.parametrize('tool', TOOLS)
 def test_help_of_a_tool_and_words_that_are_not_for_it(here, tool):
     for word in ('--help', '-h'):
