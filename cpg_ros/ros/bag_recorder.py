@@ -39,11 +39,7 @@ class BagRecorder:
     """
 
     def __init__(self, node: Node, path: Path) -> None:
-        """Open the bag; it gets its name when it is complete.
-
-        Args:
-            node: that subscribes.
-            path: of the bag, a folder that is not there yet.
+        """Open the bag, a new folder; it gets its name when it is complete.
 
         Raises:
             BagError: something is there already, or the folder cannot be written to.

@@ -150,15 +150,10 @@ class Commands:
 
     def __init__(self, node: Node, robot: Robot, kind: str, period: float, angles: np.ndarray
                  ) -> None:
-        """Subscribe to the topics of one kind of command.
+        """Subscribe to the topics of one kind of command, one of KINDS.
 
-        Args:
-            node: that subscribes.
-            robot: whose joints are commanded.
-            kind: one of KINDS.
-            period: between two calls of ``receive``, s.
-            angles: before the first command, rad.
-
+        ``period`` is the time between two calls of ``receive``, s; ``angles`` are those before the
+        first command, rad.
         """
         self._node, self._robot, self._period = node, robot, period
         self.angles = np.array(angles, dtype=float)

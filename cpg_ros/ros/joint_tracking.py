@@ -49,15 +49,10 @@ class JointTracking:
 
     def __init__(self, node: Node, robot: Robot, measured: MeasuredPose,
                  commanded: Callable[[], np.ndarray | None], news: Callable[[str], None]) -> None:
-        """Begin to compare.
+        """Compare with the limits of the node's tracking_error and tracking_time.
 
-        Args:
-            node: whose parameters tracking_error and tracking_time are the limits.
-            robot: whose joints are compared.
-            measured: where they are.
-            commanded: returns the angles that were sent last, rad, leg by leg; None for none.
-            news: called with each new text.
-
+        ``commanded`` returns the angles that were sent last, rad, leg by leg, or None; ``news``
+        gets each new text.
         """
         limits: Any = TrackingLimits(
             tuple(joint.name for joint in robot.joints),

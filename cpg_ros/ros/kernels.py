@@ -41,14 +41,7 @@ class StartProgress:
     """A thread that publishes how long something has taken, until its end."""
 
     def __init__(self, node: Node, what: str, seconds: float) -> None:
-        """Begin to publish.
-
-        Args:
-            node: that starts.
-            what: it waits for.
-            seconds: that this takes, about.
-
-        """
+        """Begin to publish that ``node`` waits for ``what``, about ``seconds``."""
         self._node, self._what, self._seconds, self._began = node, what, seconds, time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._ended = threading.Event()
@@ -84,11 +77,7 @@ LOOK = 0.05
 
 
 def compile_kernels(network: str, node: Node) -> None:
-    """Compile or load what runs a network, named as for find_network: in C, without numba.
-
-    Args:
-        network: its name.
-        node: that waits for it.
+    """Compile or load what runs a network, named as for find_network: in C.
 
     Raises:
         CpgError: there is no C compiler.
@@ -102,13 +91,9 @@ def compile_kernels(network: str, node: Node) -> None:
 
 @contextmanager
 def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
-    """Announce compilations, if there are any: in the log, and as they go on on /diagnostics.
+    """Announce compilations that take about ``seconds``, if there are any.
 
-    Args:
-        node: that waits for them.
-        what: is compiled.
-        seconds: that it takes, s.
-
+    They are logged, and published on /diagnostics as they go on.
     """
     begun: list[StartProgress] = []
 
@@ -128,14 +113,10 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
 
 
 def compile_apart(node: Any, part: str, seconds: float) -> None:
-    """Compile in a process of its own, whose results this one then loads from the disk.
+    """Compile a part of ``precompile`` in another process; this one then loads it.
 
-    The compiler keeps the interpreter's lock for up to seconds, for which a tick would wait.
-
-    Args:
-        node: a StartedNode that moves a robot meanwhile.
-        part: of cpg_ros.ros.cli.executables.
-        seconds: that this takes at its first time, s.
+    The compiler keeps the interpreter's lock for up to seconds, for which a tick would wait. It
+    takes about ``seconds`` the first time.
 
     Raises:
         StartError: the node ends.

@@ -56,15 +56,9 @@ class Measurements:
 
     def __init__(self, node: Node, body: Body, sensors: SimulatedSensors, frame: str,
                  delay: float = 0.0) -> None:
-        """Publish the motion of a body and the measurements of its sensors.
+        """Publish a body's motion and sensors; ``frame`` is that of its base.
 
-        Args:
-            node: that publishes.
-            body: that is measured.
-            sensors: of the body.
-            frame: of its base.
-            delay: of the measurements of joints and feet, s.
-
+        Joints and feet are published ``delay`` s late.
         """
         self._body, self._sensors, self._holds = body, sensors, bool(body.robot.held)
         self._delay = round(1e9 * delay)
@@ -133,16 +127,11 @@ MOST_BEHIND = 0.05
 class Lockstep(TickThread):
     """Sets the time with ``tell``, waits for the commands of that instant, calls ``tick``.
 
-    Simulated time begins when there is a publisher of every command and a reader of /clock, and
-    the first ``tick`` is at the first command, so that a run can be repeated exactly. Commands
-    that come only every few periods, as from a generator of a lower rate, are recognised.
-
-    With a pace, simulated time passes that many times as fast as real time, or slower on a slow
-    machine.
-
-    Its rate is in simulated time. A late tick did not get the command that it waited for; no tick
-    is ever dropped.
-
+    Simulated time begins when every command has a publisher and /clock a reader, and the first
+    ``tick`` is at the first command, so that a run can be repeated exactly. Commands that come
+    only every few periods, as from a generator of a lower rate, are recognised. No tick is
+    dropped; a late one did not get its command. With a ``pace``, simulated time passes that many
+    times as fast as real time, or slower on a slow machine. ``rate`` is in simulated time, Hz.
     """
 
     def __init__(self, node: Node, rate: float, commands: Commands,

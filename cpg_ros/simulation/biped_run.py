@@ -75,16 +75,10 @@ class BipedRun:
     def __init__(self, model: str, robot: Robot, noise: SensorNoise | None = None,
                  friction: float = 0.6, timestep: float = 0.002,
                  terrain: Terrain | None = None) -> None:
-        """Load the model.
+        """Load a model, as of ``robot_model.load``, of a robot with the part ``biped``.
 
-        Args:
-            model: as of ``robot_model.load``.
-            robot: whose file has the part ``biped``.
-            noise: of the sensors; none if not given.
-            friction: between feet and ground.
-            timestep: of physics and feedback, s.
-            terrain: flat and level ground if not given.
-
+        Without ``noise`` sensors are exact, without ``terrain`` the ground is flat; ``timestep``
+        is that of physics and feedback, s.
         """
         self.body = Body(model, robot, timestep=timestep, add=add_ground if terrain else None)
         if terrain is not None:

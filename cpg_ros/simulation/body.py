@@ -318,20 +318,15 @@ NEAR = 0.05
 class Approach:
     """Leads joints from their present angles to commanded ones, each leg in a smooth step.
 
-    So a driver does that is switched on under a running controller: nothing jerks, and a gait
-    that is in full swing grows out of the stand. What begins where a leg is, as with a generator
-    that ramps in from the stand, is followed from the first instant on. A leg may be commanded
-    earlier than another.
+    A gait that is in full swing grows out of the stand without a jerk. Commands that begin where a
+    leg is are followed at once, as those of a generator that ramps in from the stand. A leg may be
+    commanded earlier than another.
     """
 
     def __init__(self, steps: int, angles: np.ndarray, legs: np.ndarray) -> None:
-        """Be ready at the angles where the joints are.
+        """Be at ``angles``, rad; an approach takes ``steps`` calls of ``towards``.
 
-        Args:
-            steps: calls of ``towards`` that an approach takes, at least one.
-            angles: rad, shape (joints,).
-            legs: index from 0 of each joint's leg, shape (joints,).
-
+        ``legs`` has the index from 0 of each joint's leg; arrays have shape (joints,).
         """
         self._steps, self._legs = steps, legs
         self.begin(angles)

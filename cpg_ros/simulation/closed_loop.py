@@ -57,15 +57,9 @@ class Patterns:
 
     def __init__(self, plans: Mapping[str, GaitPlan], feedback: Feedback,
                  scenarios: Sequence[Scenario], dt: float, trimmed: bool) -> None:
-        """Stand; the first plan is the one that all runs begin with.
+        """Stand; all runs, one a scenario, begin with the first plan.
 
-        Args:
-            plans: gaits by name.
-            feedback: that has learnt them.
-            scenarios: one a run.
-            dt: of a tick, s.
-            trimmed: whether the feedback changes strides and clocks.
-
+        ``dt`` is that of a tick, s; if ``trimmed``, the feedback changes strides and clocks.
         """
         self._plans, self._feedback, self._dt, self._trimmed = plans, feedback, dt, trimmed
         first, runs = next(iter(plans.values())), len(scenarios)

@@ -174,12 +174,8 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
 def part_touching(spec: Any, stand: Mapping[str, float]) -> None:
     """Exclude collisions between links that touch with all joints at 0 or in the stand.
 
-    Convex hulls of neighbours overlap, and would be pressed apart.
-
-    Args:
-        spec: a ``mujoco.MjSpec``, which is compiled for this.
-        stand: joint -> angle, rad.
-
+    Convex hulls of neighbours overlap, and would be pressed apart. The ``mujoco.MjSpec`` is
+    compiled for this; ``stand`` has angles in rad.
     """
     import mujoco
     model = spec.compile()

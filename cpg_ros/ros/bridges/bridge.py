@@ -66,12 +66,9 @@ class StartSequence(threading.Thread):
 
     def __init__(self, steps: Sequence[Callable[[Wait], None]], on_end: Callable[[str], None]
                  ) -> None:
-        """Prepare to start.
+        """Carry out ``steps``, which may raise StartRefused; then call ``on_end``.
 
-        Args:
-            steps: each is called with a function that waits, and raises StartRefused to refuse.
-            on_end: called with why the robot was not started, or ''.
-
+        It gets the reason why the robot was not started, or ''.
         """
         super().__init__(name='start', daemon=True)
         self._steps, self._on_end = steps, on_end

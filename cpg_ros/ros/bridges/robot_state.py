@@ -27,13 +27,7 @@ import numpy as np
 # The parameters that every bridge has.
 
 def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
-    """Return the specs of a bridge's parameters.
-
-    Args:
-        robot: default robot file.
-        others: the parameters that only this bridge has.
-
-    """
+    """Return the specs of a bridge's parameters: ``others`` are those that only it has."""
     return {
         'robot': Spec(robot, 'robot file, or the name of a shipped one',
                       constraints='a shipped name, or the path of a YAML file'),
@@ -203,10 +197,7 @@ class BridgeSettings(ShortRepr):
 def motor_indices(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:
     """Return the position of each motor's joint in ``robot.order``, shape (joints,).
 
-    Args:
-        robot: of the robot file.
-        joints: names in motor order.
-        whose: whose motors these are, for the message.
+    ``joints`` are in motor order; ``whose`` names the motors' owner in the message.
 
     Raises:
         InputError: the robot file has other joints.
@@ -223,17 +214,11 @@ def motor_indices(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarr
 
 def settings_for(robot: Robot, indices: np.ndarray, *, kp: np.ndarray, kd: np.ndarray,
                  torque: np.ndarray, lying: np.ndarray, **others: float) -> BridgeSettings:
-    """Return the settings of a robot file; arrays have shape (joints,), in motor order.
+    """Return the settings of a robot file, which gives limits, speeds and the stand.
 
-    Args:
-        robot: provides limits, speeds and the stand (offsets).
-        indices: as returned by ``motor_indices``.
-        kp: proportional gains, N m / rad.
-        kd: damping gains, N m s / rad.
-        torque: largest torques, N m.
-        lying: pose to sit down to, rad; clipped to the limits.
-        others: further attributes of ``BridgeSettings``.
-
+    Arrays have shape (joints,), in motor order: gains ``kp`` (N m / rad) and ``kd`` (N m s / rad),
+    the largest ``torque`` (N m) and the pose ``lying`` (rad), clipped to the limits. ``indices``
+    are those of ``motor_indices``, ``others`` further attributes of ``BridgeSettings``.
     """
     order = robot.places[indices]
     lower, upper, velocity, stand = (robot.column(name)[order] for name in (

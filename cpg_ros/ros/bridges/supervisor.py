@@ -89,15 +89,10 @@ class Targets:
 
     def __init__(self, names: tuple[str, ...], lower: np.ndarray, upper: np.ndarray,
                  velocity: np.ndarray, period: float) -> None:
-        """Start without a target; all arrays have shape (joints,).
+        """Start without a target; arrays have shape (joints,).
 
-        Args:
-            names: of the joints.
-            lower: smallest angles, rad; targets are clipped to the limits.
-            upper: largest angles, rad.
-            velocity: largest speeds of the joints, rad/s.
-            period: between two calls of ``at``, s.
-
+        Targets are clipped to ``lower`` and ``upper``, rad; ``velocity`` limits their jumps,
+        rad/s; ``period`` is the time between two calls of ``at``, s.
         """
         self._names, self._lower, self._upper = names, lower, upper
         self._velocity, self._period = velocity, period
@@ -248,15 +243,7 @@ class Supervisor:
 
     def __init__(self, settings: BridgeSettings, robot: RobotState, command: JointCommand,
                  on_state: Callable[[BridgeState, str], None]) -> None:
-        """Start idle.
-
-        Args:
-            settings: of the robot.
-            robot: the measured state.
-            command: to be filled.
-            on_state: called with every new state and the reason for it.
-
-        """
+        """Start idle; ``on_state`` gets every new state and the reason for it."""
         self._settings, self._on_state = settings, on_state
         self.robot, self.command = robot, command
         self.targets = Targets(settings.names, settings.lower, settings.upper,

@@ -43,14 +43,10 @@ class NameTaken(CpgError):
 
 
 def address(maker: str, kind: str, domain: int, topic: str) -> str:
-    """Return the name of a socket on this computer, one for each robot that is commanded.
+    """Return the name of a socket of this computer, one for each robot that is commanded.
 
-    Args:
-        maker: as ``RobotInterface.maker``.
-        kind: ``bridge`` or ``watchdog``.
-        domain: of ROS.
-        topic: of the commands, resolved.
-
+    ``kind`` is ``bridge`` or ``watchdog``, ``domain`` that of ROS, ``topic`` that of the commands,
+    resolved.
     """
     return f'\0cpg_ros/{maker}/{kind}/{domain}{topic}'
 
@@ -180,12 +176,9 @@ class TickMonitor:
     """
 
     def __init__(self, period: float, timeout: float) -> None:
-        """Wait for the first tick of a process.
+        """Wait for the first tick of a process that ticks every ``period``, s.
 
-        Args:
-            period: between two ticks, s.
-            timeout: since the last tick after which damping begins, s; 2.5 periods at least.
-
+        Damping begins ``timeout`` s, or at least 2.5 periods, after the last tick.
         """
         self._period, self._timeout = period, timeout
         self._last = self._sent = np.inf
@@ -260,14 +253,8 @@ class WatchdogLink:
                  period: float, timeout: float) -> None:
         """Prepare the command line of a watchdog.
 
-        Args:
-            interface: of the robot.
-            domain: of ROS.
-            namespace: of the bridge.
-            topic: of the commands, resolved.
-            period: of the bridge, s.
-            timeout: without a tick, after which the watchdog damps the robot, s.
-
+        It damps the robot ``timeout`` s after the last tick of a bridge that ticks every
+        ``period``, s; ``topic`` is that of the commands, resolved.
         """
         self._address = address(interface.maker, 'watchdog', domain, topic)
         self._command = [sys.executable, '-P', '-m', 'cpg_ros.ros.bridges.watchdog',
@@ -336,12 +323,9 @@ class WatchdogLink:
         return acted
 
     def tick(self, kd: np.ndarray, now: float) -> str:
-        """Send a tick; return what is wrong with the watchdog, or ''.
+        """Send a tick with the gains for damping, N m s / rad, if no other follows.
 
-        Args:
-            kd: gains for damping if no other tick follows, N m s / rad.
-            now: s.
-
+        Returns what is wrong with the watchdog, or ''; ``now`` is in s.
         """
         try:
             self._socket.send(TickMonitor.tick(kd))

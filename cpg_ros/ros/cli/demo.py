@@ -68,10 +68,7 @@ FALLEN = 0.5
 def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
     """Walk the course, then leave the robot to others; return whether it reached the end.
 
-    Args:
-        robot: the node that follows it.
-        check: called repeatedly; an exception from it ends the run.
-
+    ``check`` is called repeatedly; an exception that it raises ends the run.
     """
     steer, push = (robot.create_publisher(Twist, 'cmd_vel', 10),
                    robot.create_publisher(Wrench, 'robot_sim/push', 10))

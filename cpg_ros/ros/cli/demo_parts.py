@@ -265,24 +265,11 @@ class Steps:
     """Announces steps, and waits for each while the page shows it."""
 
     def __init__(self, node: Node, check: Callable[[], None]) -> None:
-        """Prepare.
-
-        Args:
-            node: by which the page knows what is waited for.
-            check: raises what ends the demonstration.
-
-        """
+        """Announce steps by ``node``; ``check`` raises what ends the demonstration."""
         self._node, self._check, self._count = node, check, 0
 
     def run(self, what: str, seconds: float, words: Sequence[str]) -> int:
-        """Run an executable; return its exit code.
-
-        Args:
-            what: it does.
-            seconds: that this takes, about.
-            words: the executable and its arguments.
-
-        """
+        """Run an executable, ``words``, that takes about ``seconds``; return its exit code."""
         self._count += 1
         say(f'step {self._count}: {what}, about {seconds:.0f} s (Ctrl-C stops it)')
         progress = StartProgress(self._node, what, seconds)
@@ -311,10 +298,6 @@ def _end(process: subprocess.Popen) -> None:
 
 def prepare(args: Namespace, steps: Steps) -> DemoRobot:
     """Make a robot's file and tune it, or use again what the folder has.
-
-    Args:
-        args: options of the demonstration.
-        steps: what runs them.
 
     Raises:
         StepFailed: a step failed.

@@ -47,16 +47,9 @@ PATIENCE = 1.0
 
 
 def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
-    """Publish a bag's messages at the pace at which they were received.
+    """Publish a bag's messages as they were received, ``rate`` times as fast.
 
-    Args:
-        node: publishes.
-        path: of the bag.
-        topics: topics; all, if empty.
-        rate: recorded seconds per second.
-
-    Returns:
-        Topic -> messages published.
+    No topics mean all. Returns the number of messages of each topic.
 
     Raises:
         RecordingError: the bag cannot be read, or a topic is not in it.
@@ -112,15 +105,10 @@ USUAL = ('/rosout', '/parameter_events')
 
 
 def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
-    """Record until Ctrl-C.
-
-    Args:
-        node: subscribes.
-        path: of the bag, a folder that does not exist yet.
-        topics: topics; if empty, all that exist or appear.
+    """Record topics until Ctrl-C; if none is named, all that exist or appear.
 
     Raises:
-        BagError: something is there already, or the folder cannot be written to.
+        BagError: something is at ``path`` already, or the folder cannot be written to.
 
     """
     recorder, searched = BagRecorder(node, path), 0.0
@@ -155,12 +143,9 @@ ANSWER = 60.0
 
 
 async def play_schedule(path: Path, other: NodeClient, rate: float) -> str:
-    """Set a generator's parameters at the times of a schedule; return what was done.
+    """Set a generator's parameters at the times of a schedule, ``rate`` times as fast.
 
-    Args:
-        path: of the schedule.
-        other: the generator.
-        rate: seconds of the schedule per second.
+    Returns what was done.
 
     Raises:
         ScheduleError: the file cannot be used.
@@ -219,13 +204,10 @@ class Topic:
 
     def __init__(self, node: Node, name: str, wait: float,
                  late: Callable[[str], None] = lambda name: None) -> None:
-        """Find a topic's type and subscribe.
+        """Find a topic's type and subscribe; relative names are of the namespace /.
 
-        Args:
-            node: subscribes.
-            name: relative names are of the namespace /.
-            wait: for a publisher and for the first message, s.
-            late: called once with the topic's name if neither has come within ``SILENCE``.
+        A publisher and the first message are waited for, ``wait`` s each; ``late`` is called once
+        with the topic's name if neither has come within ``SILENCE``.
 
         Raises:
             SilentTopic: it has no publisher.

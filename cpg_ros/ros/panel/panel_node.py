@@ -70,14 +70,10 @@ class Recorder:
 
     def __init__(self, node: Node, folder: Path, largest: int, ended: Callable[[str], None]
                  ) -> None:
-        """Prepare to record.
+        """Record into a folder; a bag ends at ``largest``, bytes.
 
-        Args:
-            node: that subscribes, and need not be spun.
-            folder: for the bags.
-            largest: size at which a recording ends, bytes.
-            ended: called from the recording thread with why a recording ended by itself.
-
+        ``ended`` gets, in the recording thread, the reason why a recording ended by itself.
+        ``node`` need not be spun.
         """
         self._node, self._folder, self._largest, self._ended = node, folder, largest, ended
         self._stop, self._packing = threading.Event(), threading.Lock()

@@ -211,13 +211,8 @@ async def robot_info(watch: Node, services: ServiceClients, graph: Graph, genera
                      robot: str, urdf: str) -> shape.RobotInfo:
     """Return the description of a robot by the graph and the user.
 
-    Args:
-        watch: a node that is not spun.
-        services: clients of other nodes.
-        graph: nodes and topics.
-        generator: full name of the node that moves the robot.
-        robot: its robot file.
-        urdf: file that the user names, '' for none.
+    ``generator`` is the full name of the node that moves it, ``robot`` its robot file, ``urdf``
+    the file that the user names, '' for none. ``watch`` is not spun.
 
     Raises:
         CallError: the simulation does not answer.
@@ -265,17 +260,10 @@ class RobotView:
     def __init__(self, node: Node, watch: Node, services: ServiceClients, name: str,
                  fastest: tuple[float, float], report: Callable[[str], None],
                  send: Callable[[dict[str, Any]], None]) -> None:
-        """View a generator.
+        """View the generator ``name``; ``node`` is spun, ``watch`` is not.
 
-        Args:
-            node: that publishes, and is spun.
-            watch: that subscribes, and is not spun.
-            services: clients of other nodes.
-            name: the generator's full name.
-            fastest: speed in m/s and turn in rad/s at full deflection.
-            report: shows a line on its pages.
-            send: sends its pages a message.
-
+        ``fastest`` is the speed in m/s and the yaw rate in rad/s at full deflection. ``report``
+        shows a line on its pages, ``send`` sends them a message.
         """
         self.name, self._space = name, namespace(name)
         self._node, self._watch, self._services = node, watch, services
@@ -484,13 +472,7 @@ class BridgeViews:
     """
 
     def __init__(self, watch: Node, services: ServiceClients) -> None:
-        """View no bridge yet.
-
-        Args:
-            watch: that subscribes, and is not spun.
-            services: clients of other nodes.
-
-        """
+        """View no bridge yet; ``watch`` is not spun."""
         self._services, self._states = services, Subscriptions(watch)
         self._shown: dict[str, dict[str, Any]] = {}
         self._when: dict[str, float] = {}

@@ -182,6 +182,13 @@ def sphere(radius: float) -> np.ndarray:
     return capsule(radius, 0.0)
 
 
+#: SOLIDS: kind -> its triangles, from sizes as a geom of MuJoCo has them, m.
+SOLIDS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    'box': box, 'sphere': lambda size: sphere(size[0]), 'ellipsoid': lambda size:
+    sphere(1.0) * size, 'capsule': lambda size: capsule(*size[:2]),
+    'cylinder': lambda size: cylinder(*size[:2])}
+
+
 def along(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
     """Return the triangles of a capsule between two points, m."""
     way = np.asarray(end, float) - start
@@ -313,24 +320,15 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
 
 
 def _triangles(mujoco: Any, model: Any, k: int) -> np.ndarray | None:
-    kinds, size, kind = mujoco.mjtGeom, model.geom_size[k], model.geom_type[k]
-    if kind == kinds.mjGEOM_MESH:
+    kind = mujoco.mjtGeom(model.geom_type[k])
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = model.geom_dataid[k]
         first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
         start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
         vertices = model.mesh_vert[first:first + count].astype(float)
         return coarse(vertices[model.mesh_face[start:start + faces]])
-    if kind == kinds.mjGEOM_BOX:
-        return box(size)
-    if kind == kinds.mjGEOM_SPHERE:
-        return sphere(size[0])
-    if kind == kinds.mjGEOM_CAPSULE:
-        return capsule(size[0], size[1])
-    if kind == kinds.mjGEOM_CYLINDER:
-        return cylinder(size[0], size[1])
-    if kind == kinds.mjGEOM_ELLIPSOID:
-        return sphere(1.0) * size
-    return None
+    solid = SOLIDS.get(kind.name.removeprefix('mjGEOM_').lower())
+    return solid(model.geom_size[k]) if solid else None
 
 
 def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
@@ -351,10 +349,8 @@ FURTHEST = 1e4
 def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
     """Return the shape that a URDF's text on the graph describes.
 
-    Args:
-        text: from anyone on the graph: only files of installed packages are opened.
-        source: what to call it.
-        report: takes a line about each part that cannot be drawn.
+    The text may come from anyone: only files of installed packages are opened. ``report`` takes a
+    line about each part that cannot be drawn.
 
     Raises:
         DescriptionError: it is no URDF, is too large, or its links are not one tree.
@@ -368,11 +364,7 @@ def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
 
 
 def from_file(path: Path, report: Callable[[str], None]) -> Shape:
-    """Return the shape that a user's URDF file describes.
-
-    Args:
-        path: of the file; meshes are found as ``find_mesh`` says.
-        report: takes a line about each part that cannot be drawn.
+    """Return the shape that a user's URDF file describes; arguments as of ``from_text``.
 
     Raises:
         DescriptionError: it is no URDF, or its links are not one tree.
@@ -462,12 +454,8 @@ class _Drawing:
             return box(0.5 * _numbers(solid.get('size'), '0.1 0.1 0.1'))
         radius, length = (float(_numbers(solid.get(key), '0.1')[0])
                           for key in ('radius', 'length'))
-        if solid.tag == 'cylinder':
-            return cylinder(radius, 0.5 * length)
-        if solid.tag == 'sphere':
-            return sphere(radius)
-        if solid.tag == 'capsule':
-            return capsule(radius, 0.5 * length)
+        if solid.tag in ('cylinder', 'sphere', 'capsule'):
+            return SOLIDS[solid.tag](np.array([radius, 0.5 * length]))
         if solid.tag != 'mesh':
             raise MeshError(f'<{solid.tag}> is not a URDF shape')
         name = solid.get('filename', '')
@@ -534,10 +522,7 @@ def shipped_robot(name: str) -> Robot | None:
 def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 
-    Args:
-        info: of the robot.
-        report: takes a line about each better shape that is not available.
-
+    ``report`` takes a line about each better shape that is not available.
     """
     robot = shipped_robot(info.robot)
     for make in (

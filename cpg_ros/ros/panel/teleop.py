@@ -68,12 +68,7 @@ class Lease:
 
     def take_over(self, who: Hashable, now: float,
                   others: frozenset[bytes] = frozenset()) -> Hashable | None:
-        """Give the lease to ``who`` in any case, confirming these other publishers.
-
-        Returns:
-            The former holder, None if there was no other.
-
-        """
+        """Give the lease to ``who``, confirming ``others``; return a former holder, or None."""
         lost = None if self.holder == who else self.holder
         self._pass_to(who, now, others)
         return lost
@@ -123,14 +118,10 @@ class Teleop:
 
     def __init__(self, node: Node, topic: str, fastest: tuple[float, float],
                  stamped: Callable[[], bool]) -> None:
-        """Publish nothing yet.
+        """Publish nothing yet; ``topic`` is a full name.
 
-        Args:
-            node: that publishes.
-            topic: full name.
-            fastest: speed in m/s and turn in rad/s at full deflection.
-            stamped: returns whether the generator takes TwistStamped, not Twist.
-
+        ``fastest`` is the speed in m/s and the yaw rate in rad/s at full deflection; ``stamped``
+        returns whether the generator takes TwistStamped, not Twist.
         """
         self._node, self._topic, self._stamped = node, topic, stamped
         self._publisher: Any = None

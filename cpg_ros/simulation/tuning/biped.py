@@ -174,9 +174,9 @@ def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
         return [_price(walks, outcomes) for part in compute(walked, jobs) for outcomes in part]
 
     most = math.log(FACTOR)
-    logs, _ = cma_search(np.zeros(len(SEARCHED)), SPREAD, (-most, most), seed, price, evaluations,
-                         update)
-    gains = changed(logs)
+    result, _ = cma_search(np.zeros(len(SEARCHED)), SPREAD, (-most, most), seed, price,
+                           evaluations, update)
+    gains = changed(result.xfavorite)
     fresh = _walks(robot, FRESH + seed, JUDGED, WALKED)
     jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + BATCH])
             for k in range(0, len(fresh), BATCH)]

@@ -357,10 +357,10 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     def changed(logs: np.ndarray) -> Gains:
         return before._replace(**scaled_gains(before, names, logs, GAINS))
 
-    logs, tried = cma_search(np.zeros(len(names)), SPREAD, (-most, most), seed,
-                             lambda points, draw: price([*map(changed, points)], draw),
-                             evaluations, update, len(starts))
-    after = changed(logs)
+    result, tried = cma_search(np.zeros(len(names)), SPREAD, (-most, most), seed,
+                               lambda points, draw: price([*map(changed, points)], draw),
+                               evaluations, update, len(starts))
+    after = changed(result.xfavorite)
     benefits = _compared(trials, before, after, seed)
     if benefits.better:
         listed = dimensionless(after, leg_length(geometry_of(robot)))

@@ -206,13 +206,7 @@ class FootTrajectoryFit:
         return float(np.mean([leg.length for leg in self.legs.values()]))
 
     def joints(self, orbit: Orbit, paths: dict[str, FootTrajectory]) -> dict[str, JointMotion]:
-        """Return the motion of the joints that move the feet in a gait.
-
-        Args:
-            orbit: of the gait.
-            paths: leg -> the way of its foot.
-
-        """
+        """Return the motion of the joints that move the feet along paths, by leg."""
         phase = np.arange(POINTS) / POINTS
         joints = {}
         for name, leg in self.legs.items():

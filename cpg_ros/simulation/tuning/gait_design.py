@@ -58,12 +58,7 @@ def measure(batch: OpenLoopBatch, plan: GaitPlan,
     """Measure a gait at several strides; None if its speed does not rise with them.
 
     Rows are left out at the ends, where the robot falls or its speed does not rise any more.
-
-    Args:
-        batch: bodies.
-        plan: the gait, of a robot with a motion that has a frequency.
-        update: takes the number of strides measured so far.
-
+    ``update`` takes the number of strides measured so far.
     """
     left = plan.robot.left
     tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),

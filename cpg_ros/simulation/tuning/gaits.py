@@ -223,16 +223,11 @@ class Tuner:
 
     def prices(self, gait: str, designs: Sequence[Design],
                aim: GaitTarget | None = None) -> np.ndarray:
-        """Return the price of each design: of its mean and its worst run.
+        """Return the price of each design of a gait: of its mean and its worst run.
 
         The runs take by turns those of the robot's networks that have the gait. What the joints
-        cannot follow costs the more the further it is beyond their limits.
-
-        Args:
-            gait: one of AIMS.
-            designs: of it.
-            aim: its target, instead of the usual one.
-
+        cannot follow costs the more the further it is beyond their limits. ``aim`` replaces the
+        usual target.
         """
         aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
@@ -261,13 +256,9 @@ class Tuner:
 
     def tune(self, gait: str, evaluations: int, seed: int = 0,
              update: Callable[[int], None] = lambda done: None) -> Tuned:
-        """Search for a gait's best design.
+        """Search for a gait's best design, trying about as many as ``evaluations``.
 
-        Args:
-            gait: one of AIMS.
-            evaluations: how many designs to try, about.
-            seed: the same one gives the same result.
-            update: takes the number tried so far.
+        The same seed gives the same result; ``update`` takes the number tried so far.
 
         Raises:
             NoDesign: no design can be run.
@@ -277,16 +268,12 @@ class Tuner:
         aim, first, cheapest = aims[int(prices.argmin())], float(prices[0]), float(prices.min())
         best = aim.start
 
-        def generation(points: Sequence[np.ndarray], _: int) -> list[float]:
-            nonlocal best, cheapest
-            designs = [aim.design(point) for point in points]
-            prices = self.prices(gait, designs, aim)
-            if prices.min() < cheapest:
-                best, cheapest = designs[int(prices.argmin())], float(prices.min())
-            return prices.tolist()
-
-        _, tried = cma_search(aim.start_point, SPREAD, (0.0, 1.0), seed, generation, evaluations,
-                              update, len(aims))
+        result, tried = cma_search(
+            aim.start_point, SPREAD, (0.0, 1.0), seed,
+            lambda points, _: self.prices(gait, [*map(aim.design, points)], aim).tolist(),
+            evaluations, update, len(aims))
+        if result.fbest < cheapest:
+            best, cheapest = aim.design(result.xbest), float(result.fbest)
         near = self._nearest
         if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
             # The nearest one, by so much slower that its joints follow, or else smaller.
@@ -426,7 +413,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
 def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], seed: int,
                price: Callable[[Sequence[np.ndarray], int], list[float]], evaluations: int,
                update: Callable[[int], None] = lambda done: None, done: int = 0
-               ) -> tuple[np.ndarray, int]:
+               ) -> tuple[Any, int]:
     """Minimise a price by CMA-ES, GENERATION points at a time.
 
     Args:
@@ -440,7 +427,8 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
         done: number tried before.
 
     Returns:
-        The mean of the last generation, whose best point was partly lucky, and the number tried.
+        The result of CMA-ES and the number tried. Of a price that is partly luck, ``xfavorite``,
+        the mean of the last generation, is better than ``xbest``.
 
     """
     search = cma_es().CMAEvolutionStrategy(start, spread, {
@@ -451,7 +439,7 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
         search.tell(points, price(points, int(draws.integers(2**31))))
         done += len(points)
         update(min(done, evaluations))
-    return search.result.xfavorite, done
+    return search.result, done
 
 
 def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,

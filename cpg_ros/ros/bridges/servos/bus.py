@@ -240,13 +240,7 @@ class ServoBus(StartedNode):
         self.get_logger().error(self._refusal, throttle_duration_sec=QUIET)
 
     def _release(self, reason: str, blocked: str | None) -> None:
-        """Disable torque; a blocked sender must disable it, too, before it drives.
-
-        Args:
-            reason: for the log.
-            blocked: the sender, '' for none.
-
-        """
+        """Disable torque; the sender ``blocked``, if any, must disable it, too."""
         self._owner.released(blocked or '')
         self._reason = reason
         self._board.detach()

@@ -70,14 +70,7 @@ class Pca9685(ServoBoard):
     """Up to 16 servos by pulses, in microseconds; where they are cannot be measured."""
 
     def __init__(self, bus: LinuxI2c, channels: tuple[int, ...], frequency: float) -> None:
-        """Switch all pulses off, and set their frequency.
-
-        Args:
-            bus: to the device.
-            channels: of the servos, 0 to 15.
-            frequency: of the pulses, Hz.
-
-        """
+        """Switch all pulses off, and set their frequency, Hz; channels are 0 to 15."""
         self._bus, self._channels = bus, channels
         scale = prescale(frequency)
         # Duration of a count, us, by the rounded PRE_SCALE, not by the wanted frequency.

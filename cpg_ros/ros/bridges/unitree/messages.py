@@ -62,15 +62,9 @@ MODELS = {'go2': Model((23.7, 23.7, 45.43), 150.0, 8.0),
 
 
 def each(values: list[float], name: str, most: float) -> np.ndarray:
-    """Return a number for each of the joints.
+    """Return a number for each of the joints, shape (12,), from 0 to ``most``.
 
-    Args:
-        values: one for all, three for hip, thigh and calf, or one for each of JOINTS.
-        name: of the parameter, for messages.
-        most: largest that is allowed; from 0 on.
-
-    Returns:
-        Shape (12,).
+    ``values`` has one for all, three for hip, thigh and calf, or one for each of JOINTS.
 
     Raises:
         InputError: there are not 1, 3 or 12 of them, or one is out of range.
@@ -89,13 +83,8 @@ def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
                 torque_factor: float = 1.0, **others: float) -> BridgeSettings:
     """Return the settings of a robot file and a model.
 
-    Args:
-        robot: provides limits, speeds and the stand (offsets).
-        model: provides torque limits and the lying pose.
-        kp: proportional gains, as ``each`` takes them.
-        kd: damping gains, likewise.
-        torque_factor: fraction of the torque limits that commands may use.
-        others: further attributes of ``BridgeSettings``.
+    ``kp`` and ``kd`` are as ``each`` takes them, ``torque_factor`` is the fraction of the torque
+    limits that commands may use, ``others`` are further attributes of ``BridgeSettings``.
 
     Raises:
         InputError: the robot is not one of Unitree's, or a gain is out of range.
