@@ -21,7 +21,6 @@ import os
 from pathlib import Path
 import shutil
 import socket
-import sys
 import threading
 import time
 import traceback
