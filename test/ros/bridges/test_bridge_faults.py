@@ -107,7 +107,8 @@ def test_stops_are_accepted_in_every_state(robot, name):
             until(lambda state=state, before=before: count(f'{state}: ') > before, state)
             call(name)
             until(lambda number=number: count(ways[name]) == number + 1, ways[name])
-            until(lambda: not any(one.chain.torque.values()), 'damping')
+            until(lambda number=number: count('damping: ') == number + 1, 'damping')
+            until(lambda: not any(one.chain.torque.values()), 'no torque')
             call(name)
     if name == 'damp':
         assert not count('sitting')
