@@ -223,7 +223,7 @@ def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
     numbers, out = instant.numbers, 0
     dt = numbers[DT]
     for k in range(len(senses.monitors)):
-        out += is_out(senses.monitors[k], numbers[NOW])
+        out += is_out(senses.monitors[k], numbers[NOW], True)
     state[OUT], state[MOUNT], state[CONTRARY] = out, 0.0, 0.0
     if out == 0:
         state[MOUNT] = compare_rates(legs, sensors, dt, rates[0], rates[1], rates[2])

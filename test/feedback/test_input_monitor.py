@@ -125,7 +125,7 @@ def late_monitor(delay, now):
 def test_measurements_that_are_old_when_they_are_used_are_out(delay, late):
     monitor, now = late_monitor(delay, 1.0)
     assert monitor.age == pytest.approx(delay)
-    assert ('ms old when it is used, more than feedback.max_delay, 30 ms' in monitor.fault(now)
+    assert ('ms old when it is used, more than feedback.max_delay, 22 ms' in monitor.fault(now)
             ) is late
 
 

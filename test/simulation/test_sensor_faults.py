@@ -71,9 +71,10 @@ def test_a_right_imu_is_not_doubted(gait, push):
     assert not any('imu' in one for one in outcome.faults)
 
 
-@pytest.mark.parametrize('fault', [*in_depth('delay 50 ms', 'delay 90 ms'), 'delay 60 ms'])
-def test_late_senses_are_not_fed_back(fault):
-    outcome = FaultyGo2(fault).run(STANDS + 3.0)
+@pytest.mark.parametrize(('fault', 'seed'), [
+    *in_depth(('delay 50 ms', 0), ('delay 90 ms', 0)), ('delay 60 ms', 0), ('imu delay 28 ms', 2)])
+def test_late_senses_are_not_fed_back(fault, seed):
+    outcome = FaultyGo2(fault, seed).run(STANDS + 3.0)
     assert not outcome.fell and not outcome.crossed
     assert any('ms old when it is used, more than feedback.max_delay' in one
                for one in outcome.faults)

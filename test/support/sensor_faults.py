@@ -208,6 +208,7 @@ FAULTS: dict[str, Fault] = {
     **{f'delay {ms} ms': Fault(lasting=True, delay=1e-3 * ms) for ms in (20, 50, 60, 90, 200)},
     **{f'delay {ms} ms from a walk on': Fault(seconds=math.inf, delay=1e-3 * ms)
        for ms in (20, 50)},
+    'imu delay 28 ms': Fault(lasting=True, delay=0.028, inputs=(IMU,)),
     '0.2 s without imu': Fault(seconds=0.2, inputs=(IMU,), drop=1.0),
     'stamps 1 s ahead': Fault(stamp=1.0),
     'stamps 1 s old': Fault(stamp=-1.0),

@@ -73,7 +73,7 @@ TOPICS = fixed({
                                'of the base [rad], as in the origin of its URDF joint; by default '
                                'that of the robot file'),
     f'{PREFIX}max_delay': Spec(LATE, 'largest age of measurements when they are used, by their '
-                               'stamps, low-passed over 0.1 s [s]: feedback fades out above it; '
+                               'stamps [s]: feedback fades out above it; '
                                f'by default {LATE:g}, and {LATE_BALANCE:g} for a robot with soles',
                                0.001, DELAYED),
     f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, computed from the '
