@@ -73,13 +73,6 @@ def test_help_of_a_tool_and_words_that_are_not_for_it(here, tool):
     assert code == 2 and not said and len(errors.splitlines()) == 1
 
 
-def test_a_range_may_begin_with_a_minus():
-    parser = Parser(prog='tool')
-    parser.add_argument('--range', type=interval)
-    assert parser.parse_args(['--range', '-0.6:0.2']).range == (-0.6, 0.2)
-    assert parser.parse_args(['--range', '-.5:1']).range == (-0.5, 1.0)
-
-
 @pytest.mark.parametrize(('executable', 'word'), [
     *((executable, '--help') for executable in (*NODES, 'demo')), ('generator', '-h'), *in_depth(
         *((tool, '--help') for tool in TOOLS[1:]),
