@@ -234,18 +234,24 @@ class Tuner:
                       hops=aim.hops / math.sqrt(self.scale))
         result, runs, runnable = np.full(len(designs), NO_GAIT), [], []
         for k, design in enumerate(designs):
-            motion = self.motion(gait, design)
+            motion, plans, errors = self.motion(gait, design), [], []
             try:
-                angles = [targets(self.plan(gait, motion, network), SHORT, self.batch.timestep)
-                          for network in self.robot.networks_with(gait)]
-            except OutOfLimits as error:
-                result[k] = REFUSED + BEYOND * error.excess
-                if self._nearest is None or error.excess < self._nearest.error.excess:
-                    self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
-                                                  error)
-                continue
+                for network in self.robot.networks_with(gait):
+                    try:
+                        plans.append(self.plan(gait, motion, network))
+                    except OutOfLimits as error:
+                        errors.append(error)
             except PlanError:
                 continue
+            if errors:
+                # Of all networks, so that a slower one fits all of them.
+                worst = max(errors, key=lambda error: error.excess)
+                result[k] = REFUSED + BEYOND * worst.excess
+                if self._nearest is None or worst.excess < self._nearest.error.excess:
+                    self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
+                                                  worst)
+                continue
+            angles = [targets(plan, SHORT, self.batch.timestep) for plan in plans]
             runs += list(zip(cycle(angles), self.scenarios, strict=False))
             runnable.append(k)
         prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)

@@ -120,7 +120,7 @@ def test_a_click_takes_over_and_both_pages_see_it(twists, open_page):
 
 @pytest.mark.parametrize('request_', [
     {'do': 'set', 'name': 'gait', 'value': 'walk'}, {'do': 'enable', 'on': True},
-    {'do': 'push', 'force': 50, 'direction': 0}, {'do': 'reset'}])
+    {'do': 'push', 'force': 50, 'direction': 0}, {'do': 'reset'}, {'do': 'seat', 'on': True}])
 def test_what_moves_the_robot_takes_the_lease(rig, open_page, request_):
     one, other = open_page().ready(), open_page().ready()
     one.send(do='set', name='gait', value='trot')

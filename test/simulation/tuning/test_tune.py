@@ -192,6 +192,19 @@ def test_a_design_just_beyond_a_limit_of_speed_is_slowed(monkeypatch):
     assert found.design.stride == aims[0].start.stride and found.trial.upright
 
 
+def test_the_nearest_design_is_judged_by_the_network_that_asks_most(monkeypatch):
+    tuner = Tuner(GO2, 'go2')
+    excesses = {'delayed': 0.1, 'quadruped': 0.6}
+
+    def refuse(gait, motion, network=''):
+        raise OutOfLimits('the', f'knee of {network}', excesses[network], 'velocity')
+
+    monkeypatch.setattr(tuner, 'plan', refuse)
+    tuner._nearest = None
+    assert tuner.prices('trot', [AIMS['trot'].start])[0] == pytest.approx(REFUSED + 60.0)
+    assert tuner._nearest.error.excess == 0.6
+
+
 def test_the_slowest_design_just_beyond_a_limit_of_speed_is_made_smaller(monkeypatch):
     tuner, aim = Tuner(GO2, 'go2'), AIMS['trot'].slower(0.3)
     price, longest = tuner.prices, aim.start.stride / 1.1
