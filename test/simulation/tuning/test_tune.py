@@ -18,6 +18,7 @@ from argparse import Namespace
 from dataclasses import replace
 import importlib.util
 import re
+from types import SimpleNamespace
 
 from cpg_ros.common.jobs import ResilientExecutor
 from cpg_ros.motion.body_file import OwnFeedback
@@ -221,7 +222,7 @@ def test_the_slowest_design_just_beyond_a_limit_of_speed_is_made_smaller(monkeyp
     monkeypatch.setattr(tuner, 'prices', prices)
     monkeypatch.setattr(tuner, '_starts', lambda gait: ([aim], prices(gait, [aim.start])))
     monkeypatch.setattr('cpg_ros.simulation.tuning.gaits.cma_search',
-                        lambda *args: (None, 1))
+                        lambda *args: (SimpleNamespace(fbest=np.inf), 1))
     found = tuner.tune('trot', 1)
     assert found.design.frequency == pytest.approx(aim.start.frequency)
     assert found.design.stride == pytest.approx(0.9 * longest)
