@@ -489,7 +489,7 @@ class Generator(StartedNode):
         """Return the angles that joints should be at, rad, or None while there are none."""
         # The balance of a biped sends torques as angles, q + tau / kp.
         torques = isinstance(self.pattern, BalancedPattern) and self.pattern.balancing
-        if self.ticker.waiting or self._sent is None or torques:
+        if self.ticker.waiting or self._sent is None or torques or self._feedback.recovering:
             return None
         return self._sent.copy()
 

@@ -373,6 +373,12 @@ class FeedbackSwitch:
         return self.loop is not None and self.loop.fraction > 0.0
 
     @property
+    def recovering(self) -> bool:
+        """Whether the robot recovers from a push, with strides faster than servos follow."""
+        return (self._biped is None and self.loop is not None
+                and bool(self.loop.feedback.memory.stiff_for[0] > 0.0))
+
+    @property
     def out(self) -> str:
         """Reason why active feedback is interrupted, or ''."""
         loop = self.loop
