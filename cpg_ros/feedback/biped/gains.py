@@ -27,6 +27,7 @@ from cpg_ros.feedback.biped.stepping import (
 )
 from cpg_ros.feedback.biped.support import STANCE_GAINS, VELOCITY_GAINS
 from cpg_ros.feedback.gains import scale_of
+from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.feedback.laws.law import Gain, named_tuple
 from cpg_ros.motion.body_file import BipedBody
 import numpy as np
@@ -60,6 +61,7 @@ class BipedMemory(NamedTuple):
         ground: height of the ground, m, shape (1,).
         fractions: of the weight that each leg is to bear, shape (2,).
         error: of the capture point, forward and left, m, shape (2,).
+        force: that the ground is to exert on all feet, N, shape (3,).
         reaction: moment that the swing leg takes, N m, shape (3,).
         path: of a swinging foot, scratch, shape (3, 3).
         clock: factor of the clock, and by how much it is to leap, cycles, shape (2,).
@@ -85,6 +87,7 @@ class BipedMemory(NamedTuple):
     ground: np.ndarray
     fractions: np.ndarray
     error: np.ndarray
+    force: np.ndarray
     reaction: np.ndarray
     path: np.ndarray
     clock: np.ndarray
@@ -98,8 +101,8 @@ class BipedMemory(NamedTuple):
                    np.zeros((2, 6)), np.zeros(2), np.zeros(2), np.zeros(1), np.zeros(1),
                    np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2, dtype=bool),
                    np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1), np.full(2, 0.5), np.zeros(2),
-                   np.zeros(3), np.zeros((3, 3)), np.array([1.0, 0.0]),
-                   np.zeros(1),
+                   np.array([0.0, 0.0, GRAVITY * links.masses.sum()]), np.zeros(3),
+                   np.zeros((3, 3)), np.array([1.0, 0.0]), np.zeros(1),
                    np.zeros((2, links.chains.shape[1])))
 
 

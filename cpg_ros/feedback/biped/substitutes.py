@@ -15,8 +15,9 @@
 """Substitutes for measurements of a biped that do not arrive, for as long as it needs to stop.
 
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
-the inertial unit: it is level and still, so the joints say how the base leans and turns. Loads on
-the feet are those that the clock gives them. Joints move as they must for soles that stand to be
+the inertial unit: it is level and still, so the joints say how the base leans and turns. The force
+that the legs were to exert accelerates the centre of mass, and from it and the joints follows how
+the base accelerates. Loads on the feet are those that the clock gives them. Joints move as they must for soles that stand to be
 still and those that swing to be on their paths, while the base moves as the inertial unit says.
 """
 
@@ -41,6 +42,8 @@ PROMPT = 0.008
 FOLLOWED, DAMPED = 20.0, 1e-3
 #: FASTEST: largest rate of a predicted joint, rad/s.
 FASTEST = 15.0
+#: LEANT: age of the inertial unit, s, from which on a sole stands for it, where joints are known.
+LEANT = 0.025
 #: ADOPTED: duration of the transition to orientation and angular velocity from the sole, s.
 ADOPTED = 0.02
 
@@ -124,8 +127,9 @@ class Substitutes:
         time = max(ages[IMU], latencies[IMU])
         if late[IMU] or time > PROMPT:
             self._turn(measured, min(time, EXTRAPOLATED))
-        if ages[IMU] > EXTRAPOLATED:
-            self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
+        begins = EXTRAPOLATED if late[JOINTS] else LEANT
+        if ages[IMU] > begins:
+            self._lean_on_sole(memory, min((ages[IMU] - begins) / ADOPTED, 1.0), dt)
         if late[IMU] and late[JOINTS]:
             # Neither input tells how the base turns: let its angular velocity fade.
             sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
@@ -183,13 +187,14 @@ class Substitutes:
         about = (s * y + c * z) / cosine
         self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
 
-    def _lean_on_sole(self, memory: BipedMemory, fraction: float) -> None:
+    def _lean_on_sole(self, memory: BipedMemory, fraction: float, dt: float) -> None:
         """Set lean and rates of the base from the joints of the leg that bears more."""
         sensors, pose = self.sensors, self._pose
         self._kinematics(self._links, self._still, sensors.joint_positions[0],
                          (self._still, sensors.joint_velocities[0]), pose, self._center,
                          self._soles, self._weights)
-        leg = int(memory.fractions[1] > memory.fractions[0])
+        # By the loads, as a foot that is late is not level yet when the clock has it land.
+        leg = int(memory.loads[1] > memory.loads[0])
         # The base seen from the sole: the sole's rotation from the base, transposed.
         up = pose.turns[self._links.chains[leg, -1]][:, 2]
         lean = np.array([np.arctan2(up[1], up[2]), np.arcsin(-np.clip(up[0], -1.0, 1.0))])
@@ -198,8 +203,13 @@ class Substitutes:
         rpy[2] = memory.heading[0]
         turning = -self._soles[leg, 3:]
         sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
-        # Velocity of a body that topples about the middle of the sole.
-        center, sole = memory.center[0], memory.pose.soles[leg]
-        topples = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
-        topples[2] = GRAVITY
-        sensors.acceleration[0] = memory.pose.turns[0].T @ topples
+        # The centre of mass goes as the force of the last tick moves it, and the base as it has
+        # to while legs move against it.
+        turn = memory.pose.turns[0]
+        self._kinematics(self._links, rpy, sensors.joint_positions[0],
+                         (turn @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
+                         self._center, self._soles, self._weights)
+        moved = memory.force / pose.carried[0] - (
+            self._center[3:] - memory.center[1] + memory.base) / dt
+        moved[2] += GRAVITY - memory.force[2] / pose.carried[0]
+        sensors.acceleration[0] = turn.T @ moved

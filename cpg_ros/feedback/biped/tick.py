@@ -191,6 +191,7 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
     firm = 1.0 if kind == stepping.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
     moment = (firm * x, firm * y, firm * z)
     force = support.ground_force(memory.center[0], pressure, up, moment, gains)
+    memory.force[0], memory.force[1], memory.force[2] = force
     for leg in range(2):
         torque, bears = memory.torque[leg], fractions[leg] > 0.0
         damping = gains.stance_damping * (1.0 if bears else stepping.SWUNG)
