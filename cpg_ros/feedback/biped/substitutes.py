@@ -17,8 +17,9 @@
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
 the inertial unit: it is level and still, so the joints say how the base leans and turns. The force
 that the legs were to exert accelerates the centre of mass, and from it and the joints follows how
-the base accelerates. Loads on the feet are those that the clock gives them. Joints move as they must for soles that stand to be
-still and those that swing to be on their paths, while the base moves as the inertial unit says.
+the base accelerates. Loads on the feet are those that the clock gives them. Joints move as they
+must for soles that stand to be still and those that swing to be on their paths, while the base
+moves as the inertial unit says.
 """
 
 from cpg_ros.dynamics.integration.compilation import specialised
@@ -129,7 +130,9 @@ class Substitutes:
             self._turn(measured, min(time, EXTRAPOLATED))
         begins = EXTRAPOLATED if late[JOINTS] else LEANT
         if ages[IMU] > begins:
-            self._lean_on_sole(memory, min((ages[IMU] - begins) / ADOPTED, 1.0), dt)
+            # In a stand, one that arrives but is not believed may be that of a robot on its edges.
+            pushed = latencies[IMU] < LEANT and not memory.swinging.any()
+            self._lean_on_sole(memory, min((ages[IMU] - begins) / ADOPTED, 1.0), dt, pushed)
         if late[IMU] and late[JOINTS]:
             # Neither input tells how the base turns: let its angular velocity fade.
             sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
@@ -187,7 +190,8 @@ class Substitutes:
         about = (s * y + c * z) / cosine
         self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
 
-    def _lean_on_sole(self, memory: BipedMemory, fraction: float, dt: float) -> None:
+    def _lean_on_sole(self, memory: BipedMemory, fraction: float, dt: float,
+                      pushed: bool) -> None:
         """Set lean and rates of the base from the joints of the leg that bears more."""
         sensors, pose = self.sensors, self._pose
         self._kinematics(self._links, self._still, sensors.joint_positions[0],
@@ -212,4 +216,9 @@ class Substitutes:
         moved = memory.force / pose.carried[0] - (
             self._center[3:] - memory.center[1] + memory.base) / dt
         moved[2] += GRAVITY - memory.force[2] / pose.carried[0]
+        if pushed:
+            # Feet on their edges do not exert that force: it topples about the middle of a sole.
+            center, sole = memory.center[0], memory.pose.soles[int(np.argmax(memory.fractions))]
+            moved = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
+            moved[2] = GRAVITY
         sensors.acceleration[0] = turn.T @ moved

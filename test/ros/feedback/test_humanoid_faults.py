@@ -14,6 +14,8 @@
 
 """A humanoid whose sensors fail in a walk stops or crouches, within its limits, and goes on."""
 
+import importlib.util
+
 from depth import in_depth
 import numpy as np
 import pytest
@@ -30,6 +32,14 @@ from humanoid_under_fault import HumanoidUnderFault  # noqa: E402
 def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
+    assert not humanoid.crossed and not humanoid.pattern.falls
+
+
+@pytest.mark.skipif(importlib.util.find_spec('mjlab') is None, reason='the G1 is in mjlab')
+@pytest.mark.parametrize('fault, end', [('0.2 s without imu', 'walk'), ('NaN imu', 'crouch')])
+def test_a_unitree_g1_walks_on_or_crouches_without_its_imu(fault, end):
+    humanoid = HumanoidUnderFault(fault, 2, name='unitree_g1', begins=3.0 + 0.4 / 1.65)
+    assert humanoid.run(humanoid.faults.ends + 2.5) == end
     assert not humanoid.crossed and not humanoid.pattern.falls
 
 
