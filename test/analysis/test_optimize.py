@@ -20,10 +20,7 @@ import os
 import subprocess
 import sys
 
-from cpg_ros.analysis import nsga2 as polish
-from cpg_ros.analysis import nsga2 as weights
-from cpg_ros.analysis import objectives, optimize
-from cpg_ros.analysis import objectives as search_space
+from cpg_ros.analysis import nsga2, objectives, optimize
 from cpg_ros.analysis.optimize import write_front
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import extra_symmetry
@@ -52,7 +49,7 @@ def run(*arguments, **environment):
 
 @pytest.fixture(scope='module')
 def found():
-    return weights.optimise('biped', 'walk', population=24, generations=4, fixed=FIXED,
+    return nsga2.optimise('biped', 'walk', population=24, generations=4, fixed=FIXED,
                             progress=False)
 
 
@@ -70,7 +67,7 @@ def test_it_finds_the_walk(found):
     assert best.preset.network.as_dict().items() >= FIXED.items()
     assert best.orbit.residual < 1e-8
     # The walk of Table 5: 0 1/2 1/2 0, exactly.
-    x = polish.orbit_signals(best.orbit, 64)[:, :4]
+    x = best.orbit.cycle(64)[:, :4]
     assert x[:, 3] == pytest.approx(x[:, 0], abs=1e-12)
     assert x[:, 1] == pytest.approx(np.roll(x[:, 0], 32), abs=1e-9)
     assert x[:, 2] == pytest.approx(x[:, 1], abs=1e-12)
@@ -129,7 +126,7 @@ def test_a_two_wave_gait_and_its_picture(tmp_path, capsys):
     preset = read_presets(tmp_path / 'preset.yaml', Biped)['skip_optimised']
     orbit = solve_preset(preset)
     assert extra_symmetry(orbit) == '' and multipliers(orbit).leading < 1.0
-    signals = polish.orbit_signals(orbit)
+    signals = orbit.cycle(nsga2.POINTS)
     assert shape_difference(signals[:, 0], signals[:, 2]) > objectives.LEAST_DIFFERENCE
 
 
@@ -222,7 +219,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
 
 @pytest.mark.parametrize('gait', GAITS)
 def test_weights_of_a_search_keep_the_gaits_symmetry(gait):
-    space = search_space.search_space('biped', gait, {}, {})
+    space = objectives.search_space('biped', gait, {}, {})
     weight = [variable for variable in space.variables if variable.name.startswith('w_')]
     if gait in PRIMARY:
         assert {variable.name: frozenset(variable.members) for variable in weight} == {
@@ -245,14 +242,14 @@ def test_weights_of_a_search_keep_the_gaits_symmetry(gait):
 
 
 def test_bounds_and_fixed_values_hold():
-    space = search_space.search_space('quadruped', 'trot', {'xi': (-0.1, 0.1)}, {'beta': 0.25})
+    space = objectives.search_space('quadruped', 'trot', {'xi': (-0.1, 0.1)}, {'beta': 0.25})
     assert [variable.name for variable in space.free] == ['alpha', 'gamma', 'delta', 'xi']
     network = space.build(np.array([0.11111111, 0.2, 0.3, -0.1]))
     assert network == Quadruped(0.1111, 0.25, 0.2, 0.3, -0.1, 0.0)
 
 
 def test_a_partners_name_fixes_both():
-    space = search_space.search_space('biped', 'skip', {}, {'w_21': 0.5})
+    space = objectives.search_space('biped', 'skip', {}, {'w_21': 0.5})
     network = space.build(np.zeros(len(space.free)))
     assert network.w_21 == network.w_12 == 0.5
 
@@ -261,7 +258,7 @@ def test_a_partners_name_fixes_both():
                                            for gait in ALL_PRESETS[network]])
 def test_phase_errors_are_those_of_the_gait(network, gait):
     preset = ALL_PRESETS[network][gait]
-    signals = polish.orbit_signals(solve_preset(preset), 256)
+    signals = solve_preset(preset).cycle(256)
     for other in preset.network.gaits():
         symmetry = preset.network.symmetry(other)
         errors = objectives.phase_errors(signals, symmetry)
@@ -315,9 +312,9 @@ def test_shipped_secondary_gaits_are_stable_two_waved_readable_and_stand_noise(g
     preset = PRESETS[gait]
     orbit = solve_preset(preset)
     assert multipliers(orbit).leading < 0.7
-    assert objectives.waveform_shortfall(polish.orbit_signals(orbit), orbit.symmetry) == 0.0
+    assert objectives.waveform_shortfall(orbit.cycle(nsga2.POINTS), orbit.symmetry) == 0.0
     PhaseReadout(orbit, np.zeros(1, int), np.zeros((1, 6)), np.array([0]), 3)
-    assert polish.survives(orbit)
+    assert nsga2.survives(orbit)
 
 
 @pytest.mark.parametrize('network, gait', [(network, gait) for network in ('biped', 'quadruped')

@@ -51,8 +51,8 @@ def gait_plan(robot, network, gait, duty=0.0):
         legs[leg] = (one,)
     order = tuple(joint.name for joints in legs.values() for joint in joints)
     preset = find_network(network).presets()[gait]
-    return plan(replace(known, legs=legs, order=order, motions={}), gait, preset, preset.network,
-                1.0, duty=duty)
+    robot = replace(known, legs=legs, order=order, motions={}, geometry=None)
+    return plan(robot, gait, preset, preset.network, 1.0, duty=duty)
 
 
 def falling(pattern, strides=3, ticks=2000):
