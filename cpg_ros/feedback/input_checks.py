@@ -266,6 +266,9 @@ def _contradicts(up, turning, memory):
     leaps = comparable and leap > LEAP**2
     if leaps:
         comparable, memory[12], memory[13], memory[19] = False, 0.0, 0.0, 0.0
+    if not comparable:
+        # The mean acceleration begins anew, too.
+        memory[14:19] = 0.0
     stays = 1.0 - min(dt / FORGET, 1.0)
     for k in range(3):
         stated = stays * memory[6 + k] + up[k] - memory[3 + k]

@@ -259,6 +259,8 @@ def test_a_set_system_clock_shows_in_the_stamps_alone(monkeypatch):
                              create_jump_callback=lambda *_, **__: None)
     ticker = ticker_module.Ticker(SimpleNamespace(get_clock=lambda: steady), 500.0, tick, None,
                                   failures.append)
+    monkeypatch.setattr(ticker, '_library', SimpleNamespace(
+        wait_until=ticker._library.wait_until, system_offset=lambda: offset[0]))
     began = time.monotonic()
     ticker.start()
     assert done.wait(60.0)

@@ -76,7 +76,7 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
             depth = stand - ahead_of_soles.height(angles)
             kp = np.array([robot.biped.links[name].kp for name in names])
             # At the end of its range a knee rests on its stop.
-            bearing = (hips, knees) if fraction < 1.0 else (hips,)
+            bearing = (hips, knees) if fraction < 1.0 else ()
             sag = ahead_of_soles.torques(angles, bearing) / kp
             return np.clip(angles + sag, lower, upper)[order], depth
     return None

@@ -136,6 +136,8 @@ class Targets:
 #: A joint is stuck if it moves by less than FOLLOWS of the range that it is commanded, while that
 #: is more than MOVES, rad, in two windows of ``tracking_time`` that follow one another.
 FOLLOWS, MOVES = 0.2, 0.08
+#: FRESH: largest age of the measured angles that are compared, s.
+FRESH = 0.2
 
 
 class TrackingMonitor:
@@ -324,7 +326,7 @@ class Supervisor:
         if self.state is BridgeState.FOLLOWING:
             self._check_targets(now)
         dt, self._before = now - self._before, now
-        if self.state is BridgeState.FOLLOWING and (
+        if self.state is BridgeState.FOLLOWING and now - self._received < FRESH and (
                 reason := self.tracking.update(self._at, self.robot.q, dt)):
             self.sit(now, reason)
         if self.state in ACTIVE:
