@@ -67,7 +67,7 @@ def note(monitor, now, stamp, same, verdict, patience):
     monitor[CAME] = now
     if not same:
         monitor[CHANGED] = now
-    elif verdict == 0 and now > monitor[CHANGED] + patience:
+    elif verdict in (0, NO_GRAVITY) and now > monitor[CHANGED] + patience:
         verdict = REPEATED
     if not math.isnan(stamp) and not abs(now - stamp) <= DELAYED:
         monitor[LAG], verdict = now - stamp, MISSTAMPED
@@ -203,9 +203,9 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
             'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
             'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed',
             'the same numbers again and again', '', '')
-#: Indices of the last verdicts. REPEATED: the same values; MISSTAMPED: a stamp far from the clock;
-#: UNREADABLE: another layout.
-REPEATED, MISSTAMPED, UNREADABLE = 11, 12, 13
+#: Indices of the last verdicts. NO_GRAVITY: an acceleration without it; REPEATED: the same values;
+#: MISSTAMPED: a stamp far from the clock; UNREADABLE: another layout.
+NO_GRAVITY, REPEATED, MISSTAMPED, UNREADABLE = 10, 11, 12, 13
 #: JOLT: largest change of the angular velocity between two messages, rad/s, and SPUN: what the
 #: time between them adds, rad/s^2.
 JOLT, SPUN = 5.0, 1000.0
@@ -354,7 +354,7 @@ def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
     up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
     contradicts = _contradicts(up, turning, memory)
     if _is_off_gravity(up, felt, moving, dt, memory):
-        return 10
+        return NO_GRAVITY
     if contradicts:
         return 6
     rpy[0] = math.atan2(up[1], up[2])
