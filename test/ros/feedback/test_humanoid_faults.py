@@ -35,7 +35,8 @@ def test_it_goes_on_walking_after(fault):
     assert not humanoid.crossed and not humanoid.pattern.falls
 
 
-@pytest.mark.skipif(importlib.util.find_spec('mjlab') is None, reason='the G1 is in mjlab')
+@pytest.mark.skipif(importlib.util.find_spec('mjlab') is None,
+                    reason='mjlab, which has the G1, is not installed')
 @pytest.mark.parametrize('fault, end', [('0.2 s without imu', 'walk'), ('NaN imu', 'crouch')])
 def test_a_unitree_g1_walks_on_or_crouches_without_its_imu(fault, end):
     humanoid = HumanoidUnderFault(fault, 2, name='unitree_g1', begins=3.0 + 0.4 / 1.65)
