@@ -167,7 +167,7 @@ def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
 
 @jit
 def _intend(tables, gains, memory, planned, run, off, step):
-    """Return the Intent of a run, and advance the filters that it depends on."""
+    """Return the slot of the gait and the Intent of a run; advance the filters behind them."""
     old, new, mix, (dt, fraction, _, _) = (planned.gaits[run, 0], planned.gaits[run, 1],
                                            planned.mix[run], step)
     slot = new if mix > 0.5 else old

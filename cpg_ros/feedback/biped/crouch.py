@@ -16,8 +16,9 @@
 
 A stand on servos falls: the ankles would have to be stiffer than the weight topples. In the crouch
 the ankles are at the ends of their ranges, so they cannot give way forward, and the centre of mass
-is low and above the middle of the soles. Servos of hips and knees give way under the weight, and
-their targets make up for it: at rest each bears half of the potential energy's derivative.
+is low and above the middle of the soles. Knees rest on the ends of their ranges, or, where thighs
+would then point down, are bent less: servos of hips and knees then give way under the weight, and
+their targets make up for it (at rest each bears half of the potential energy's derivative).
 """
 
 from collections.abc import Sequence
@@ -74,11 +75,10 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
                 and ahead_of_soles.thighs_rise(angles)):
             order = [names.index(joint.name) for joint in robot.joints]
             depth = stand - ahead_of_soles.height(angles)
-            kp = np.array([robot.biped.links[name].kp for name in names])
-            # At the end of its range a knee rests on its stop.
-            bearing = (hips, knees) if fraction < 1.0 else ()
-            sag = ahead_of_soles.torques(angles, bearing) / kp
-            return np.clip(angles + sag, lower, upper)[order], depth
+            if fraction < 1.0:
+                kp = np.array([robot.biped.links[name].kp for name in names])
+                angles += ahead_of_soles.torques(angles, (hips, knees)) / kp
+            return np.clip(angles, lower, upper)[order], depth
     return None
 
 

@@ -103,6 +103,11 @@ class Between(Watcher):
         return next((one for one in reversed(self.diagnostics)
                      if 'pattern' in one.name), None)
 
+    def corrected(self):
+        """Tell whether the feedback is in full effect."""
+        return self.health is not None and any(
+            (one.key, one.value) == ('feedback', '100 %') for one in self.health.values)
+
     def pass_by(self, seconds):
         """Wait for simulated time."""
         end = self.time + seconds
@@ -129,9 +134,7 @@ def test_the_closed_go2_walks_and_an_input_that_fails_is_named(between):
     body, watcher, generator = between
     generator.wait_for('publishing')
     # It begins once the first measurements have come by the relay.
-    until(lambda: watcher.health is not None and
-          any((one.key, one.value) == ('feedback', '100 %') for one in watcher.health.values),
-          'feedback')
+    until(watcher.corrected, 'feedback')
     # While the gait ramps up, it may recover from its own start.
     watcher.pass_by(4.0)
     until(lambda: not watcher.kp_scales or watcher.kp_scales[-1][1] == 1.0, 'soft servos')
@@ -188,9 +191,7 @@ def test_it_is_off_by_default_with_controllers(stepped, words, enabled):
 def test_the_closed_go2_walks_low_is_pushed_sits_and_walks_again(between):
     body, watcher, generator = between
     generator.wait_for('publishing')
-    until(lambda: watcher.health is not None and
-          any((one.key, one.value) == ('feedback', '100 %') for one in watcher.health.values),
-          'feedback')
+    until(watcher.corrected, 'feedback')
     watcher.pass_by(4.0)
     high = np.mean([row[2] for row in watcher.rows[-500:]])
     assert watcher.set(**{'body.height': -0.05})[0].successful
