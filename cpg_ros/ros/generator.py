@@ -564,9 +564,10 @@ class Generator(StartedNode):
         else:
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
-    def look(self) -> None:
+    def look(self) -> float:
         """Let ticks outside the interpreter know what motion is wanted."""
         self._feedback.renew()
+        return 0.02 if self._feedback.active else 0.1
 
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.

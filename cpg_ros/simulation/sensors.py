@@ -21,7 +21,7 @@ import math
 from cpg_ros.dynamics.integration.compilation import jit_entry
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.rotations import fill_quaternion, rpy_of
+from cpg_ros.motion.rotations import fill_quaternion
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np
@@ -41,7 +41,7 @@ class SimulatedSensors:
         self.foot_forces = body.feet.copy()
         self._true = SensorData.zeros(1, len(body.feet), 0)
         self._noise = NoisySenses(replace(noise, delay=0.0), 1, len(body.feet), period)
-        self._before = body.rates[:3].copy()
+        self._before, self._velocity = body.rates[None].copy(), np.empty((1, 3))
         self._late: deque[tuple[int, np.ndarray]] = deque()
 
     def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
@@ -53,12 +53,11 @@ class SimulatedSensors:
 
         """
         body, true, imu = self._body, self._true, np.empty(10)
-        rates = body.rates
-        true.foot_forces[0], true.rpy[0] = body.feet, rpy_of(body.quaternion)
-        true.angular_velocity[0] = rates[3:]
-        true.acceleration[0] = ((rates[:3] - self._before) / self._period
-                                + (0.0, 0.0, GRAVITY)) @ body.axes
-        self._before[:] = rates[:3]
+        true.foot_forces[0] = body.feet
+        # As plain Python: a simulated robot needs no machine code for one body.
+        fill_sensor_data.py_func(true, body.quaternion[None], body.rates[None], self._before,
+                                 self._period, self._velocity)
+        self._before[0] = body.rates
         sensed = self._noise(true)
         self.foot_forces = sensed.foot_forces[0]
         roll, pitch, yaw = sensed.rpy[0].tolist()

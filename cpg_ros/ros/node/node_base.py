@@ -20,6 +20,7 @@ from functools import partialmethod
 import gc
 import os
 from pathlib import Path
+import select
 import signal
 import sys
 import threading
@@ -281,8 +282,9 @@ class StartedNode(Node):
     def begin(self) -> None:
         """Start the thread."""
 
-    def look(self) -> None:
-        """Do periodic work, 50 times a second, in the main thread."""
+    def look(self) -> float:
+        """Do periodic work in the main thread; return the time until the next call, s."""
+        return 0.1
 
     def finish(self) -> None:
         """End the thread."""
@@ -410,9 +412,12 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     node.begin()
     serving.start()
     node.parameter_service.thread.start()
-    # A bare wait() can miss a signal that another thread received, and a stop must not wait.
-    while not signals and not node.stop.wait(0.02):
-        node.look()
+    # A signal wakes the main thread whichever thread receives it: a stop must not wait.
+    woken, waking = os.pipe()
+    os.set_blocking(waking, False)
+    signal.set_wakeup_fd(waking, warn_on_full_buffer=False)
+    while not signals and not node.stop.is_set():
+        select.select([woken], [], [], node.look())
     node.stop.set()
     node.parameter_service.end()
     node.finish()
