@@ -98,7 +98,7 @@ def tour(body: Body, made: dict[str, GaitPlan]) -> str:
 
 def steered(body: Body, made: GaitPlan, forward: float, turn: float) -> tuple[float, float]:
     """Return the speeds and yaw rates that are reached for those commanded."""
-    pattern = Pattern(made, drive=StrideCommand(4))
+    pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)
     walk.go(2.0)

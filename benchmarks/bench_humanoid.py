@@ -65,7 +65,7 @@ RUNNING, LATER = 8.0, 0.07
 #: Changes of the gains that take a law away.
 ABLATIONS = {'without placement': {'place_x': 0.0, 'place_y': 0.0},
              'without speed-up': {'speed_up': 0.0},
-             'without pressure': {'pressure_x': 0.0, 'pressure_y': 0.0}}
+             'without pressure': {'cop_x': 0.0, 'cop_y': 0.0}}
 EVEN = 'even clock'
 TARGETS = {'speed_error': 0.1, 'survived_20': 22, 'survived_30': 12}
 #: A round of 'ten times', s, and its gaits and commands from their times on.

@@ -25,7 +25,7 @@ import math
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.motion.body_file import leg_axes
-from cpg_ros.motion.core import Body, core, Drive
+from cpg_ros.motion.core import Body, core, Smoother
 from cpg_ros.motion.plan import beyond_limits, GaitPlan
 from cpg_ros.motion.robot import Robot
 import numpy as np
@@ -87,8 +87,8 @@ class BodyPose:
         self.now, self.target, rate = np.zeros((3, len(POSE)))
         #: Rates of the stand's angles, rad/s, and arrays that only the core uses.
         self._kept = np.zeros(len(names)), rate, joints, limbs
-        self._struct = Body(Drive(self.now.ctypes.data, rate.ctypes.data, self.target.ctypes.data,
-                                  None, len(POSE) - 1, 0),
+        self._struct = Body(Smoother(self.now.ctypes.data, rate.ctypes.data,
+                                     self.target.ctypes.data, None, len(POSE) - 1, 0),
                             1.0, self._kept[0].ctypes.data, joints.ctypes.data,
                             limbs.ctypes.data, len(legs), 0)
         self.address = ctypes.addressof(self._struct)

@@ -52,31 +52,32 @@ Gait = _struct(
     'Gait', (_REAL, 'frequency period start peak least'),
     (_WHOLE, 'components cells joints legs points harmonics by_phase'),
     (_POINTER, 'joint_cell joint_leg leg_cell wave phase shift speed weights in_place maps '
-               'waves shapes circles terms crests values lead turn cycle'))
+               'waves shapes circles terms crests values phase_offset phase_offset_slope '
+               'cycle'))
 Net = _struct('Net', (_POINTER, 'lane clock now x slope before'), (ctypes.c_int64, 'size'))
 Track = _struct(
     'Track', (_POINTER, 'gait advance'), (Net, 'net home seed'),
     (_REAL, 'transition progress phase phase_carry settling calm still astray distance sum'),
-    (_POINTER, 'angle rise reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
-Drive = _struct('Drive', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
-Body = _struct('Body', (Drive, 'pose'), (_REAL, 'pace'), (_POINTER, 'rate joints limbs'),
+    (_POINTER, 'angle d_angle_d_phase reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
+Smoother = _struct('Smoother', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
+Body = _struct('Body', (Smoother, 'pose'), (_REAL, 'pace'), (_POINTER, 'rate joints limbs'),
                (_WHOLE, 'legs moving'))
 _RampPart = _struct('RampPart', (_REAL, 'start rate end time'))
 Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart, 'part'), (_REAL, 'end time'),
                (ctypes.c_uint8, 'parts'))
 Core = _struct(
     'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
-    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'drive body offset'),
+    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'strides body offset'),
     (_POINTER * 3, 'limits'),
     (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
-               'behind'), (Ramp, 'ramp lead'),
+               'behind'), (Ramp, 'ramp approach'),
     (_REAL, 'slowing slower frequency frequency_scale substep absorbed fraction stall stall_past '
             'stall_low'), (_POINTER, 'legs state'), (_REAL, 'go'), (_POINTER, 'waiting'))
 
 _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
     'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
-    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_lead_in': (_POINTER, _REAL),
+    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_approach_stand': (_POINTER, _REAL),
     'cpg_take': (_POINTER,), 'cpg_report': (_POINTER,) * 3,
     'cpg_feet': (_POINTER,) * 3, 'cpg_pose': (_POINTER, _POINTER, _POINTER, ctypes.c_int),
     'cpg_track_look': (_POINTER, _REAL),
@@ -87,7 +88,8 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 
 def _sources() -> dict[str, str]:
     """Return the files of the core, name -> text."""
-    defines = f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_LEAD {TABLE}\n#define HOLD {HOLD!r}'
+    defines = (f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_ANGLES {TABLE}\n'
+               f'#define HOLD {HOLD!r}')
     names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'body',
              'host_track', 'pattern', 'host')
     # Both readouts stand in it.
@@ -177,8 +179,8 @@ class CTrack:
 
     Attributes:
         struct: its numbers, and addresses of arrays that stay as long as this object.
-        angle, rise, reach: of each joint: angle from the stand, rad; its derivative by phase, rad
-            per cycle, and by the stride of its leg, rad.
+        angle, d_angle_d_phase, reach: of each joint: angle from the stand, rad; its derivative by
+            phase, rad per cycle, and by the stride of its leg, rad.
         legs: phase of each leg, cycles.
         clocks: of each cell, shape (6, cells): phase (cycles), what its speed (cycles a stride)
             is above 1 now and at the next look, amplitude, its rate (per stride) now and then.
@@ -189,9 +191,9 @@ class CTrack:
         """Make room for a gait."""
         joints, legs, cells = gait.struct.joints, gait.struct.legs, gait.struct.cells
         self.struct = Track()
-        self.angle, self.rise, self.reach = motion = np.zeros((3, joints))
+        self.angle, self.d_angle_d_phase, self.reach = motion = np.zeros((3, joints))
         self.legs, self.clocks = np.zeros(legs), np.zeros((6, cells))
-        for name, array in (*zip(('angle', 'rise', 'reach'), motion, strict=True),
+        for name, array in (*zip(('angle', 'd_angle_d_phase', 'reach'), motion, strict=True),
                             ('legs', self.legs)):
             setattr(self.struct, name, array.ctypes.data)
         for k, row in enumerate(self.clocks):

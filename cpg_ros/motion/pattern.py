@@ -90,12 +90,12 @@ def _steered(field: str, address: Callable[[StrideCommand], int]) -> Any:
 
     """
     def read(self: Any) -> StrideCommand | None:
-        drive: StrideCommand | None = self._drive
-        return drive
+        strides: StrideCommand | None = self._strides
+        return strides
 
-    def write(self: Any, drive: StrideCommand | None) -> None:
-        self._drive = drive
-        setattr(self._struct, field, None if drive is None else address(drive))
+    def write(self: Any, strides: StrideCommand | None) -> None:
+        self._strides = strides
+        setattr(self._struct, field, None if strides is None else address(strides))
     return property(read, write)
 
 
@@ -112,16 +112,16 @@ class GaitRunner:
     """
 
     phase, progress, settling = _shared('phase'), _shared('progress'), _shared('settling')
-    drive = _steered('stride', lambda drive: drive.stride.ctypes.data)
+    strides = _steered('stride', lambda strides: strides.stride.ctypes.data)
 
     def __init__(self, plan: GaitPlan, transition: float,
-                 drive: StrideCommand | None = None) -> None:
-        """Run a plan; a drive, if given, scales its strides."""
+                 strides: StrideCommand | None = None) -> None:
+        """Run a plan; a stride command, if given, scales its strides."""
         self._core, self._track = core(), CTrack(plan.core)
         self._struct, self.address = self._track.struct, self._track.address
         self._struct.transition = transition
         self.legs = self._track.legs
-        self.drive = drive
+        self.strides = strides
         self._start_on(plan)
         self.reseed(plan.readout.start)
 
@@ -203,10 +203,10 @@ class Pattern:
 
     faults, held = _shared('faults'), _shared('ticks_held')
     frequency_scale, substep = _shared('frequency_scale'), _shared('substep')
-    drive = _steered('drive', lambda drive: drive.address)
+    strides = _steered('strides', lambda strides: strides.address)
 
     def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,
-                 drive: StrideCommand | None = None) -> None:
+                 strides: StrideCommand | None = None) -> None:
         """Begin in the stand and, if enabled, ramp into the gait in ``ramp`` s."""
         robot = plan.robot
         self.robot = robot
@@ -214,7 +214,7 @@ class Pattern:
         self._core, self._struct = core(), Core(joints=len(robot.joints), substep=SUBSTEP,
                                                 frequency_scale=1.0)
         self._address = ctypes.addressof(self._struct)
-        self._ramp, self._lead = self._struct.ramp, self._struct.lead
+        self._ramp, self._approach = self._struct.ramp, self._struct.approach
         self._offset = robot.column('offset')
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
         #: The plan whose gait the network is to find by itself, if requested; _asked is then 1.
@@ -237,8 +237,8 @@ class Pattern:
             setattr(self._struct, name, array.ctypes.data)
         for k, row in enumerate(self._limits):
             self._struct.limits[k] = row.ctypes.data
-        self._run([GaitRunner(plan, 0.0, drive)])
-        self.drive = drive
+        self._run([GaitRunner(plan, 0.0, strides)])
+        self.strides = strides
         try:
             self.body: BodyPose | None = BodyPose(robot)
             self._struct.body = self.body.address
@@ -298,16 +298,16 @@ class Pattern:
         self._struct.absorbed, self._struct.jumped = 0.0, 0
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
-        """Begin at these angles, rad, (joints,), and lead the joints to the stand in s or more.
+        """Begin at these angles, rad, (joints,), and bring the joints to the stand in s or more.
 
         To be called before the first advance. No joint takes more than half of its speed limit.
         """
-        # The joints' offsets from the stand, and the ramp that leads these to 0.
+        # The joints' offsets from the stand, and the ramp that brings these to 0.
         self._found[:] = angles - self._offset
-        self._lead.level, self._lead.rate, self._lead.parts = 1.0, 0.0, 0
+        self._approach.level, self._approach.rate, self._approach.parts = 1.0, 0.0, 0
         self.position[:] = np.clip(angles, *self._limits[:2])
         if self._found.any():
-            self._core.cpg_lead_in(self._address, time)
+            self._core.cpg_approach_stand(self._address, time)
 
     def begin_at(self, phase: float) -> None:
         """Put the first leg at a phase in cycles, before the first advance."""
@@ -321,7 +321,7 @@ class Pattern:
         A plan that still waits, for a tick or for the end of other changes, is replaced.
         """
         # Seeding an orbit takes long: do it in the caller's thread, not in that of the ticks.
-        prepared = GaitRunner(plan, max(transition, SHORTEST), self.drive)
+        prepared = GaitRunner(plan, max(transition, SHORTEST), self.strides)
         self._keep(prepared)
         if transition > 0.0:
             self._drift.clear()
@@ -340,18 +340,18 @@ class Pattern:
         """Request the legs' strides, shape (legs,), and the pace; see StrideCommand.
 
         Raises:
-            ValueError: the pattern was made without a drive.
+            ValueError: the pattern was made without a stride command.
 
         """
-        if self.drive is None:
-            raise ValueError('this pattern has no drive')
-        self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
+        if self.strides is None:
+            raise ValueError('this pattern has no stride command')
+        self.strides.set_target(stride, pace, at_once=self._ramp.level == 0.0)
 
-    def attach(self, drive: StrideCommand) -> None:
-        """Use a drive from now on; one that has no target yet changes nothing."""
+    def attach(self, strides: StrideCommand) -> None:
+        """Use a stride command from now on; one that has no target yet changes nothing."""
         for track in self._tracks:
-            track.drive = drive
-        self.drive = drive
+            track.strides = strides
+        self.strides = strides
 
     @property
     def plan(self) -> GaitPlan:
@@ -388,7 +388,7 @@ class Pattern:
     @property
     def standing(self) -> bool:
         """Tell whether it is disabled and the ramp has ended."""
-        return not (self.enabled or self._ramp.level or self._struct.go or self._lead.parts)
+        return not (self.enabled or self._ramp.level or self._struct.go or self._approach.parts)
 
     @property
     def in_transition(self) -> bool:

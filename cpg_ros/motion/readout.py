@@ -194,7 +194,7 @@ class Waveform(NamedTuple):
         period: of the orbit, model time.
         phases: phase of each cell in the gait, cycles, shape (cells,).
         values: over the peak, on even phases of a cycle, shape (m,).
-        lead: phase minus angle, both in cycles, on even angles, shape (m,).
+        phase_offset: phase minus angle, both in cycles, on even angles, shape (m,).
 
     """
 
@@ -202,28 +202,28 @@ class Waveform(NamedTuple):
     period: float
     phases: np.ndarray
     values: np.ndarray
-    lead: np.ndarray
+    phase_offset: np.ndarray
 
 
 class Retiming(NamedTuple):
     """Tables by which joints follow a waveform at another phase than their cells'.
 
     Attributes:
-        lead: of the orbit on even angles: phase minus angle, cycles, and its slope per entry,
-            shape (m, 2).
+        phase_offset: of the orbit on even angles: phase minus angle, cycles, and its slope per
+            entry, shape (m, 2).
         cycle: of the orbit on even phases: x and its slope per entry, y and its slope, shape
             (m, 4).
         maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
 
     """
 
-    lead: np.ndarray
+    phase_offset: np.ndarray
     cycle: np.ndarray
     maps: np.ndarray
 
 
 def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
-    """Return lead and cycle of a Retiming; the waveform must determine its phase."""
+    """Return phase_offset and cycle of a Retiming; the waveform must determine its phase."""
     grid = np.arange(POINTS) / POINTS
 
     def unit(theta: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -317,10 +317,11 @@ class WaveReadout:
     def fields(self) -> dict[str, Any]:
         """Return the fields by which the core reads joints and legs, see core.CGait."""
         wave, joints, retiming = self.wave, self.joints, self.retiming
-        turn, cycle, maps = (None,) * 3 if retiming is None else retiming
+        offset, cycle, maps = (None,) * 3 if retiming is None else retiming
         return {'peak': wave.peak, 'period': wave.period, 'phase': wave.phases,
-                'cells': wave.phases.size, 'values': wave.values, 'lead': wave.lead,
-                'turn': turn, 'cycle': cycle, 'maps': maps, **joints.fields()}
+                'cells': wave.phases.size, 'values': wave.values,
+                'phase_offset': wave.phase_offset,
+                'phase_offset_slope': offset, 'cycle': cycle, 'maps': maps, **joints.fields()}
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

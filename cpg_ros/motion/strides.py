@@ -17,7 +17,7 @@
 import ctypes
 from typing import TypeVar
 
-from cpg_ros.motion.core import core, Drive
+from cpg_ros.motion.core import core, Smoother
 import numpy as np
 
 Real = TypeVar('Real', float, np.ndarray)
@@ -47,8 +47,8 @@ class StrideCommand:
         self._rate = np.zeros(legs + 1)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
         self._trim: np.ndarray | None = None
-        self._struct = Drive(self._now.ctypes.data, self._rate.ctypes.data,
-                             self._goal.ctypes.data, None, legs, 0)
+        self._struct = Smoother(self._now.ctypes.data, self._rate.ctypes.data,
+                                self._goal.ctypes.data, None, legs, 0)
         self.address = ctypes.addressof(self._struct)
 
     @property

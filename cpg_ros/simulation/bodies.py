@@ -129,7 +129,7 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
     if len(strides) or pace != 1.0:
         command, stride = StrideCommand(stride.size), np.array(strides or stride, dtype=float)
         command.set_target(stride, pace, at_once=True)
-    pattern = Pattern(plan, ramp, drive=command)
+    pattern = Pattern(plan, ramp, strides=command)
     table = np.empty((round(duration / timestep), len(robot.order)))
     for row in table:
         pattern.advance(timestep)

@@ -63,7 +63,7 @@ class Patterns:
         """
         self._plans, self._feedback, self._dt, self._trimmed = plans, feedback, dt, trimmed
         first, runs = next(iter(plans.values())), len(scenarios)
-        self._patterns = [Pattern(first, RAMP, drive=StrideCommand(len(first.robot.legs)))
+        self._patterns = [Pattern(first, RAMP, strides=StrideCommand(len(first.robot.legs)))
                           for _ in scenarios]
         self.planned = PlannedMotion.zeros(runs, len(first.robot.joints))
         self.planned.velocity[:, 0] = [one.speed for one in scenarios]
@@ -72,8 +72,8 @@ class Patterns:
             pattern.begin_at(one.phase)
             if pattern.body is not None and any(one.pose):
                 pattern.body.go_to(one.pose, RAMP)
-            if trimmed and pattern.drive is not None:
-                pattern.drive.trim = feedback.memory.stride[run]
+            if trimmed and pattern.strides is not None:
+                pattern.strides.trim = feedback.memory.stride[run]
             self._steer(run, first)
         self._time = 0.0
         self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(

@@ -22,7 +22,7 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.feedback.biped import stepping, support
 from cpg_ros.feedback.biped.feedback import gait_plan, KINDS
 from cpg_ros.feedback.biped.gains import BipedGains, GAINS
-from cpg_ros.feedback.biped.links import add_torques, blank_pose, kinematics, links_of, rotation
+from cpg_ros.feedback.biped.links import add_torques, blank_pose, kinematics, links_of, rotate
 from cpg_ros.motion.body_file import GAIT_SPEEDS
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.library.biped import Biped
@@ -62,7 +62,7 @@ def test_kinematics_and_weights_are_those_of_mujoco(name):
     for _ in range(20):
         rpy, joints = rng.uniform(-1.0, 1.0, 3), rng.uniform(-1.0, 1.0, n)
         turning, rates = rng.normal(size=3), rng.normal(size=n)
-        rotation(*rpy, turn)
+        rotate(*rpy, turn)
         mujoco.mju_mat2Quat(quaternion, turn.ravel())
         data.qpos[:3], data.qpos[3:7], data.qpos[angles] = 0.0, quaternion, joints
         data.qvel[:3], data.qvel[3:6], data.qvel[speeds] = 0.0, turn.T @ turning, rates
@@ -130,7 +130,7 @@ def test_a_pendulum_that_steps_as_it_is_told_repeats_itself(speed, sideways):
         early = np.array([pendulum(place[i], velocity[i], feet[i], height, time / 3)
                           for i in range(2)])
         xi = early[:, 0] + early[:, 1] / rate - feet
-        error = stepping.capture_error(tuple(xi), side, time / 3, rate, wanted, gains)
+        error = stepping.dcm_error(tuple(xi), side, time / 3, rate, wanted, gains)
         # Rounding grows as exp(w t) as well, which the steps correct.
         np.testing.assert_allclose(error, 0.0, atol=1e-8)
         step = stepping.step(error, side, 2.0 * time / 3, rate, wanted, gains)
@@ -150,11 +150,11 @@ def test_a_step_catches_an_error_of_the_capture_point():
     time, rate = 0.5 / gains.frequency, stepping.growth_rate(0.65)
     forward, inward, _ = stepping.offsets(0.3, 0.0, rate, gains)
     xi = np.array([forward + 0.02, inward + 0.03])
-    error = stepping.capture_error(tuple(xi), 1, 0.0, rate, (0.3, 0.0), gains)
+    error = stepping.dcm_error(tuple(xi), 1, 0.0, rate, (0.3, 0.0), gains)
     np.testing.assert_allclose(error, [0.02, 0.03], atol=1e-12)
     foot = np.array(stepping.step(error, 1, time, rate, (0.3, 0.0), gains))
     at_touchdown = np.exp(rate * time) * xi - foot
-    after = stepping.capture_error(tuple(at_touchdown), -1, 0.0, rate, (0.3, 0.0), gains)
+    after = stepping.dcm_error(tuple(at_touchdown), -1, 0.0, rate, (0.3, 0.0), gains)
     np.testing.assert_allclose(after, 0.0, atol=1e-9)
     assert stepping.speed_up(error, gains) == 1.0
     assert stepping.speed_up((0.1, 0.0), gains) == pytest.approx(
@@ -174,7 +174,7 @@ def test_the_clock_shares_the_weight():
     landed = np.zeros(2, dtype=bool)
     for phase in np.linspace(0.0, 1.0, 200, endpoint=False):
         phases = np.array([phase, (phase + 0.5) % 1.0])
-        stepping.load_shares(phases, landed, gains, fractions)
+        stepping.load_fractions(phases, landed, gains, fractions)
         assert fractions.sum() == pytest.approx(1.0)
         for leg in range(2):
             if phases[leg] < 1.0 - gains.duty:
@@ -186,11 +186,11 @@ def test_the_clock_shares_the_weight():
 def test_the_ground_force_turns_the_body_by_what_is_wanted():
     gains, mass = BipedGains(), 33.0
     center = np.array([0.02, -0.03, 0.0])
-    pressure = (0.01, 0.02, -gains.height)
+    cop = (0.01, 0.02, -gains.height)
     moment = (7.0, -5.0)
     up = support.upward_force(gains.height, gains.height, 0.0, mass, gains)
-    force = np.array(support.ground_force(center, pressure, up, moment, gains))
-    about = np.cross(np.array(pressure) - center, force)
+    force = np.array(support.ground_force(center, cop, up, moment, gains))
+    about = np.cross(np.array(cop) - center, force)
     np.testing.assert_allclose(about[:2], moment, atol=1e-9)
     assert force[2] == pytest.approx(mass * G)
 

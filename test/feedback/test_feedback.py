@@ -244,7 +244,7 @@ def patterns(loop, expected, gains, steps=1500):
     """Return angles and speeds told, ticks held by a limit and the place, m, of a real pattern."""
     made = program('trot')
     body = Body('go2', GO2)
-    pattern = Pattern(made, drive=StrideCommand(4))
+    pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
     if gains is not None:
         feedback = Feedback(loop.geometry, gains)

@@ -26,7 +26,7 @@ from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np
-from plain_pattern import PlainDrive, PlainPattern
+from plain_pattern import PlainStrides, PlainPattern
 import pytest
 
 SEED = 5757
@@ -65,8 +65,8 @@ class Pair:
         first = self.plans[draws.integers(len(self.plans))]
         legs, ramp = len(first.robot.legs), draws.choice([0.0, 0.4])
         steered = draws.random() < 0.7
-        self.core = Pattern(first, ramp, drive=StrideCommand(legs) if steered else None)
-        self.plain = PlainPattern(first, ramp, PlainDrive(legs) if steered else None)
+        self.core = Pattern(first, ramp, strides=StrideCommand(legs) if steered else None)
+        self.plain = PlainPattern(first, ramp, PlainStrides(legs) if steered else None)
         self.dt, self.time = draws.choice([0.001, 0.004, 0.02]), 0.0
         self.alike = 1e-12
         if draws.random() < 0.5:
@@ -88,21 +88,21 @@ class Pair:
             on, ramp = draws.random() < 0.6, draws.choice([0.0, 0.2])
             core.enable(bool(on), ramp)
             plain.ramp.go(float(on), max(ramp, 0.05))
-            if plain.lead.parts and not on:
-                left = plain.lead.level * np.abs(plain.found)
-                plain.lead.go(0.0, max(ramp, 0.05, np.max(3.0 * left / plain.limits[2])))
+            if plain.approach.parts and not on:
+                left = plain.approach.level * np.abs(plain.found)
+                plain.approach.go(0.0, max(ramp, 0.05, np.max(3.0 * left / plain.limits[2])))
         elif what == 'resume':
             stall = draws.choice([0.003, 0.05, 0.5])
             core.resume(stall)
             plain.resume(stall)
-        elif what in ('steer', 'trim') and plain.drive is not None:
-            strides = draws.uniform(-1.0, 1.0, plain.drive.trim.size)
+        elif what in ('steer', 'trim') and plain.strides is not None:
+            strides = draws.uniform(-1.0, 1.0, plain.strides.trim.size)
             if what == 'trim':
-                core.drive.trim = plain.drive.trim = 0.3 * strides
+                core.strides.trim = plain.strides.trim = 0.3 * strides
             else:
                 pace = draws.uniform(0.6, 1.2)
-                core.drive.set_target(strides, pace)
-                plain.drive.target = np.append(strides, pace)
+                core.strides.set_target(strides, pace)
+                plain.strides.target = np.append(strides, pace)
         elif what == 'correct':
             core.correct = plain.correct = self.correction if draws.random() < 0.7 else None
         elif what == 'scale':

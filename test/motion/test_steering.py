@@ -75,7 +75,7 @@ def angles(one, phases, strides):
 @pytest.mark.parametrize('strides', [[1.0] * 4, [0.0] * 4, [-0.7, 0.9, -0.7, 0.9]])
 def test_the_joints_are_what_the_file_says(robot, strides):
     one = gait_plan(robot)
-    pattern = Pattern(one, ramp=0.2, drive=StrideCommand(4))
+    pattern = Pattern(one, ramp=0.2, strides=StrideCommand(4))
     pattern.steer(np.array(strides), 0.5)
     run(pattern, 1.5)
     position, velocity, phases = run(pattern, 2.0)
@@ -88,7 +88,8 @@ def test_the_joints_are_what_the_file_says(robot, strides):
 
 def test_without_a_drive_it_moves_as_with_full_strides(robot):
     one = gait_plan(robot)
-    plain, driven = (run(Pattern(one, drive=drive), 3.0) for drive in (None, StrideCommand(4)))
+    plain, driven = (run(Pattern(one, strides=command), 3.0)
+                     for command in (None, StrideCommand(4)))
     for a, b in zip(plain, driven, strict=True):
         assert np.abs(a - b).max() < 1e-12
 
@@ -98,14 +99,14 @@ def test_without_a_drive_it_moves_as_with_full_strides(robot):
                       max_size=4), dt=st.sampled_from([0.001, 0.005, 0.02]))
 def test_whatever_is_asked_the_joints_move_smoothly(robot, asked, dt):
     one = gait_plan(robot)
-    drive = StrideCommand(4)
-    pattern = Pattern(one, ramp=0.2, drive=drive)
+    command = StrideCommand(4)
+    pattern = Pattern(one, ramp=0.2, strides=command)
     run(pattern, 0.4, dt)
     rows = []
     for *strides, pace in asked:
         pattern.steer(np.array(strides), pace)
         rows.append(run(pattern, 0.3, dt))
-        assert np.abs(drive.stride).max() < 1.4
+        assert np.abs(command.stride).max() < 1.4
     position, velocity, _ = (np.concatenate(row) for row in zip(*rows, strict=True))
     robot = one.robot
     assert (position >= robot.column('lower')).all() and (position <= robot.column('upper')).all()
@@ -118,24 +119,24 @@ def test_whatever_is_asked_the_joints_move_smoothly(robot, asked, dt):
 
 
 def test_strides_are_at_once_what_is_asked_while_nothing_moves(robot):
-    pattern = Pattern(gait_plan(robot), enabled=False, drive=StrideCommand(4))
+    pattern = Pattern(gait_plan(robot), enabled=False, strides=StrideCommand(4))
     pattern.steer(np.array([0.2, 0.4, 0.6, 0.8]), 0.7)
     pattern.advance(0.01)
-    assert pattern.drive.stride.tolist() == [0.2, 0.4, 0.6, 0.8] and pattern.drive.pace == 0.7
+    assert pattern.strides.stride.tolist() == [0.2, 0.4, 0.6, 0.8] and pattern.strides.pace == 0.7
 
 
 def test_a_drive_approaches_as_a_critically_damped_oscillator():
     # Against a fine integration of s'' = (target - s) / T^2 - 2 s' / T.
-    drive, s, v, dt = StrideCommand(1), 1.0, 0.0, 1e-5
-    drive.set_target(np.array([-0.5]), 1.0)
+    command, s, v, dt = StrideCommand(1), 1.0, 0.0, 1e-5
+    command.set_target(np.array([-0.5]), 1.0)
     for tick in range(100):
         if tick == 20:
-            drive.set_target(np.array([0.8]), 1.0)
+            command.set_target(np.array([0.8]), 1.0)
         for _ in range(1000):
             v += dt * (((-0.5 if tick < 20 else 0.8) - s) / 0.04 - 2.0 * v / 0.2)
             s += dt * v
-        drive.advance(0.01)
-        assert abs(drive.stride[0] - s) < 1e-3 and abs(drive.rate[0] - v) < 1e-2
+        command.advance(0.01)
+        assert abs(command.stride[0] - s) < 1e-3 and abs(command.rate[0] - v) < 1e-2
 
 
 @given(speed=st.floats(-1.0, 1.0), turn=st.floats(-3.0, 3.0))

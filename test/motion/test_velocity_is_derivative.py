@@ -127,7 +127,7 @@ def test_where_strides_change_while_a_ramp_is_slowed():
     robot, rate = load_robot('unitree_go2'), 2000.0
     gaits = [plan_gait(robot, gait, frequency)
              for gait, frequency in (('trot', 2.2), ('walk', 1.3), ('trot', 0.5), ('walk', 0.5))]
-    pattern, draws, rows = Pattern(gaits[0], 0.2, drive=StrideCommand(4)), np.random.default_rng(
+    pattern, draws, rows = Pattern(gaits[0], 0.2, strides=StrideCommand(4)), np.random.default_rng(
         5), []
     for _ in range(60):
         draw = draws.random()

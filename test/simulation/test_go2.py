@@ -97,7 +97,7 @@ def test_a_tour_of_all_switches_does_not_make_it_fall(body):
 def asked(body, gait, forward, turn):
     """Ask as cmd_vel does; return speed and yaw rate over 6 s."""
     made = program(gait)
-    pattern = Pattern(made, drive=StrideCommand(4))
+    pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)
     walk.go(2.0)

@@ -15,7 +15,7 @@
 """The tick of the pattern in plain Python and numpy, to compare the core in C with.
 
 A network is a Stepper, whose steps are compared with numba's elsewhere; nothing else of the core
-is used. Without `drive`, `correct` and stalls where they are not given, a tick is that of
+is used. Without `strides`, `correct` and stalls where they are not given, a tick is that of
 Pattern.advance.
 """
 
@@ -82,7 +82,7 @@ class WaveTrackReadout:
         cells = wave.phases.size
         x, y, z = (now[n][:cells] * by_phase**n / wave.peak for n in range(3))
         turns = np.arctan2(-y, x) / TURN
-        legs = np.array([(turns[cell] + linear(wave.lead, turns[cell])) % 1.0
+        legs = np.array([(turns[cell] + linear(wave.phase_offset, turns[cell])) % 1.0
                          for cell in self.of.joints.leg_cells])
         base = legs[0] - wave.phases[self.of.joints.leg_cells[0]]
         off = [abs(x[cell] - linear(wave.values, base + wave.phases[cell]))
@@ -96,12 +96,12 @@ class WaveTrackReadout:
         return signals, legs, np.max(off)
 
     def retimed(self, x, y, z, number):
-        lead, cycle, maps = self.of.retiming
+        offset, cycle, maps = self.of.retiming
         square = x * x + y * y
         turning = (y * y - x * z) / square if square > 1e-12 else 1.0
         growing = y * (x + z) / square if square > 1e-12 else 0.0
         turn = math.atan2(-y, x) / TURN
-        ahead, slope = cubic(lead, 0, turn)
+        ahead, slope = cubic(offset, 0, turn)
         theta, going = turn + ahead, (1.0 + slope) * turning
         own_x, (own_y, own_z) = cubic(cycle, 0, theta)[0], cubic(cycle, 2, theta)
         whole = own_x**2 + own_y**2
@@ -180,8 +180,8 @@ class PhaseTrackReadout:
 class PlainTrack:
     """A network that runs a plan, and its watchdog."""
 
-    def __init__(self, plan, transition, drive):
-        self.plan, self.transition, self.progress, self.drive = plan, transition, 0.0, drive
+    def __init__(self, plan, transition, strides):
+        self.plan, self.transition, self.progress, self.strides = plan, transition, 0.0, strides
         kind = WaveTrackReadout if hasattr(plan.readout, 'wave') else PhaseTrackReadout
         self.readout = kind(plan.readout)
         self.reseed(plan.readout.start)
@@ -197,14 +197,14 @@ class PlainTrack:
     def look(self, strides):
         signals, self.legs, distance = self.readout.read(self.stepper.now, strides)
         plan, weights = self.plan, self.plan.readout.joints.weights
-        self.angle, self.rise = np.array([joint(w, *s) for w, s in zip(
+        self.angle, self.d_angle = np.array([joint(w, *s) for w, s in zip(
             weights, signals, strict=True)]).T
-        if self.drive is not None:
+        if self.strides is not None:
             still, lift = np.array([joint(w, *s) for w, s in zip(
                 plan.in_place.joints.weights, signals, strict=True)]).T
-            longer = self.drive.stride[plan.robot.leg_of_joint] - 1.0
+            longer = self.strides.stride[plan.robot.leg_of_joint] - 1.0
             self.reach = self.angle - still
-            self.rise = self.rise + longer * (self.rise - lift)
+            self.d_angle = self.d_angle + longer * (self.d_angle - lift)
             self.angle = self.angle + longer * self.reach
         self.angle = self.angle + plan.shift
         return distance
@@ -221,12 +221,13 @@ class PlainTrack:
         return self.astray <= 0.5
 
     def rate(self, frequency):
-        if self.drive is None:
-            return self.rise * frequency
-        return self.rise * frequency + self.drive.rate[self.plan.robot.leg_of_joint] * self.reach
+        if self.strides is None:
+            return self.d_angle * frequency
+        rate = self.strides.rate[self.plan.robot.leg_of_joint]
+        return self.d_angle * frequency + rate * self.reach
 
 
-class PlainDrive:
+class PlainStrides:
     """Strides and pace approach their targets as critically damped oscillators do."""
 
     def __init__(self, legs):
@@ -270,11 +271,11 @@ class PlainRamp:
 class PlainPattern:
     """Joint positions and velocities, as Pattern has them."""
 
-    def __init__(self, plan, ramp, drive=None):
+    def __init__(self, plan, ramp, strides=None):
         robot = plan.robot
-        self.offset, self.drive, self.correct = robot.column('offset'), drive, None
+        self.offset, self.strides, self.correct = robot.column('offset'), strides, None
         self.limits = [robot.column(name) for name in ('lower', 'upper', 'velocity')]
-        self.tracks, self.waiting = [PlainTrack(plan, 0, drive)], []
+        self.tracks, self.waiting = [PlainTrack(plan, 0, strides)], []
         self.faults, self.scale = 0, 1.0
         self.tracks[0].reseed(0.0)
         self.frequency, self.slowing, self.slower, self.last = plan.frequency, 1.0, 1.0, None
@@ -282,13 +283,13 @@ class PlainPattern:
         self.velocity = self.rate = self.correction = np.zeros_like(self.offset)
         self.behind = np.zeros(self.offset.size, bool)
         self.jump, self.absorbed = None, math.inf
-        self.ramp, self.lead, self.found = PlainRamp(0.0), PlainRamp(1.0), 0.0 * self.offset
+        self.ramp, self.approach, self.found = PlainRamp(0.0), PlainRamp(1.0), 0.0 * self.offset
         self.stall = self.past = self.low = 0.0
         self.ramp.go(1.0, max(ramp, 0.05))
 
     def start_from(self, angles, time):
         self.found, self.position = angles - self.offset, np.clip(angles, *self.limits[:2])
-        self.lead.go(0.0, max(time, 0.05, np.max(3.0 * np.abs(self.found) / self.limits[2])))
+        self.approach.go(0.0, max(time, 0.05, np.max(3.0 * np.abs(self.found) / self.limits[2])))
 
     def resume(self, stall):
         pace = self.pace(self.past / self.stall) if self.stall else 1.0
@@ -317,10 +318,10 @@ class PlainPattern:
     def advance(self, dt):
         if self.waiting and len(self.tracks) < 4:
             plan, transition = self.waiting.pop()
-            self.tracks.append(PlainTrack(plan, max(transition, 0.05), self.drive))
+            self.tracks.append(PlainTrack(plan, max(transition, 0.05), self.strides))
             self.tracks[-1].reseed(self.tracks[-2].phase)
         clock, pace = (self.scale * one for one in self.slowed_in(dt))
-        calm = (len(self.tracks) == 1 and not (self.ramp.parts or self.lead.parts)
+        calm = (len(self.tracks) == 1 and not (self.ramp.parts or self.approach.parts)
                 and self.absorbed >= 0.3)
         if not (calm and self.cruise(clock)):
             parts = max(1, math.ceil(clock / 1e-3 - 1e-9))
@@ -343,7 +344,7 @@ class PlainPattern:
 
     def cruise(self, dt):
         self.slowing, self.slower, self.last, track = 1.0, 1.0, None, self.tracks[0]
-        strides, frequency = self.strides(track.plan.frequency, dt, dt)
+        strides, frequency = self.steered(track.plan.frequency, dt, dt)
         if not track.advance(strides):
             track.phase -= strides
             self.recover(track)
@@ -353,23 +354,23 @@ class PlainPattern:
         self.rate = self.ramp.level * track.rate(frequency)
         return True
 
-    def strides(self, frequency, dt, clock):
-        if self.drive is not None:
-            self.drive.advance(clock)
-            frequency = frequency * self.drive.now[-1]
+    def steered(self, frequency, dt, clock):
+        if self.strides is not None:
+            self.strides.advance(clock)
+            frequency = frequency * self.strides.now[-1]
         before, self.frequency = self.frequency, frequency
         return 0.5 * (before + frequency) * clock, frequency
 
     def step(self, dt):
         clock, self.slowing = 0.5 * dt * (self.slowing + self.slower), self.slower
-        tracks, moving, leading = self.tracks, len(self.tracks) > 1, bool(self.lead.parts)
+        tracks, moving, leading = self.tracks, len(self.tracks) > 1, bool(self.approach.parts)
         frequency, fades = tracks[0].plan.frequency, []
         for track in tracks[1:]:
             track.progress = min(1.0, track.progress + clock / track.transition)
             fraction, slope = smoothstep(track.progress)
             fades.append((fraction, slope / track.transition))
             frequency += fraction * (track.plan.frequency - frequency)
-        strides, frequency = self.strides(frequency, dt, clock)
+        strides, frequency = self.steered(frequency, dt, clock)
         for track in tracks:
             if not track.advance(strides):
                 self.recover(track)
@@ -387,9 +388,9 @@ class PlainPattern:
         rate = self.ramp.level * rate + self.ramp.rate * wanted
         wanted = self.ramp.level * wanted
         if leading:
-            self.lead.advance(clock)
-            wanted = wanted + self.lead.level * self.found
-            rate = rate + self.lead.rate * self.found
+            self.approach.advance(clock)
+            wanted = wanted + self.approach.level * self.found
+            rate = rate + self.approach.rate * self.found
         if moving or leading:
             shifts = [track.plan.speed + 2.0 * (np.abs(track.plan.shift) + leading * np.abs(
                 self.found)) for track in tracks]

@@ -26,15 +26,16 @@ def clocks_at(readout, phase):
     return clocks
 
 
-def look(readout, now, strides, clocks, angle, rise, legs):
+def look(readout, now, strides, clocks, angle, d_angle, legs):
     """Read joints and legs off a state so many strides after the last; return how far it is off.
 
-    Clocks are advanced, angle, rise and legs filled.
+    Clocks are advanced, angle, d_angle and legs filled.
     """
     gait = CGait(**readout.fields(), shift=np.zeros(angle.size), components=now.shape[1])
     track, now = CTrack(gait), np.ascontiguousarray(now, dtype=float)
     track.struct.net.now = now.ctypes.data
     track.clocks[:] = clocks
     core().cpg_track_look(track.address, strides)
-    clocks[:], angle[:], rise[:], legs[:] = track.clocks, track.angle, track.rise, track.legs
+    clocks[:], angle[:], legs[:] = track.clocks, track.angle, track.legs
+    d_angle[:] = track.d_angle_d_phase
     return float(track.struct.distance)

@@ -34,7 +34,7 @@ LATERAL = 0.9
 HALVINGS = 22
 #: STEP: of central differences, rad.
 STEP = 1e-5
-#: BENT: bends of the knees that are tried, as shares of their range, the most bent first.
+#: BENT: bends of the knees that are tried, as fractions of their range, the most bent first.
 BENT = np.arange(1.0, 0.4, -0.05)
 
 

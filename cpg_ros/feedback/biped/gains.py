@@ -48,7 +48,7 @@ class BipedMemory(NamedTuple):
         center: of mass, m, then its velocity, m/s, shape (2, 3).
         turning: angular velocity of the base, rad/s, shape (3,).
         soles: velocities of the soles from the base's, m/s and rad/s, shape (2, 6).
-        loads: share of the weight on each foot, shape (2,).
+        loads: fraction of the weight on each foot, shape (2,).
         wanted: velocity forward and left as it is approached, m/s, shape (2,).
         heading: wanted, rad, shape (1,).
         integral: of the missing speed, m, shape (1,).
@@ -60,7 +60,7 @@ class BipedMemory(NamedTuple):
         target: where it is to end, likewise.
         ground: height of the ground, m, shape (1,).
         fractions: of the weight that each leg is to bear, shape (2,).
-        error: of the capture point, forward and left, m, shape (2,).
+        dcm_error: of the capture point, forward and left, m, shape (2,).
         force: that the ground is to exert on all feet, N, shape (3,).
         reaction: moment that the swing leg takes, N m, shape (3,).
         path: of a swinging foot, scratch, shape (3, 3).
@@ -86,7 +86,7 @@ class BipedMemory(NamedTuple):
     target: np.ndarray
     ground: np.ndarray
     fractions: np.ndarray
-    error: np.ndarray
+    dcm_error: np.ndarray
     force: np.ndarray
     reaction: np.ndarray
     path: np.ndarray

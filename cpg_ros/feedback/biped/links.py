@@ -61,7 +61,7 @@ class Pose(NamedTuple):
     """Places and rotations of the links; world's axes, from the base.
 
     Attributes:
-        turns: rotation of each link, shape (joints + 1, 3, 3).
+        rotations: of each link, shape (joints + 1, 3, 3).
         places: of the joints' anchors, m, shape (joints + 1, 3).
         axes: of the joints, shape (joints + 1, 3).
         carried: mass from each joint on, kg, shape (joints + 1,).
@@ -70,7 +70,7 @@ class Pose(NamedTuple):
 
     """
 
-    turns: np.ndarray
+    rotations: np.ndarray
     places: np.ndarray
     axes: np.ndarray
     carried: np.ndarray
@@ -118,13 +118,13 @@ def blank_pose(links: Links) -> Pose:
 
 
 #: Rotation from the base's axes to the world's.
-rotation = jit(fill_rotation)
+rotate = jit(fill_rotation)
 
 
 @jit
-def carry(turn, offset, k):
+def carry(rotation, offset, k):
     """Return component k of a rotated offset."""
-    return turn[k, 0] * offset[0] + turn[k, 1] * offset[1] + turn[k, 2] * offset[2]
+    return rotation[k, 0] * offset[0] + rotation[k, 1] * offset[1] + rotation[k, 2] * offset[2]
 
 
 @jit
@@ -139,13 +139,13 @@ def place(links, rpy, joints, pose):
 
     """
     count = links.masses.size
-    turns, places, axes = pose.turns, pose.places, pose.axes
-    rotation(rpy[0], rpy[1], rpy[2], turns[0])
+    rotations, places, axes = pose.rotations, pose.places, pose.axes
+    rotate(rpy[0], rpy[1], rpy[2], rotations[0])
     for row in range(count):
-        before, turn, at = links.parents[row], turns[row], links.anchors[row]
+        before, rotation, at = links.parents[row], rotations[row], links.anchors[row]
         if row > 0:
             u, c, s = links.axes[row], np.cos(joints[row - 1]), np.sin(joints[row - 1])
-            base, start = turns[before], links.anchors[before]
+            base, start = rotations[before], links.anchors[before]
             off = (at[0] - start[0], at[1] - start[1], at[2] - start[2])
             v = 1.0 - c
             for k in range(3):
@@ -154,14 +154,14 @@ def place(links, rpy, joints, pose):
                 # Rodrigues' formula, times the rotation before, row by row.
                 a, b, d = base[k, 0], base[k, 1], base[k, 2]
                 along = v * (a * u[0] + b * u[1] + d * u[2])
-                turn[k, 0] = c * a + along * u[0] + s * (b * u[2] - d * u[1])
-                turn[k, 1] = c * b + along * u[1] + s * (d * u[0] - a * u[2])
-                turn[k, 2] = c * d + along * u[2] + s * (a * u[1] - b * u[0])
+                rotation[k, 0] = c * a + along * u[0] + s * (b * u[2] - d * u[1])
+                rotation[k, 1] = c * b + along * u[1] + s * (d * u[0] - a * u[2])
+                rotation[k, 2] = c * d + along * u[2] + s * (a * u[1] - b * u[0])
         center = links.centers[row]
         off = (center[0] - at[0], center[1] - at[1], center[2] - at[2])
         pose.carried[row] = links.masses[row]
         for k in range(3):
-            pose.moments[row, k] = links.masses[row] * (places[row, k] + carry(turn, off, k))
+            pose.moments[row, k] = links.masses[row] * (places[row, k] + carry(rotation, off, k))
     for row in range(count - 1, 0, -1):
         before = links.parents[row]
         pose.carried[before] += pose.carried[row]
@@ -172,7 +172,7 @@ def place(links, rpy, joints, pose):
         at = links.anchors[last]
         off = (sole[0] - at[0], sole[1] - at[1], sole[2] - at[2])
         for k in range(3):
-            pose.soles[leg, k] = places[last, k] + carry(turns[last], off, k)
+            pose.soles[leg, k] = places[last, k] + carry(rotations[last], off, k)
 
 
 @jit

@@ -30,7 +30,7 @@ from cpg_ros.feedback.laws.law import Gain
 
 SWING_GAINS = {
     'lift': Gain(0.084, 0.4, 'm', 'height of a swinging foot'),
-    'swing_end': Gain(0.9966, 1.0, '', 'share of the swing in which the foot goes its way'),
+    'swing_end': Gain(0.9966, 1.0, '', 'fraction of the swing in which the foot goes its way'),
     'swing_kp': Gain(3580.0, 5e4, 'N/m', 'force on a swinging foot by its place'),
     'swing_kd': Gain(176.0, 2e3, 'N s/m', 'the same by its velocity'),
     'swing_mass': Gain(3.37, 30.0, 'kg', 'the same by the acceleration of its path'),
@@ -63,12 +63,12 @@ def path(fraction, duration, lift_off, target, gains, out):
     for k in range(2):
         total = target[k] - lift_off[k]
         out[0, k], out[1, k], out[2, k] = lift_off[k] + way * total, speed * total, rise * total
-    turn = math.pi / duration
+    rate = math.pi / duration
     sine = math.sin(math.pi * fraction)
     out[0, 2] = (lift_off[2] + way * (target[2] - lift_off[2]) + gains.lift * sine * sine
                  - gains.press * fraction * fraction)
-    out[1, 2] = gains.lift * turn * math.sin(2.0 * math.pi * fraction)
-    out[2, 2] = 2.0 * gains.lift * turn * turn * math.cos(2.0 * math.pi * fraction)
+    out[1, 2] = gains.lift * rate * math.sin(2.0 * math.pi * fraction)
+    out[2, 2] = 2.0 * gains.lift * rate * rate * math.cos(2.0 * math.pi * fraction)
 
 
 @jit
@@ -83,11 +83,11 @@ def foot_force(target, position, velocity, gains):
 
 
 @jit
-def level_moment(turn, heading, turning, gains):
+def level_moment(rotation, heading, turning, gains):
     """Return the moment that brings a sole level and to the heading, N m.
 
     Args:
-        turn: rotation of the sole, shape (3, 3).
+        rotation: of the sole, shape (3, 3).
         heading: rad.
         turning: its angular velocity, rad/s, (3,).
         gains: BipedGains.
@@ -95,43 +95,43 @@ def level_moment(turn, heading, turning, gains):
     """
     c, s = math.cos(heading), math.sin(heading)
     # Half the sum of the cross products of the present axes and the wanted ones.
-    x = 0.5 * (-turn[2, 0] * s - turn[2, 1] * c + turn[1, 2])
-    y = 0.5 * (turn[2, 0] * c - turn[2, 1] * s - turn[0, 2])
-    z = 0.5 * (turn[0, 0] * s - turn[1, 0] * c + turn[0, 1] * c + turn[1, 1] * s)
+    x = 0.5 * (-rotation[2, 0] * s - rotation[2, 1] * c + rotation[1, 2])
+    y = 0.5 * (rotation[2, 0] * c - rotation[2, 1] * s - rotation[0, 2])
+    z = 0.5 * (rotation[0, 0] * s - rotation[1, 0] * c + rotation[0, 1] * c + rotation[1, 1] * s)
     return (gains.sole_kp * x - gains.sole_kd * turning[0],
             gains.sole_kp * y - gains.sole_kd * turning[1],
             gains.sole_kp * z - gains.sole_kd * turning[2])
 
 
-# Clock of a biped: from the legs' phases, which leg swings and what share of the weight each
+# Clock of a biped: from the legs' phases, which leg swings and what fraction of the weight each
 # bears.
 
 CLOCK_GAINS = {
     'frequency': Gain(1.65, 4.0, 'Hz', 'strides per second of the undisturbed walk'),
-    'duty': Gain(0.511, 0.9, '', 'share of the stride that a leg stands, above 0.5', low=0.501),
-    'touchdown': Gain(0.09, 1.0, '', "share of the robot's weight on a swinging foot from which "
-                      'on, late in the swing, it has landed: the clock leaps to the stance'),
-    'early': Gain(0.3, 1.0, '', 'share of the load that a leg takes which has landed early')}
-#: LATE: share of the swing before which a load on the foot does not count as a touchdown.
+    'duty': Gain(0.511, 0.9, '', 'fraction of the stride that a leg stands, above 0.5', low=0.501),
+    'touchdown': Gain(0.09, 1.0, '', "fraction of the robot's weight on a foot above which, late in"
+                      ' the swing, it has landed: the clock leaps to the stance'),
+    'early': Gain(0.3, 1.0, '', 'fraction of the load that a leg takes which has landed early')}
+#: LATE: fraction of the swing before which a load on the foot does not count as a touchdown.
 LATE = 0.6
 
 
 @jit
-def swing_share(gains):
-    """Return the share of the stride that a leg swings."""
+def swing_fraction(gains):
+    """Return the fraction of the stride that a leg swings."""
     return 1.0 - gains.duty
 
 
 @jit
 def stride_phase(phase, gains):
     """Return a leg's phase from its lift-off on, cycles, by that of its flexor (peak at 0)."""
-    return (phase + 0.5 * swing_share(gains)) % 1.0
+    return (phase + 0.5 * swing_fraction(gains)) % 1.0
 
 
 @jit
 def time_in_step(phase, gains):
     """Return how long ago the other foot took over, s, by the phase of the leg that swings."""
-    swing = swing_share(gains)
+    swing = swing_fraction(gains)
     if phase >= swing and phase > 0.5 + 0.5 * swing:
         phase -= 1.0
     time = (phase + 0.5 * (gains.duty - 0.5)) / gains.frequency
@@ -139,9 +139,9 @@ def time_in_step(phase, gains):
 
 
 @jit
-def load_shares(phases, landed, gains, fractions):
-    """Fill the share of the weight that each leg is to bear; phases from lift-off, cycles."""
-    swing, double = swing_share(gains), max(gains.duty - 0.5, 1e-4)
+def load_fractions(phases, landed, gains, fractions):
+    """Fill the fraction of the weight that each leg is to bear; phases from lift-off, cycles."""
+    swing, double = swing_fraction(gains), max(gains.duty - 0.5, 1e-4)
     total = 0.0
     for leg in range(2):
         if phases[leg] < swing:
@@ -194,12 +194,12 @@ def course(fraction, kind, gains):
 
     """
     stance, cycle = spans(kind, gains)
-    flight, turn = cycle - stance, math.pi * fraction
-    rise = GRAVITY * (0.5 * cycle * (1.0 - math.cos(turn)) - 0.5 * flight - fraction * stance)
+    flight, angle = cycle - stance, math.pi * fraction
+    rise = GRAVITY * (0.5 * cycle * (1.0 - math.cos(angle)) - 0.5 * flight - fraction * stance)
     height = gains.height * gains.flight_height + GRAVITY * stance * (
         -0.5 * flight * fraction - 0.5 * fraction * fraction * stance
-        + 0.5 * cycle * (fraction - math.sin(turn) / math.pi))
-    return height, rise, 0.5 * math.pi * math.sin(turn) * cycle / stance
+        + 0.5 * cycle * (fraction - math.sin(angle) / math.pi))
+    return height, rise, 0.5 * math.pi * math.sin(angle) * cycle / stance
 
 
 @jit
@@ -233,14 +233,14 @@ def foothold(speed, target, side, remaining, gains):
 
 
 @jit
-def stance_share(phase, gains):
-    """Return the share of a leg's stance that is over, by its phase from lift-off."""
-    return min(max((phase - swing_share(gains)) / gains.duty, 0.0), 1.0)
+def stance_fraction(phase, gains):
+    """Return the fraction of a leg's stance that is over, by its phase from lift-off."""
+    return min(max((phase - swing_fraction(gains)) / gains.duty, 0.0), 1.0)
 
 
 PLACEMENT_GAINS = {
     'step_width': Gain(0.235, 0.6, 'm', 'between the middles of the soles'),
-    'place_x': Gain(0.893, 3.0, '', "step forward by the capture point's error at touchdown"),
+    'place_x': Gain(0.893, 3.0, '', 'step forward by the DCM error at touchdown'),
     'place_y': Gain(0.626, 3.0, '', 'the same sideways'),
     'place_offset': Gain(0.0028, 0.2, 'm', 'added to every step forward'),
     'reach_x': Gain(0.45, 1.0, 'm', 'longest step forward and backward'),
@@ -248,8 +248,8 @@ PLACEMENT_GAINS = {
     'narrowest': Gain(0.13, 0.5, 'm', 'narrowest step'),
     'speed_integral': Gain(0.92, 3.0, '1/s', 'speed added by the integral of what is missing'),
     'acceleration': Gain(0.5, 3.0, 'm/s^2', 'with which a wanted speed is approached'),
-    'speed_up': Gain(4.90, 20.0, '1/m', "speed-up of the clock by the capture point's error"),
-    'speed_up_from': Gain(0.047, 0.5, 'm', 'error that does not speed the clock up'),
+    'speed_up': Gain(4.90, 20.0, '1/m', 'speed-up of the clock by the DCM error'),
+    'speed_up_from': Gain(0.047, 0.5, 'm', 'DCM error that does not speed the clock up'),
     'speed_up_most': Gain(0.6, 2.0, '', 'largest speed-up')}
 #: SOONEST: least time to the touchdown, s, for which footholds are computed; LOWEST: least height
 #: of the centre of mass over the feet, m, for the growth rate of the capture point.
@@ -286,8 +286,8 @@ def offsets(speed, sideways, rate, gains):
 
 
 @jit
-def capture_error(xi, side, time, rate, target, gains):
-    """Return the error of the capture point, forward and left, m.
+def dcm_error(xi, side, time, rate, target, gains):
+    """Return the DCM error: how far the capture point is off, forward and left, m.
 
     Args:
         xi: capture point from the foot that stands, heading's axes, m, a pair.
@@ -304,11 +304,11 @@ def capture_error(xi, side, time, rate, target, gains):
 
 
 @jit
-def step(error, side, remaining, rate, target, gains):
+def step(dcm_error, side, remaining, rate, target, gains):
     """Return the foothold relative to the foot that stands, forward and left, m.
 
     Args:
-        error: see capture_error.
+        dcm_error: forward and left, m.
         side: of the foot that swings, 1 left and -1 right.
         remaining: time to its touchdown, s.
         rate: see growth_rate.
@@ -317,16 +317,16 @@ def step(error, side, remaining, rate, target, gains):
 
     """
     time, grown = 0.5 / gains.frequency, math.exp(rate * max(remaining, SOONEST))
-    forward = target[0] * time + gains.place_x * grown * error[0] + gains.place_offset
-    outward = gains.step_width + side * (target[1] * time + gains.place_y * grown * error[1])
+    forward = target[0] * time + gains.place_x * grown * dcm_error[0] + gains.place_offset
+    outward = gains.step_width + side * (target[1] * time + gains.place_y * grown * dcm_error[1])
     return (min(max(forward, -gains.reach_x), gains.reach_x),
             side * min(max(outward, gains.narrowest), gains.reach_y))
 
 
 @jit
-def speed_up(error, gains):
-    """Return the factor of the clock by the capture point's error, m, a pair."""
-    size = math.sqrt(error[0] * error[0] + error[1] * error[1])
+def speed_up(dcm_error, gains):
+    """Return the factor of the clock by the DCM error, m, a pair."""
+    size = math.sqrt(dcm_error[0] * dcm_error[0] + dcm_error[1] * dcm_error[1])
     return 1.0 + min(max(gains.speed_up * (size - gains.speed_up_from), 0.0),
                      gains.speed_up_most)
 
@@ -341,4 +341,4 @@ def integrate(integral, missing, dt):
 @jit
 def time_to_touchdown(phase, gains):
     """Return when a leg that swings will bear half of the weight, s; phase from lift-off."""
-    return ((swing_share(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency
+    return ((swing_fraction(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency

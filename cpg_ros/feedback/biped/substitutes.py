@@ -147,7 +147,7 @@ class Substitutes:
         self._kinematics(self._links, rpy, sensors.joint_positions[0],
                          (self._still, sensors.joint_velocities[0]), self._pose, self._center,
                          self._soles, self._weights)
-        return self._pose.turns[self._links.chains[:, -1], :2, 2].copy()
+        return self._pose.rotations[self._links.chains[:, -1], :2, 2].copy()
 
     def _take_joints(self, latency: float, memory: BipedMemory, dt: float) -> None:
         """Take the joints as measured a latency in s ago, but for the suspect."""
@@ -200,7 +200,7 @@ class Substitutes:
         # By the loads, as a foot that is late is not level yet when the clock has it land.
         leg = int(memory.loads[1] > memory.loads[0])
         # The base seen from the sole: the sole's rotation from the base, transposed.
-        up = pose.turns[self._links.chains[leg, -1]][:, 2]
+        up = pose.rotations[self._links.chains[leg, -1]][:, 2]
         lean = np.array([np.arctan2(up[1], up[2]), np.arcsin(-np.clip(up[0], -1.0, 1.0))])
         rpy = sensors.rpy[0]
         rpy[:2] += fraction * (lean - rpy[:2])
@@ -209,9 +209,9 @@ class Substitutes:
         sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
         # The centre of mass goes as the force of the last tick moves it, and the base as it has
         # to while legs move against it.
-        turn = memory.pose.turns[0]
+        base = memory.pose.rotations[0]
         self._kinematics(self._links, rpy, sensors.joint_positions[0],
-                         (turn @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
+                         (base @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
                          self._center, self._soles, self._weights)
         moved = memory.force / pose.carried[0] - (
             self._center[3:] - memory.center[1] + memory.base) / dt
@@ -221,4 +221,4 @@ class Substitutes:
             center, sole = memory.center[0], memory.pose.soles[int(np.argmax(memory.fractions))]
             moved = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
             moved[2] = GRAVITY
-        sensors.acceleration[0] = turn.T @ moved
+        sensors.acceleration[0] = base.T @ moved

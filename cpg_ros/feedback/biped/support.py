@@ -34,7 +34,7 @@ import numpy as np
 VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
                                         'in which the soles that stand correct the '
                                "accelerometer's velocity")}
-#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, shares of the
+#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, fractions of the
 #: weight.
 FROM, OVER = 0.06, 0.18
 #: SLIP: speed of a sole at which it counts half, m/s; ROLL: angular speed with the same effect,
@@ -43,21 +43,21 @@ SLIP, ROLL = 0.2, 1.0
 
 
 @jit
-def update(turn, acceleration, soles, loads, dt, gains, velocity):
+def update(rotation, acceleration, soles, loads, dt, gains, velocity):
     """Update the base's velocity, world's axes, m/s, shape (3,), in place.
 
     Args:
-        turn: rotation of the base, shape (3, 3).
+        rotation: of the base, shape (3, 3).
         acceleration: as an accelerometer measures it, m/s^2, shape (3,).
         soles: velocities of the soles relative to the base, m/s and rad/s, shape (2, 6).
-        loads: share of the weight on each foot, shape (2,).
+        loads: fraction of the weight on each foot, shape (2,).
         dt: since the last time, s.
         gains: BipedGains.
         velocity: changed.
 
     """
     for k in range(3):
-        velocity[k] += dt * (carry(turn, acceleration, k) - (GRAVITY if k == 2 else 0.0))
+        velocity[k] += dt * (carry(rotation, acceleration, k) - (GRAVITY if k == 2 else 0.0))
     first, second = _trust(soles[0], loads[0], velocity), _trust(soles[1], loads[1], velocity)
     total = first + second
     if total > 0.0:
@@ -166,13 +166,13 @@ STANCE_GAINS = {
     'yaw_kd': Gain(18.7, 500.0, 'N m s/rad', 'derivative gain of the same'),
     'lean': Gain(0.0662, 0.5, 'rad', 'pitch that the base is to have, positive forward',
                  low=-0.5),
-    'pressure_x': Gain(2.60, 10.0, '', "centre of pressure's shift by the capture point's error"),
-    'pressure_y': Gain(0.769, 10.0, '', 'the same sideways'),
-    'pressure_reach_x': Gain(0.0566, 0.3, 'm', 'its largest shift from the middle of a sole'),
-    'pressure_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
+    'cop_x': Gain(2.60, 10.0, '', 'shift of the centre of pressure by the DCM error'),
+    'cop_y': Gain(0.769, 10.0, '', 'the same sideways'),
+    'cop_reach_x': Gain(0.0566, 0.3, 'm', 'its largest shift from the middle of a sole'),
+    'cop_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
     'stand': Gain(2.5, 10.0, '', 'centre of pressure by the capture point while standing'),
     'stance_damping': Gain(1.63, 20.0, 'N m s/rad', 'of the joints of a leg that stands'),
-    'reaction': Gain(0.0032, 1.5, '', "share of the swing leg's moment that the stance leg gives"),
+    'reaction': Gain(0.0032, 1.5, '', "fraction of the swing leg's moment borne by the stance"),
     'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
     'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
     'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
@@ -181,19 +181,19 @@ LEAST, MOST = 0.3, 1.8
 
 
 @jit
-def pressure_shift(error, half, gains):
-    """Return the centre of pressure's shift in the sole's axes, m.
+def cop_shift(dcm_error, half, gains):
+    """Return the shift of the centre of pressure in the sole's axes, m.
 
     Args:
-        error: of the capture point, forward and left, m.
+        dcm_error: forward and left, m.
         half: half the length and width of a sole, m.
         gains: BipedGains.
 
     """
-    reach_x = min(gains.pressure_reach_x, half[0])
-    reach_y = min(gains.pressure_reach_y, half[1])
-    return (min(max(gains.pressure_x * error[0], -reach_x), reach_x),
-            min(max(gains.pressure_y * error[1], -reach_y), reach_y))
+    reach_x = min(gains.cop_reach_x, half[0])
+    reach_y = min(gains.cop_reach_y, half[1])
+    return (min(max(gains.cop_x * dcm_error[0], -reach_x), reach_x),
+            min(max(gains.cop_y * dcm_error[1], -reach_y), reach_y))
 
 
 @jit
@@ -214,20 +214,20 @@ def upward_force(target, height, rise, mass, gains):
 
 
 @jit
-def ground_force(center, pressure, up, moment, gains):
+def ground_force(center, cop, up, moment, gains):
     """Return the force that the ground is to exert, N.
 
     Args:
         center: of mass, m.
-        pressure: centre of it, m.
+        cop: centre of pressure, m.
         up: the upward force, N.
         moment: that is to turn the body, about x and y, N m.
         gains: BipedGains.
 
     """
-    arm = max(center[2] - pressure[2], 0.3)
-    x = ((center[0] - pressure[0]) * up - moment[1]) / arm
-    y = ((center[1] - pressure[1]) * up + moment[0]) / arm
+    arm = max(center[2] - cop[2], 0.3)
+    x = ((center[0] - cop[0]) * up - moment[1]) / arm
+    y = ((center[1] - cop[1]) * up + moment[0]) / arm
     size, most = math.sqrt(x * x + y * y), gains.friction * up
     if size > most:
         x, y = x * most / size, y * most / size

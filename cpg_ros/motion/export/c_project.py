@@ -116,7 +116,7 @@ class CProject:
                 values |= {'CPG_PHASE_READOUT': '',
                            'CPG_HARMONICS': readout.gait.known.terms.shape[1] - 1}
             else:
-                values['CPG_LEAD'] = data.lead
+                values['CPG_ANGLES'] = data.angles
         return values
 
     def _defines(self) -> str:

@@ -248,13 +248,13 @@ class GaitData:
             struct.point('terms', phase_maps.terms)
             struct.point('crests', phase_maps.crests)
             return
-        every = len(plan.readout.wave.lead) // self.lead
+        every = len(plan.readout.wave.phase_offset) // self.angles
         struct.put('peak', orbit.peak)
-        struct.point('lead', plan.readout.wave.lead[::every])
+        struct.point('phase_offset', plan.readout.wave.phase_offset[::every])
         if self.retimed:
             retiming = plan.readout.retiming
-            struct.point('turn', None if retiming is None else
-                      retiming.lead[::every] * [1.0, every])
+            struct.point('phase_offset_slope', None if retiming is None else
+                      retiming.phase_offset[::every] * [1.0, every])
             struct.point('cycle', None if retiming is None else
                       retiming.cycle[::every] * [1.0, every, 1.0, every])
 
@@ -272,7 +272,7 @@ class GaitData:
         return hermite_table(curve, self.format.tolerance)
 
     @property
-    def lead(self) -> int:
+    def angles(self) -> int:
         """Entries of tables by the angle of a waveform."""
         return LEAD[self.format.real]
 

@@ -96,12 +96,12 @@ def schedule(gaits: int, dt: float) -> dict[int, int]:
 def run_pattern(plans: Sequence[GaitPlan], dt: float, events: dict[int, int],
                 strides: np.ndarray | None, substep: float = SUBSTEP) -> np.ndarray:
     """Return the joints' positions after each tick, rad, shape (ticks, joints)."""
-    drive = None if strides is None else StrideCommand(len(plans[0].robot.legs))
-    pattern, samples = Pattern(plans[0], RAMP, drive=drive), []
+    command = None if strides is None else StrideCommand(len(plans[0].robot.legs))
+    pattern, samples = Pattern(plans[0], RAMP, strides=command), []
     pattern.substep, steered = substep, iter(() if strides is None else strides)
     for tick in range(max(events) + round(1.5 * RAMP / dt)):
         event = events.get(tick)
-        if event is not None and drive is not None:
+        if event is not None and command is not None:
             *stride, pace = next(steered)
             pattern.steer(np.array(stride), pace)
         if event == -1:

@@ -249,8 +249,8 @@ class FeedbackLoop(SensorLoop):
         if not self.wanted and self._state[SPENT] > DIES_OUT and not self._state[CLOSED]:
             pattern.correct = None
             return
-        if pattern.drive is not None:
-            pattern.drive.trim = instant.trim
+        if pattern.strides is not None:
+            pattern.strides.trim = instant.trim
         self.inputs.read()
         instant.numbers[:2] = dt, now
         self.renew()
@@ -291,8 +291,8 @@ class FeedbackLoop(SensorLoop):
             return None
         if self._bound is not self.feedback.gains:
             self.bind()
-        if self._pattern.drive is not None:
-            self._pattern.drive.trim = self._instant.trim
+        if self._pattern.strides is not None:
+            self._pattern.strides.trim = self._instant.trim
         correction = self._correction
         correction.close, correction.report = self._machine.address, pattern.report
         correction.plan, correction.follow = pattern.plan, pattern.follow

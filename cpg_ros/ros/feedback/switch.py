@@ -265,7 +265,7 @@ class FeedbackSwitch:
         with announced(self._node, 'the feedback', FEEDBACK):
             warm_up(geometry, len(robot.joints))
         loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)
-        if pattern.drive is None:
+        if pattern.strides is None:
             # Speed and heading are closed by the strides.
             pattern.attach(StrideCommand(len(robot.legs)))
         for line in partial_legs(robot):

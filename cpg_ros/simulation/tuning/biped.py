@@ -38,7 +38,7 @@ import numpy as np
 
 #: SEARCHED: names of the gains that are searched for.
 SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
-            'speed_up_from', 'pressure_x', 'pressure_y', 'height_kp', 'height_kd', 'roll_kp',
+            'speed_up_from', 'cop_x', 'cop_y', 'height_kp', 'height_kd', 'roll_kp',
             'roll_kd', 'pitch_kp', 'pitch_kd', 'yaw_kp', 'yaw_kd', 'stance_damping', 'lean',
             'lift', 'swing_kp', 'swing_kd', 'sole_kp', 'sole_kd', 'reaction_yaw')
 #: FACTOR: largest factor by which a gain changes, either way; SPREAD: initial standard deviation

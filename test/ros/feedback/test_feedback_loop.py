@@ -96,7 +96,7 @@ class Robot:
         made = program('trot')
         self.body = Body('go2', GO2)
         self.unit = SimulatedSensors(self.body, DT, SensorNoise(**dull))
-        self.pattern = Pattern(made, 0.4, drive=StrideCommand(4))
+        self.pattern = Pattern(made, 0.4, strides=StrideCommand(4))
         geometry = geometry_of(GO2)
         inputs = SensorInput(None, GO2, geometry, 'imu', 'measured', contacts, 'foot_contacts')
         self.loop = FeedbackLoop(self.pattern, geometry, inputs,

@@ -55,7 +55,7 @@ def packed(name, *values):
 def messages():
     """Return what a robot that trots at 0.4 m/s, its servos and its generator publish."""
     made, kinds, found = program('trot'), STORE.types, []
-    body, pattern = Body('go2', GO2), Pattern(made, drive=StrideCommand(4))
+    body, pattern = Body('go2', GO2), Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
     feel, unknown = Proprioception(body), np.zeros(9)
     vector, quaternion = kinds['geometry_msgs/msg/Vector3'], kinds['geometry_msgs/msg/Quaternion']

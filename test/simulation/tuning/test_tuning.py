@@ -71,13 +71,13 @@ def in_order(pattern):
        strides=st.none() | st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),
        pace=st.floats(0.5, 1.0))
 def test_targets_are_what_the_generator_publishes(gait, ramp, strides, pace):
-    """A drive or none, tick by tick through the network, for as long as it takes to notice."""
+    """Run tick by tick through the network, with a stride command or none, for long enough."""
     found = targets(program(gait), 3.0, DT, strides or (), pace, ramp)
-    drive = None
+    command = None
     if strides or pace != 1.0:
-        drive = StrideCommand(4)
-        drive.set_target(np.array(strides or [1.0] * 4), pace, at_once=True)
-    pattern, published = Pattern(program(gait), ramp, drive=drive), np.empty_like(found)
+        command = StrideCommand(4)
+        command.set_target(np.array(strides or [1.0] * 4), pace, at_once=True)
+    pattern, published = Pattern(program(gait), ramp, strides=command), np.empty_like(found)
     for row in published:
         pattern.advance(DT)
         row[:] = in_order(pattern)

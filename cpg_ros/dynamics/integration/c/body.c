@@ -119,7 +119,7 @@ static void move_body(cpg *c, cpg_real dt)
     if (!b || !(dt > 0.0) || !__atomic_load_n(&b->moving, __ATOMIC_ACQUIRE)) {
         return;
     }
-    cpg_drive *pose = &b->pose;
+    cpg_smoother *pose = &b->pose;
     approach(pose, 3, dt * b->pace);
     uint8_t there = 1;
     for (int16_t k = 0; k < 4; k++) {

@@ -18,11 +18,11 @@ void cpg_start(cpg *c, uint8_t gait, cpg_real ramp)
     c->tracks = 1;
 #ifdef CPG_STEERING
     for (int16_t k = 0; k <= CPG_LEGS; k++) {
-        c->drive.now[k] = c->drive.target[k] = R(1.0);
-        c->drive.rate[k] = R(0.0);
+        c->strides.now[k] = c->strides.target[k] = R(1.0);
+        c->strides.rate[k] = R(0.0);
     }
-    c->drive.at_once = 0;
-    c->track[0].stride = c->drive.now;
+    c->strides.at_once = 0;
+    c->track[0].stride = c->strides.now;
 #endif
     c->track[0].transition = c->track[0].progress = R(0.0);
     align(&c->track[0], gait, R(0.0));
@@ -57,11 +57,11 @@ static void aim(cpg_real *target, cpg_real value, cpg_real low, cpg_real high)
 void cpg_steer(cpg *c, const cpg_real *stride, cpg_real pace)
 {
     for (int16_t leg = 0; leg < CPG_LEGS; leg++) {
-        aim(&c->drive.target[leg], stride[leg], R(-1.0), R(1.0));
+        aim(&c->strides.target[leg], stride[leg], R(-1.0), R(1.0));
     }
-    aim(&c->drive.target[CPG_LEGS], pace, R(0.0), R(2.0));
+    aim(&c->strides.target[CPG_LEGS], pace, R(0.0), R(2.0));
     /* Nothing moves at the stand. */
-    c->drive.at_once = !(c->ramp.level > R(0.0));
+    c->strides.at_once = !(c->ramp.level > R(0.0));
 }
 #endif
 
@@ -77,7 +77,7 @@ static void take_waiting(cpg *c)
         t->transition = c->transition;
         t->progress = R(0.0);
 #ifdef CPG_STEERING
-        t->stride = c->drive.now;
+        t->stride = c->strides.now;
 #endif
         align(t, (uint8_t)(c->waiting - 1), c->track[c->tracks - 1].phase);
         c->tracks++;
@@ -92,7 +92,7 @@ void cpg_advance(cpg *c, cpg_real dt)
 #ifdef CPG_STEERING
     /* Point to the strides of this struct, which may have been copied. */
     for (int16_t n = 0; n < c->tracks; n++) {
-        c->track[n].stride = c->drive.now;
+        c->track[n].stride = c->strides.now;
     }
 #endif
     take_waiting(c);

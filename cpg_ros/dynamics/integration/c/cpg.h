@@ -32,7 +32,7 @@ typedef struct {
     cpg_real transition, progress;  /* s, and the share of it that is over */
     cpg_real phase, phase_carry;    /* of the first leg, cycles */
     cpg_real angle[CPG_JOINTS];     /* from the stand, rad */
-    cpg_real rise[CPG_JOINTS];      /* its derivative by phase, rad per cycle */
+    cpg_real d_angle_d_phase[CPG_JOINTS];  /* rad per cycle */
     cpg_real legs[CPG_LEGS];        /* phase of each leg, cycles */
 #ifdef CPG_STEERING
     const cpg_real *stride;
@@ -60,7 +60,7 @@ typedef struct {
 typedef struct {
     cpg_real now[CPG_LEGS + 1], rate[CPG_LEGS + 1], target[CPG_LEGS + 1];
     uint8_t at_once;
-} cpg_drive;
+} cpg_smoother;
 #endif
 
 @RAMP@
@@ -77,7 +77,7 @@ typedef struct cpg {
     cpg_real slowing, slower, frequency, transition;
     cpg_real last_rate[CPG_JOINTS];
 #ifdef CPG_STEERING
-    cpg_drive drive;
+    cpg_smoother strides;
 #endif
 } cpg;
 
@@ -155,9 +155,9 @@ typedef struct {
     CPG_ROM cpg_real *crests;     /* [wave]: phase at which x peaks */
 #else
     cpg_real peak;
-    CPG_ROM cpg_real *lead;       /* phase minus angle, over the angle */
+    CPG_ROM cpg_real *phase_offset;        /* phase minus angle, over the angle */
 #ifdef CPG_RETIMED
-    CPG_ROM cpg_real *turn;       /* the same and its slope per point */
+    CPG_ROM cpg_real *phase_offset_slope;  /* the same and its slope per point */
     CPG_ROM cpg_real *cycle;      /* x, its slope per point, y and its slope, over the phase */
 #endif
 #endif
@@ -169,11 +169,11 @@ extern CPG_ROM cpg_gait cpg_gaits[CPG_GAITS];
 #define TRACK(n) (&c->track[n])
 #ifdef CPG_STEERING
 #define STEERED(c) 1
-#define DRIVE(c) (&(c)->drive)
+#define STRIDES(c) (&(c)->strides)
 #define LEGS_OF(c) CPG_LEGS
 extern CPG_ROM uint8_t cpg_joint_leg[CPG_JOINTS];
 #else
-#define speed_of(c, t, joint, frequency) ((t)->rise[joint] * (frequency))
+#define speed_of(c, t, joint, frequency) ((t)->d_angle_d_phase[joint] * (frequency))
 #endif
 extern CPG_ROM cpg_real cpg_offset[CPG_JOINTS];
 extern CPG_ROM cpg_real cpg_limits[3][CPG_JOINTS];  /* lowest, highest, fastest */

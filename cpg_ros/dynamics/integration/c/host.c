@@ -14,14 +14,14 @@ void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
     ramp_to(ramp, end, most(time, SHORTEST));
 }
 
-/* Lead the joints from their first angles to the stand, none faster than half of its limit. */
-void cpg_lead_in(cpg *c, cpg_real time)
+/* Bring the joints from their first angles to the stand, none faster than half of its limit. */
+void cpg_approach_stand(cpg *c, cpg_real time)
 {
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
-        const cpg_real left = c->lead.level * fabs(c->found[joint]);
+        const cpg_real left = c->approach.level * fabs(c->found[joint]);
         time = most(time, 1.5 * left / most(0.5 * c->limits[2][joint], 1e-9));
     }
-    cpg_ramp_to(&c->lead, 0.0, time);
+    cpg_ramp_to(&c->approach, 0.0, time);
 }
 
 /* Take the requests of other threads. */
@@ -31,14 +31,14 @@ void cpg_take(cpg *c)
     __atomic_exchange(&c->go, &go, &go, __ATOMIC_ACQ_REL);
     if (go != 0.0) {
         cpg_ramp_to(&c->ramp, go > 0.0, fabs(go));
-        if (go < 0.0 && c->lead.parts > 0) {
-            cpg_lead_in(c, -go);
+        if (go < 0.0 && c->approach.parts > 0) {
+            cpg_approach_stand(c, -go);
         }
     }
     if (c->tracks < CPG_TRACKS) {
         cpg_track *t = __atomic_load_n(&c->waiting, __ATOMIC_ACQUIRE);
         if (t) {
-            t->stride = c->drive ? c->drive->now : 0;
+            t->stride = c->strides ? c->strides->now : 0;
             cpg_track_reseed(t, c->track[c->tracks - 1]->phase);
             c->track[c->tracks] = t;
             __atomic_store_n(&c->tracks, c->tracks + 1, __ATOMIC_RELEASE);
@@ -118,7 +118,8 @@ void cpg_plan(cpg *c, cpg_real dt)
     move_body(c, clock);
     clock *= c->frequency_scale;
     c->fraction *= c->frequency_scale;
-    if (c->tracks == 1 && c->ramp.parts == 0 && c->lead.parts == 0 && !(c->absorbed < ABSORB)) {
+    if (c->tracks == 1 && c->ramp.parts == 0 && c->approach.parts == 0
+            && !(c->absorbed < ABSORB)) {
         if (cruise(c, clock, c->wanted, c->rate)) {
             carry(c, c->rate);
             return;

@@ -7,9 +7,9 @@ typedef double cpg_real;
 @DEFINES@
 #define CPG_HOST
 #define CPG_STEERING
-#define STEERED(c) ((c)->drive != 0)
-#define DRIVE(c) ((c)->drive)
-#define LEGS_OF(c) ((int16_t)(c)->drive->legs)
+#define STEERED(c) ((c)->strides != 0)
+#define STRIDES(c) ((c)->strides)
+#define LEGS_OF(c) ((int16_t)(c)->strides->legs)
 #define CPG_ROM const
 #define CPG_WEIGHTS 6
 #define CPG_VARIABLES 2
@@ -32,7 +32,7 @@ typedef struct {
     const cpg_real *phase, *shift, *speed;
     const cpg_real (*weights)[CPG_WEIGHTS], (*in_place)[CPG_WEIGHTS], (*maps)[3];
     const cpg_real *waves, *shapes, *circles, *terms, *crests;
-    const cpg_real *values, *lead, *turn, *cycle;
+    const cpg_real *values, *phase_offset, *phase_offset_slope, *cycle;
 } cpg_gait;
 
 /* A network and its history, of size numbers in each of x, slope and before. */
@@ -49,7 +49,7 @@ typedef struct {
     cpg_real transition, progress, phase, phase_carry;
     cpg_real settling, calm, still, astray;  /* strides */
     cpg_real distance, sum;
-    cpg_real *angle, *rise, *reach, *legs, *clocks[6];
+    cpg_real *angle, *d_angle_d_phase, *reach, *legs, *clocks[6];
     const cpg_real *stride;  /* of each leg, 0 if nothing steers */
 } cpg_track;
 
@@ -58,11 +58,11 @@ typedef struct {
     cpg_real *now, *rate;
     const cpg_real *target, *trim;
     int32_t legs, at_once;
-} cpg_drive;
+} cpg_smoother;
 
 /* The pose of a body against its feet. */
 typedef struct {
-    cpg_drive pose;          /* height, m, roll, pitch, yaw, rad */
+    cpg_smoother pose;         /* height, m, roll, pitch, yaw, rad */
     cpg_real pace, *rate;    /* factor of the time; of the joints in the stand, rad/s */
     const int16_t (*joints)[3];          /* of each leg, -1 for none */
     const cpg_real (*limbs)[8][3];       /* axes, links, hip, foot in the stand, m */
@@ -73,14 +73,14 @@ typedef struct {
 typedef struct {
     int32_t joints, tracks, held, ticks_held, faults, followed, recovering, jumped;
     cpg_track *track[CPG_TRACKS];
-    cpg_drive *drive;
+    cpg_smoother *strides;
     cpg_body *body;
     cpg_real *offset;
     const cpg_real *limits[3], *found;
     cpg_real *position, *velocity, *wanted, *rate, *last_rate, *goal, *correction;
     cpg_real *jump, *jump_rate;
     uint8_t *behind;
-    cpg_ramp ramp, lead;
+    cpg_ramp ramp, approach;
     cpg_real slowing, slower, frequency, frequency_scale, substep, absorbed, fraction;
     cpg_real stall, stall_past, stall_low;
     /* Phases and state of the newest track, after each tick. */

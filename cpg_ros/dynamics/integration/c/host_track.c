@@ -80,9 +80,9 @@ void cpg_track_reseed(cpg_track *t, cpg_real phase)
     t->phase_carry = t->settling = t->astray = 0.0;
 }
 
-void cpg_steer(cpg_drive *drive, cpg_real dt)
+void cpg_steer(cpg_smoother *strides, cpg_real dt)
 {
-    approach(drive, (int16_t)drive->legs, dt);
+    approach(strides, (int16_t)strides->legs, dt);
 }
 
 static void recover(cpg *c, cpg_track *t)

@@ -13,8 +13,8 @@ static void watch_wave(cpg_track *t, const cpg_real *x)
     const cpg_real base = t->legs[0] - gait->phase[gait->leg_cell[0]];
     for (int16_t cell = 0; cell < gait->cells; cell++) {
         cpg_real rest;
-        const int16_t low = place_of(base + gait->phase[cell], CPG_LEAD, &rest);
-        const cpg_real a = gait->values[low], b = gait->values[low + 1 < CPG_LEAD ? low + 1 : 0];
+        const int16_t low = place_of(base + gait->phase[cell], CPG_ANGLES, &rest);
+        const cpg_real a = gait->values[low], b = gait->values[low + 1 < CPG_ANGLES ? low + 1 : 0];
         watch(t, x[cell] - (a + rest * (b - a)));
     }
 }

@@ -1,8 +1,8 @@
 
-/* A joint's deviation from its offset: w0 x + w1 y + w2 x^2 + w3 xy + w4 x^3 + w5 x^2 y; rise is its
- * derivative from those of x and y. */
+/* A joint's deviation from its offset: w0 x + w1 y + w2 x^2 + w3 xy + w4 x^3 + w5 x^2 y;
+ * d_angle is its derivative, from those of x and y. */
 static cpg_real joint_value(CPG_ROM cpg_real *w, cpg_real x, cpg_real y, cpg_real dx, cpg_real dy,
-                            cpg_real *rise)
+                            cpg_real *d_angle)
 {
     cpg_real value = w[0] * x, by_x = w[0];
 #if CPG_WEIGHTS > 1
@@ -19,9 +19,9 @@ static cpg_real joint_value(CPG_ROM cpg_real *w, cpg_real x, cpg_real y, cpg_rea
     by_x += R(3.0) * w[4] * x * x + R(2.0) * w[5] * x * y;
     by_y += w[5] * x * x;
 #endif
-    *rise = by_x * dx;
+    *d_angle = by_x * dx;
 #if CPG_WEIGHTS > 1
-    *rise += by_y * dy;
+    *d_angle += by_y * dy;
 #else
     (void)y;
     (void)dy;
@@ -40,12 +40,12 @@ static cpg_real retimed_phase(cpg_real phase, CPG_ROM cpg_real *map, cpg_real *s
 }
 #endif
 
-/* Fill in a joint's angle, and its rise, from x and y of its cell and their derivatives. */
+/* Fill in a joint's angle and its derivative by phase, from x and y of its cell and theirs. */
 static void drive_joint(cpg_track *t, CPG_ROM cpg_gait *gait, int16_t joint,
                         const cpg_real *signal)
 {
     cpg_real angle = joint_value(gait->weights[joint], signal[0], signal[1], signal[2], signal[3],
-                                 &t->rise[joint]);
+                                 &t->d_angle_d_phase[joint]);
 #ifdef CPG_STEERING
     if (t->stride) {
         /* angle = in_place + stride (angle - in_place), and so its derivatives. */
@@ -53,7 +53,7 @@ static void drive_joint(cpg_track *t, CPG_ROM cpg_gait *gait, int16_t joint,
         const cpg_real longer = t->stride[cpg_joint_leg[joint]] - R(1.0);
         t->reach[joint] = angle - joint_value(gait->in_place[joint], signal[0], signal[1],
                                               signal[2], signal[3], &lift);
-        t->rise[joint] += longer * (t->rise[joint] - lift);
+        t->d_angle_d_phase[joint] += longer * (t->d_angle_d_phase[joint] - lift);
         angle += longer * t->reach[joint];
     }
 #endif

@@ -49,7 +49,7 @@ static void rates(const cpg_track *t, const cpg_real *driven, const cpg_real *x,
 }
 
 /* Coupling terms `driven` at c steps after the head node, from the state a delay earlier. */
-static const cpg_real *heard(const cpg_track *t, cpg_real c, cpg_real *driven)
+static const cpg_real *delayed_terms(const cpg_track *t, cpg_real c, cpg_real *driven)
 {
 #if CPG_DRIVEN > 0
     cpg_real past[CPG_COMPONENTS];
@@ -67,7 +67,7 @@ static void restart(cpg_track *t)
 {
     cpg_real room[CPG_DRIVEN_ROOM];
     begin_kink(t);
-    const cpg_real *driven = heard(t, R(0.0), room);
+    const cpg_real *driven = delayed_terms(t, R(0.0), room);
     cpg_real *slope = t->slope[t->head];
     rates(t, driven, t->x[t->head], R(0.0), arriving(t, t->head), slope);
 }
@@ -80,10 +80,10 @@ void cpg_network_step(cpg_track *t)
     const int16_t new = t->head + 1 < CPG_NODES ? (int16_t)(t->head + 1) : (int16_t)0;
     const cpg_real *now = t->x[t->head], *k1 = t->slope[t->head];
     /* Stages 2 and 3 share one delayed state, stage 4 and the slope at the end another. */
-    const cpg_real *driven = heard(t, R(0.5), room);
+    const cpg_real *driven = delayed_terms(t, R(0.5), room);
     rates(t, driven, now, R(0.5) * CPG_STEP, k1, k2);
     rates(t, driven, now, R(0.5) * CPG_STEP, k2, k3);
-    driven = heard(t, R(1.0), room);
+    driven = delayed_terms(t, R(1.0), room);
     rates(t, driven, now, CPG_STEP, k3, k4);
     cpg_real *x = t->x[new];
     for (int16_t i = 0; i < CPG_COMPONENTS; i++) {

@@ -24,11 +24,11 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
     ramp->past = R(0.0);
     if (rate * (end - level) < R(0.0)) {
         /* The level moves away from its end: brake first, within half of the room that is left. */
-        const cpg_real turn = level + R(0.5) * ((rate > R(0.0) ? R(1.0) : R(0.0)) - level);
-        const cpg_ramp_part part = {level, rate, turn, R(2.0) * (turn - level) / rate};
+        const cpg_real halt = level + R(0.5) * ((rate > R(0.0) ? R(1.0) : R(0.0)) - level);
+        const cpg_ramp_part part = {level, rate, halt, R(2.0) * (halt - level) / rate};
         ramp->parts = 1;
         ramp->part = part;
-        level = turn;
+        level = halt;
         rate = R(0.0);
     }
     if (rate != R(0.0)) {
@@ -71,9 +71,9 @@ static void advance_ramp(cpg_ramp *ramp, cpg_real clock)
 }
 
 /* Factor of the clock, 0 to 1, at which no joint exceeds its speed bound in the next substep. */
-static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t leading)
+static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t approaching)
 {
-    (void)leading;
+    (void)approaching;
     cpg_real worst = R(1.0);
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
         cpg_real bound = R(0.0);
@@ -82,7 +82,7 @@ static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t leading)
             bound = most(bound, gait->speed[joint] + SHIFTING * F(fabs)(gait->shift[joint]));
         }
 #ifdef CPG_HOST
-        bound += leading ? SHIFTING * fabs(c->found[joint]) : 0.0;
+        bound += approaching ? SHIFTING * fabs(c->found[joint]) : 0.0;
 #endif
         bound = most(SHORT_OF * least(bound, cpg_limits[2][joint]), R(1e-9));
         const cpg_real ahead = c->followed ? R(2.0) * rate[joint] - c->last_rate[joint]
@@ -98,7 +98,7 @@ static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t leading)
 static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 {
     const cpg_real clock = R(0.5) * dt * (c->slowing + c->slower);
-    uint8_t moving = c->tracks > 1 || c->ramp.parts > 0, leading = 0;
+    uint8_t moving = c->tracks > 1 || c->ramp.parts > 0, approaching = 0;
     cpg_real share[CPG_TRACKS] = {R(0.0)}, share_rate[CPG_TRACKS] = {R(0.0)};
     cpg_real frequency = gait_of(TRACK(0))->frequency;
     c->slowing = c->slower;
@@ -114,8 +114,8 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
     frequency *= steered(c, clock);
 #endif
 #ifdef CPG_HOST
-    leading = c->lead.parts > 0;
-    moving = moving || leading;
+    approaching = c->approach.parts > 0;
+    moving = moving || approaching;
 #endif
     const cpg_real strides = R(0.5) * (c->frequency + frequency) * clock;
     c->frequency = frequency;
@@ -130,8 +130,8 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
     }
 #ifdef CPG_HOST
     /* Go to the stand first: the gait swings about it, not about where the joints were found. */
-    if (leading) {
-        advance_ramp(&c->lead, clock);
+    if (approaching) {
+        advance_ramp(&c->approach, clock);
     } else
 #endif
     if (c->ramp.parts > 0) {
@@ -148,9 +148,9 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
         rate[joint] = c->ramp.level * speed + c->ramp.rate * angle;
         wanted[joint] = c->ramp.level * angle + cpg_offset[joint];
 #ifdef CPG_HOST
-        if (leading) {
-            wanted[joint] += c->lead.level * c->found[joint];
-            rate[joint] += c->lead.rate * c->found[joint];
+        if (approaching) {
+            wanted[joint] += c->approach.level * c->found[joint];
+            rate[joint] += c->approach.rate * c->found[joint];
         }
 #endif
     }
@@ -161,7 +161,7 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
         c->tracks--;
     }
     if (moving) {
-        c->slower = slowed(c, rate, leading);
+        c->slower = slowed(c, rate, approaching);
         for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
             rate[joint] *= c->slowing;
         }

@@ -2,28 +2,28 @@
 #define TIME_CONSTANT R(0.2)
 
 /* e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target. */
-static void approach(cpg_drive *drive, int16_t legs, cpg_real dt)
+static void approach(cpg_smoother *value, int16_t legs, cpg_real dt)
 {
     const cpg_real decay = F(exp)(-dt / TIME_CONSTANT);
-    const uint8_t at_once = drive->at_once != 0;
+    const uint8_t at_once = value->at_once != 0;
     for (int16_t k = 0; k <= legs; k++) {
-        cpg_real target = drive->target[k];
+        cpg_real target = value->target[k];
         if (at_once) {
-            drive->now[k] = target;
-            drive->rate[k] = R(0.0);
+            value->now[k] = target;
+            value->rate[k] = R(0.0);
             continue;
         }
 #ifdef CPG_HOST
-        if (drive->trim && k < legs) {
-            target = within(target + drive->trim[k], -1.0, 1.0);
+        if (value->trim && k < legs) {
+            target = within(target + value->trim[k], -1.0, 1.0);
         }
 #endif
-        const cpg_real gap = drive->now[k] - target, pull = drive->rate[k] + gap / TIME_CONSTANT;
-        drive->now[k] = target + (gap + pull * dt) * decay;
-        drive->rate[k] = (drive->rate[k] - pull * dt / TIME_CONSTANT) * decay;
+        const cpg_real gap = value->now[k] - target, pull = value->rate[k] + gap / TIME_CONSTANT;
+        value->now[k] = target + (gap + pull * dt) * decay;
+        value->rate[k] = (value->rate[k] - pull * dt / TIME_CONSTANT) * decay;
     }
     if (at_once) {
-        drive->at_once = 0;
+        value->at_once = 0;
     }
 }
 
@@ -34,14 +34,14 @@ static cpg_real steered(cpg *c, cpg_real dt)
         return R(1.0);
     }
     const int16_t legs = LEGS_OF(c);
-    approach(DRIVE(c), legs, dt);
-    return DRIVE(c)->now[legs];
+    approach(STRIDES(c), legs, dt);
+    return STRIDES(c)->now[legs];
 }
 
 static cpg_real speed_of(const cpg *c, const cpg_track *t, int16_t joint, cpg_real frequency)
 {
     CPG_ROM cpg_gait *gait = gait_of(t);
     (void)gait;
-    const cpg_real speed = t->rise[joint] * frequency;
-    return STEERED(c) ? speed + DRIVE(c)->rate[cpg_joint_leg[joint]] * t->reach[joint] : speed;
+    const cpg_real speed = t->d_angle_d_phase[joint] * frequency;
+    return STEERED(c) ? speed + STRIDES(c)->rate[cpg_joint_leg[joint]] * t->reach[joint] : speed;
 }

@@ -28,7 +28,7 @@ static void look(cpg_track *t)
         const cpg_real a = table[low], gap = table[high] - a;
         const cpg_real a_slope = table[low + 1], b_slope = table[high + 1];
         t->angle[joint] = gait->shift[joint] + a + ab * gap + da * a_slope + db * b_slope;
-        t->rise[joint] = ab_rise * gap + da_rise * a_slope + db_rise * b_slope;
+        t->d_angle_d_phase[joint] = ab_rise * gap + da_rise * a_slope + db_rise * b_slope;
     }
     for (int16_t leg = 0; leg < CPG_LEGS; leg++) {
         t->legs[leg] = fraction(t->orbit_phase + gait->leg_phase[leg]);

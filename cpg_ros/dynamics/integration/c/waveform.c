@@ -13,9 +13,9 @@ static void begin_clocks(cpg_track *t, cpg_real phase)
 static cpg_real periodic(CPG_ROM cpg_real *table, int16_t width, cpg_real cycles, cpg_real *slope)
 {
     cpg_real rest;
-    const int16_t low = place_of(cycles, CPG_LEAD, &rest);
-    const cpg_real value = lookup(table, width, CPG_LEAD, low, rest, slope);
-    *slope *= (cpg_real)CPG_LEAD;
+    const int16_t low = place_of(cycles, CPG_ANGLES, &rest);
+    const cpg_real value = lookup(table, width, CPG_ANGLES, low, rest, slope);
+    *slope *= (cpg_real)CPG_ANGLES;
     return value;
 }
 
@@ -27,8 +27,8 @@ static void retime(CPG_ROM cpg_gait *gait, CPG_ROM cpg_real *map, cpg_real z, cp
     const cpg_real turning = square > LEAST_SQUARE ? (*y * *y - *x * z) / square : R(1.0);
     cpg_real growing = square > LEAST_SQUARE ? *y * (*x + z) / square : R(0.0);
     cpg_real slope, steep;
-    const cpg_real turn = F(atan2)(-*y, *x) / TURN;
-    const cpg_real theta = turn + periodic(gait->turn, 2, turn, &slope);
+    const cpg_real angle = F(atan2)(-*y, *x) / TURN;
+    const cpg_real theta = angle + periodic(gait->phase_offset_slope, 2, angle, &slope);
     const cpg_real going = (R(1.0) + slope) * turning;
     const cpg_real own_x = periodic(gait->cycle, 4, theta, &slope);
     const cpg_real own_y = periodic(gait->cycle + 2, 4, theta, &slope), own_z = slope / TURN;
@@ -62,7 +62,7 @@ static void look(cpg_track *t, cpg_real strides)
             signal[1] = signal[2] = now[1][cell];
             signal[3] = now[2][cell];
 #ifdef CPG_RETIMED
-            if (gait->turn) {
+            if (gait->phase_offset_slope) {
                 retime(gait, gait->maps[joint], now[2][cell], &signal[0], &signal[1], &signal[2],
                        &signal[3]);
             }
@@ -74,11 +74,12 @@ static void look(cpg_track *t, cpg_real strides)
     }
     for (int16_t leg = 0; leg < CPG_LEGS; leg++) {
         const int16_t cell = cpg_leg_cell[leg];
-        const cpg_real turn = F(atan2)(-now[1][cell], now[0][cell]) / TURN;
+        const cpg_real angle = F(atan2)(-now[1][cell], now[0][cell]) / TURN;
         cpg_real rest;
-        const int16_t low = place_of(turn, CPG_LEAD, &rest);
-        const cpg_real a = gait->lead[low], b = gait->lead[low + 1 < CPG_LEAD ? low + 1 : 0];
-        t->legs[leg] = fraction(turn + a + rest * (b - a));
+        const int16_t low = place_of(angle, CPG_ANGLES, &rest);
+        const cpg_real a = gait->phase_offset[low];
+        const cpg_real b = gait->phase_offset[low + 1 < CPG_ANGLES ? low + 1 : 0];
+        t->legs[leg] = fraction(angle + a + rest * (b - a));
     }
 #ifdef CPG_HOST
     watch_wave(t, now[0]);
