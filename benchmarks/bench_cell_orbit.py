@@ -53,7 +53,7 @@ def by_scipy(network: Network, gait: str, path, period: float) -> tuple[float, f
                 reduced.rates(y.T).T[:, None, :])
 
     def ends(left, right, length):
-        return np.append(right - left[reduced.turn], reduced.rates(left)[0])
+        return np.append(right - left[reduced.permutation], reduced.rates(left)[0])
 
     began = time.perf_counter()
     with warnings.catch_warnings():

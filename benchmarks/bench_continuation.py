@@ -83,7 +83,7 @@ def by_bvp(branch: Branch) -> list[float]:
                     reduced.rates(y.T).T[:, None, :])
 
         def ends(left, right, p, reduced=reduced):
-            return np.append(right - left[reduced.turn], reduced.rates(left)[0])
+            return np.append(right - left[reduced.permutation], reduced.rates(left)[0])
 
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')

@@ -93,7 +93,7 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
         part = slice(BETWEEN * max(begin - 1, 0), BETWEEN * (end - 1) + 1)
         axes.plot(values[part], amplitudes[part], color=colour,
                   linestyle=STYLES[kinds[begin]][0], linewidth=1.6)
-    for k in branch.turns:
+    for k in branch.fold_indices:
         axes.plot(branch.values[k], branch.amplitudes[k], marker='s', color=colour, markersize=5)
 
 

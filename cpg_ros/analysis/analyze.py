@@ -31,7 +31,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.dynamics.stability import verdicts
 from cpg_ros.networks.network import ParameterLine
-from cpg_ros.networks.network_options import add_network_options, chosen_preset
+from cpg_ros.networks.network_options import add_network_options, preset_from
 from cpg_ros.networks.registry import SHIPPED
 import numpy as np
 
@@ -89,7 +89,7 @@ def _analysed(args: Namespace) -> Analysis:
         raise InputError(f'--basin: {args.basin} is not from 1 to {MOST_STATES}')
     if args.seed is not None and (args.basin is None or args.seed < 0):
         raise InputError('--seed: it must be 0 or more, and goes with --basin')
-    preset, network = chosen_preset(args)
+    preset, network = preset_from(args)
     longest = 2.0 * network.delay if args.longest_delay is None else args.longest_delay
     if not 0.0 <= longest <= LONGEST:
         raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')

@@ -203,7 +203,8 @@ def text(by_gait: dict[str, Basin]) -> str:
     """Return a table of the basins."""
     if not by_gait:
         return 'Basins: no gait attracts.'
-    rows: list[tuple[str, ...]] = [('gait', 'gain', 'return', 'share', '95 % interval', 'others')]
+    rows: list[tuple[str, ...]] = [
+        ('gait', 'gain', 'return', 'fraction', '95 % interval', 'others')]
     for gait, basin in by_gait.items():
         low, high = basin.interval
         others = ', '.join(f'{name} {number}' for name, number in basin.others.items())
@@ -222,6 +223,6 @@ def text(by_gait: dict[str, Basin]) -> str:
 def as_dict(by_gait: dict[str, Basin]) -> dict[str, Any]:
     """Return the basins in plain types, gait -> basin."""
     return {gait: {'symmetry_gain': basin.gain, 'states': basin.states, 'seed': basin.seed,
-                   'returned': basin.returned, 'share': basin.fraction,
+                   'returned': basin.returned, 'fraction': basin.fraction,
                    'interval': list(basin.interval), 'others': dict(basin.others)}
             for gait, basin in by_gait.items()}

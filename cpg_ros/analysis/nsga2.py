@@ -170,7 +170,7 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
     return VerifiedGait(preset, orbit, score.errors, leading, differences)
 
 
-#: EPOCH: generations between two migrations; MIGRANTS: share of a population that migrates.
+#: EPOCH: generations between two migrations; MIGRANTS: fraction of a population that migrates.
 EPOCH, MIGRANTS = 3, 0.1
 
 

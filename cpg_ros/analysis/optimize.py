@@ -65,7 +65,7 @@ def write_front(path: Path, front: Front) -> None:
     rows = csv.writer(text)
     rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
                    *(['difference of waveforms [1]'] if two else []),
-                   'period [model time]', 'chosen'])
+                   'period [model time]', 'selected'])
     for score in front.scores:
         parameters = score.network.as_dict()
         values = [parameters[variable.members[0]] for variable in front.space.variables]
@@ -90,7 +90,7 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
                  label='tried, orbit solved')
     axes.scatter(values[x][on], values[y][on], s=22, color=BEST, label='Pareto front', zorder=3)
     axes.scatter(values[x][selected], values[y][selected], s=110, facecolors='none',
-                 edgecolors='#1a202c', linewidths=1.3, label='chosen', zorder=4)
+                 edgecolors='#1a202c', linewidths=1.3, label='selected', zorder=4)
     for name, scale, limits in ((x, axes.set_xscale, axes.set_xlim),
                                 (y, axes.set_yscale, axes.set_ylim)):
         if 'phase' in name:
@@ -140,7 +140,7 @@ def draw_front(path: Path, front: Front) -> None:
     axes.set_xlabel('time [strides]')
     figure.suptitle(f'{front.space.gait.replace("_", " ")} of the {front.space.network.name}: '
                     f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
-                    f'chosen: period {orbit.period:.3f} model time, leading multiplier '
+                    f'selected: period {orbit.period:.3f} model time, leading multiplier '
                     f'{front.best.leading:.2g} a cycle', fontsize=11)
     write_atomically(path, rendered(figure, dpi=120))
     pyplot.close(figure)
@@ -196,7 +196,7 @@ def _parser() -> Parser:
     return parser
 
 
-def chosen_set(front: Front) -> str:
+def selected_set(front: Front) -> str:
     """Return the selected set as lines of a name, a value and a unit."""
     best, space = front.best, front.space
     parameters = best.preset.network.as_dict()
@@ -211,7 +211,7 @@ def chosen_set(front: Front) -> str:
     if best.orbit.waves.max():
         rows.append(('waveforms differ by', f'{best.differences[0]:.3f}', 'of their RMS'))
     head = (f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
-            f'{len(front.scores)} on the Pareto front; chosen:')
+            f'{len(front.scores)} on the Pareto front; selected:')
     return '\n'.join([head, *(f'  {line}' for line in table(rows, '<><'))])
 
 
@@ -232,7 +232,7 @@ def _optimize(args: argparse.Namespace) -> int:
     draw_front(args.out / 'front.png', front)
     write_presets(args.out / 'preset.yaml', front.space.network, {name: front.best.preset},
                   f'Found by: {args.command}')
-    say(f'{chosen_set(front)}\n'
+    say(f'{selected_set(front)}\n'
         f'written: front.csv, front.png and preset.yaml (preset {name}) in {args.out}')
     return 0
 

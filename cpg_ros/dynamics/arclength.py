@@ -78,11 +78,11 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
     points, ordinates = list(grid), list(values)
     sizes = np.abs(values)
     bend = np.maximum(sizes[:-2], sizes[2:]) - sizes[1:-1]
-    turns = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
+    bends = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
                            & (sizes[1:-1] <= sizes[2:])
                            & (np.sign(values[:-2]) == np.sign(values[1:-1]))
                            & (np.sign(values[1:-1]) == np.sign(values[2:]))) + 1
-    for k in turns[::-1]:
+    for k in bends[::-1]:
         side = np.sign(values[k])
         lowest = scipy.optimize.minimize_scalar(
             lambda x, side=side: side * function(x), method='bounded',

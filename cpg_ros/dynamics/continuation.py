@@ -44,8 +44,8 @@ import numpy as np
 #: A branch ends near a homoclinic orbit if its period has grown by the factor GROWN while the
 #: value changes by less than STILL of its scale per period.
 GROWN, STILL = 3.0, 1e-2
-#: The period grows alone in a step in which it grows by the share LONGER while the value changes
-#: by less than ROUNDING of its scale.
+#: The period grows alone in a step in which it grows by the fraction LONGER while the value
+#: changes by less than ROUNDING of its scale.
 LONGER, ROUNDING = 0.01, 1e-9
 #: Near a saddle-node the slope of the value falls as the period to the power -3; a fall from this
 #: power on is taken for an exponential one.
@@ -180,26 +180,26 @@ class Branch(ShortRepr):
     Attributes:
         along: the line.
         points: in their order on the branch.
-        turns: indices of the folds.
+        fold_indices: of the folds.
         ends: before the first point and after the last.
 
     """
 
     along: ParameterLine
     points: tuple[BranchPoint, ...]
-    turns: tuple[int, ...]
+    fold_indices: tuple[int, ...]
     ends: tuple[BranchEnd, BranchEnd]
 
     def _summary(self) -> str:
         orbit, values = self.points[0].orbit, self.values
         return (f'{orbit.gait} of {orbit.network.name} along {self.along} '
                 f'{values.min():.6g} to {values.max():.6g}: {len(self.points)} points, '
-                f'folds: {len(self.turns)}, ends: {self.ends[0]}; {self.ends[1]}')
+                f'folds: {len(self.fold_indices)}, ends: {self.ends[0]}; {self.ends[1]}')
 
     @property
     def folds(self) -> tuple[BranchPoint, ...]:
         """Folds of the branch, with two orbits on one side and none on the other."""
-        return tuple(self.points[k] for k in self.turns)
+        return tuple(self.points[k] for k in self.fold_indices)
 
     @property
     def values(self) -> np.ndarray:
@@ -286,7 +286,7 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     if start is None:
         raise NoOrbit(f"Newton's method fails at the orbit given, {along} {value:g}")
     start = start if start.rate >= 0.0 else start.reversed()
-    points, turns, end = _run(start, low, high, orbit.period, limits)
+    points, folds, end = _run(start, low, high, orbit.period, limits)
     before: list[BranchPoint] = []
     back: list[int] = []
     begin = BranchEnd('start', value, orbit.period)
@@ -296,7 +296,7 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     earlier = [replace(point, curve_point=point.curve_point.reversed())
                for point in reversed(before)]
     return Branch(along, (*earlier, _point(start), *points),
-                  (*(n - 1 - k for k in reversed(back)), *(n + 1 + k for k in turns)),
+                  (*(n - 1 - k for k in reversed(back)), *(n + 1 + k for k in folds)),
                   (begin, end))
 
 
@@ -363,8 +363,8 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
-    points, turns, end = _run(start, low, high, period, limits)
-    return Branch(along, (_point(start), *points), tuple(1 + k for k in turns),
+    points, folds, end = _run(start, low, high, period, limits)
+    return Branch(along, (_point(start), *points), tuple(1 + k for k in folds),
                   (BranchEnd('start', value, period), end))
 
 
@@ -394,7 +394,7 @@ def _run(start: CurvePoint, low: float, high: float, period: float, limits: Step
             return 'period'
         return 'symmetry' if extra_symmetry(orbit) else ''
 
-    turns, why = arclength.continue_curve(start, low, high, visit, **steps)
+    folds, why = arclength.continue_curve(start, low, high, visit, **steps)
     last = points[-1] if points else _point(start)
     value, period = last.value, last.orbit.period
     if why in ('period', 'steep', 'lost'):
@@ -407,7 +407,7 @@ def _run(start: CurvePoint, low: float, high: float, period: float, limits: Step
         fraction = size / (before.curve_point.amplitude**2 - size)
         value += fraction * (value - before.value)
         period += fraction * (period - before.orbit.period)
-    return points, turns, BranchEnd(why, value, period)
+    return points, folds, BranchEnd(why, value, period)
 
 
 def _check(network: Network, symmetry: Symmetry, along: ParameterLine, low: float,
@@ -492,7 +492,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]) -> Iterator[tupl
     for k, (left, right) in enumerate(pairwise(spectra)):
         for part, (old, new) in enumerate(zip(left, right, strict=True)):
             before, after = (int((np.abs(spectrum) > 1.0).sum()) for spectrum in (old, new))
-            folds = {k, k + 1} & set(branch.turns)
+            folds = {k, k + 1} & set(branch.fold_indices)
             for rank in range(min(before, after), max(before, after)):
                 pair = old[rank], new[rank]
                 # At a fold one multiplier of the class is 1, to rounding.

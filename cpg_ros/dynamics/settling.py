@@ -264,5 +264,5 @@ def _fits(path: Path, symmetry: Symmetry) -> bool:
     """Return whether a cycle has the symmetry of a gait, and no more."""
     count = 24 * symmetry.order
     x = path(np.arange(count) / count)[:, :symmetry.group.cells]
-    gap = np.abs(x[:, symmetry.turn] - np.roll(x, -24, axis=0)).max()
+    gap = np.abs(x[:, symmetry.permutation] - np.roll(x, -24, axis=0)).max()
     return bool(gap < KEPT * np.ptp(x)) and not signal_symmetry(symmetry, x, ADDED)

@@ -35,7 +35,7 @@ def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 @jit
 def between_phases(phase, points):
-    """Return the points of a cycle on either side of a place, and the share of the second.
+    """Return the points of a cycle on either side of a place, and the fraction of the second.
 
     Args:
         phase: in points, from 0 on.
@@ -48,7 +48,7 @@ def between_phases(phase, points):
 
 @jit
 def between_speeds(speeds, speed):
-    """Return the rows of a table on either side of a speed, and the share of the second.
+    """Return the rows of a table on either side of a speed, and the fraction of the second.
 
     Beyond the table, the nearest end counts.
 
@@ -104,7 +104,7 @@ class EfferenceCopy:
 
 @jit
 def expect(speeds, table, phase, speed, fraction, out):
-    """Add a share of the expected signals to out, shape (SIGNALS,); see EfferenceCopy."""
+    """Add a fraction of the expected signals to out, shape (SIGNALS,); see EfferenceCopy."""
     low, high, up = between_speeds(speeds, speed)
     # A bin's mean stands for its middle.
     one, two, on = between_phases((phase * BINS - 0.5) % BINS, BINS)

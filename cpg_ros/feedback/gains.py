@@ -16,9 +16,9 @@
 
 Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983):
 as gravity is the same, lengths go with the length l of the legs, and times with sqrt(l/g). Forces
-are shares of the weight in all laws of a quadruped, so mass does not matter there; a biped's gains
-are proportional to it. The unit of a gain determines how it scales. The usual gains were found on
-a Unitree Go2.
+are fractions of the weight in all laws of a quadruped, so mass does not matter there; a biped's
+gains are proportional to it. The unit of a gain determines how it scales. The usual gains were
+found on a Unitree Go2.
 """
 
 from collections.abc import Sequence

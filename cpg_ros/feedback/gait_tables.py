@@ -29,7 +29,7 @@ import numpy as np
 
 #: POINTS: number of phases of a stride in the tables.
 POINTS = 512
-#: TOGETHER: legs of a pair swing together if one alone swings for less than this share of a
+#: TOGETHER: legs of a pair swing together if one alone swings for less than this fraction of a
 #: stride.
 TOGETHER = 0.2
 
@@ -41,7 +41,8 @@ class Timetable:
         angles: from the stand at full strides, rad, shape (POINTS, joints).
         in_place: the same at strides of length 0.
         swinging: whether each leg is meant to, shape (POINTS, legs).
-        progress: share of that swing, or else of its stance, that is over, shape (POINTS, legs).
+        progress: fraction of that swing, or else of its stance, that is over, shape (POINTS,
+            legs).
         hops: whether the left and right leg of each pair swing together.
 
     """
@@ -93,10 +94,10 @@ class GaitTables(NamedTuple):
 
     Attributes:
         swinging: whether each leg is meant to, shape (SLOTS, POINTS, legs).
-        progress: share of that swing, or else of its stance, that is over, the same.
-        duty: share of the stride that each leg stands, shape (SLOTS, legs).
+        progress: fraction of that swing, or else of its stance, that is over, the same.
+        duty: fraction of the stride that each leg stands, shape (SLOTS, legs).
         one_by_one: 1 where, for most of the stride, at most one leg swings, else 0, the same.
-        turns: 1 where left and right legs take turns, 0 where they hop, shape (SLOTS,).
+        alternates: 1 where left and right legs alternate, 0 where they hop, shape (SLOTS,).
         speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
         expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
         steered: whether strides can be changed, shape (SLOTS,).
@@ -113,7 +114,7 @@ class GaitTables(NamedTuple):
     progress: np.ndarray
     duty: np.ndarray
     one_by_one: np.ndarray
-    turns: np.ndarray
+    alternates: np.ndarray
     speeds: np.ndarray
     expected: np.ndarray
     steered: np.ndarray
@@ -144,7 +145,7 @@ class GaitTables(NamedTuple):
         self.swinging[slot], self.progress[slot] = timetable.swinging, timetable.progress
         self.duty[slot] = 1.0 - timetable.swinging.mean(axis=0)
         self.one_by_one[slot] = (timetable.swinging.sum(axis=1) <= 1).mean() > 0.5
-        self.turns[slot] = not timetable.hops
+        self.alternates[slot] = not timetable.hops
         self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
         self.expected[slot] = _filled(expected.table, SPEEDS, 'an efference copy')
         self.copied[slot] = plan.motion.efference is not None

@@ -34,8 +34,8 @@ DELAYED = 0.1
 #: simulation. LATE: in the gaits of a quadruped, which falls with an IMU that is 28 ms late, also
 #: for moments; LATE_BALANCE: in a balanced walk, low-passed.
 LATE, LATE_BALANCE = 0.022, 0.012
-#: AGE_MEMORY: time constant of the low-pass of the age, s; IN_TIME: share of the largest age below
-#: which a late input counts as good again.
+#: AGE_MEMORY: time constant of the low-pass of the age, s; IN_TIME: fraction of the largest age
+#: below which a late input counts as good again.
 AGE_MEMORY, IN_TIME = 0.1, 0.9
 #: FADE: duration of the transition from full feedback to none and back, s; GOOD: time for which
 #: all inputs have to be good before feedback returns, s.
@@ -216,9 +216,9 @@ UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
 #: FORGET: time constant of the integral, s; GAP: longest time between messages, s, over which they
 #: are compared; LEAP: difference in one message, rad, from which on the base was put elsewhere.
 APART, FORGET, GAP, LEAP = 0.15, 0.2, 0.05, 0.3
-#: DIFFERS: mean square of that difference, as a share of the motion's, above which orientation and
-#: angular velocity contradict each other; AGREE: share below which they agree again; COMPARED:
-#: time constant of the mean, s; MOVES: RMS motion, rad, above which they are compared.
+#: DIFFERS: mean square of that difference, as a fraction of the motion's, above which orientation
+#: and angular velocity contradict each other; AGREE: fraction below which they agree again;
+#: COMPARED: time constant of the mean, s; MOVES: RMS motion, rad, above which they are compared.
 DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
 #: Distance of the mean acceleration from gravity, m/s^2. STANDING_OFF, WALKING_OFF: largest one
 #: while the robot stands and walks; RIGHT: below it, the acceleration is right again.
@@ -423,7 +423,7 @@ def judge_loads(loads, places, weight, dt, memory, forces):
 
 @jit_entry
 def agreement(loads, least, swinging, fraction, before):
-    """Return the low-passed share of legs, 0 to 1, whose contacts agree with the gait.
+    """Return the low-passed fraction of legs, 0 to 1, whose contacts agree with the gait.
 
     Args:
         loads: of the feet, N, shape (legs,).

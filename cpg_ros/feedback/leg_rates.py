@@ -40,7 +40,7 @@ MEAN, LEAST = 1.0, 0.15
 #: SLIPS: least mismatch of all mounts, rad/s, at which a sample counts half: the feet slip.
 SLIPS = 0.2
 #: The mount is wrong if it leaves more than MOVES, (rad/s)^2, unexplained, and if another mount
-#: leaves less than the share BETTER of that.
+#: leaves less than the fraction BETTER of that.
 BETTER, MOVES = 0.5, 0.0025
 
 

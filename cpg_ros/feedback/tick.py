@@ -55,7 +55,7 @@ class PlannedMotion(NamedTuple):
         angles: of the joints, rad, shape (runs, joints).
         phase: of the first leg, cycles, shape (runs,).
         gaits: slots of the gait that is left and of that which is entered, shape (runs, 2).
-        mix: share of the one that is entered, shape (runs,).
+        mix: fraction of the one that is entered, shape (runs,).
         velocity: wanted forward and to the left, m/s, shape (runs, 2).
         heading: wanted, rad, shape (runs,).
         turn: wanted, rad/s, shape (runs,).
@@ -95,7 +95,7 @@ class Intent(NamedTuple):
     """Motion of all feet of a run that the laws want; pairs are forward and to the left.
 
     Attributes:
-        turns: 1 where left and right legs take turns, 0 where they hop.
+        alternates: 1 where left and right legs alternate, 0 where they hop.
         roll, pitch: deviation from the slope of the ground, rad.
         uphill: displacement of all feet, m, a pair.
         further: how much further to put feet down, m, a pair.
@@ -105,7 +105,7 @@ class Intent(NamedTuple):
 
     """
 
-    turns: float
+    alternates: float
     roll: float
     pitch: float
     uphill: tuple[float, float]
@@ -174,15 +174,15 @@ def _intend(tables, gains, memory, planned, run, off, step):
     phase, left = planned.phase[run], memory.wanted_velocity[run, 0, 1]
     # Feet that land together pitch and roll the body wherever they are put: of the laws
     # that move feet or change the frequency, only posture helps a hop.
-    turns = tables.turns[old] + mix * (tables.turns[new] - tables.turns[old])
+    alternates = tables.alternates[old] + mix * (tables.alternates[new] - tables.alternates[old])
     ground = memory.ground_angles[run]
     ground[0] = low_passed(ground[0], off.roll, gains.slope_filter, dt)
     ground[1] = low_passed(ground[1], off.pitch, gains.slope_filter, dt)
     uphill_x = uphill_y = 0.0
     if gains.slope:
         singly = tables.one_by_one[old] + mix * (tables.one_by_one[new] - tables.one_by_one[old])
-        uphill_x = turns * slope.shift_ahead(ground[1], singly, gains)
-        uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
+        uphill_x = alternates * slope.shift_ahead(ground[1], singly, gains)
+        uphill_y = -alternates * slope.shift(ground[0], gains.slope_share, gains)
     further = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
                placement.step(off.vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
     yielded = placement.yielding(
@@ -195,8 +195,9 @@ def _intend(tables, gains, memory, planned, run, off, step):
         fraction * dt)
     strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
     memory.last_phase[run] = phase
-    return slot, Intent(turns, off.roll - ground[0], off.pitch - ground[1], (uphill_x, uphill_y),
-                        further, yielded, left + memory.sidestep_correction[run], strode)
+    return slot, Intent(alternates, off.roll - ground[0], off.pitch - ground[1],
+                        (uphill_x, uphill_y), further, yielded,
+                        left + memory.sidestep_correction[run], strode)
 
 
 @jit
@@ -216,13 +217,13 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
 
     """
     run, leg, slot, row, now = at
-    turns, swinging, contact = (intent.turns, tables.swinging[slot, row, leg],
-                                memory.contact[run, leg])
+    alternates, swinging, contact = (intent.alternates, tables.swinging[slot, row, leg],
+                                     memory.contact[run, leg])
     (x, y), z = intent.uphill, 0.0
     if gains.posture:
         if swinging:
             # A hop lands on legs that a falling nose would draw in.
-            z = turns * posture.in_swing(foot[0], foot[1], intent.roll, intent.pitch, gains)
+            z = alternates * posture.in_swing(foot[0], foot[1], intent.roll, intent.pitch, gains)
         else:
             # About the middle of the feet that stand: the body is tilted, not raised.
             z = posture.in_stance(foot[0] - middle[0], foot[1] - middle[1], off.roll, off.pitch,
@@ -230,7 +231,7 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
     if gains.placement:
         placed = memory.placement_displacement[run, leg]
         placement.advance(placed, swinging, intent.further, intent.yielded, gains, dt)
-        x, y = x + turns * placed[0], y + turns * placed[1]
+        x, y = x + alternates * placed[0], y + alternates * placed[1]
     if gains.sidestep:
         carried = memory.sidestep_displacement[run]
         carried[leg] = sidestep.advance(
@@ -238,13 +239,13 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
             tables.duty[slot, leg] * dt / max(intent.strode, 0.1 * dt), gains, dt)
         y += carried[leg]
     if gains.reflexes:
-        z += turns * reflexes.advance(
+        z += alternates * reflexes.advance(
             memory.reflex_state[run, leg], contact, tables.swinging[slot, now, leg],
             tables.progress[slot, now, leg], foot[2],
             intent.roll * foot[1] - intent.pitch * foot[0], gains, dt)
     if gains.clearance and swinging:
-        z += turns * clearance.lift(memory.clearance_share[run], tables.progress[slot, row, leg],
-                                    gains)
+        z += alternates * clearance.lift(
+            memory.clearance_share[run], tables.progress[slot, row, leg], gains)
     return x, y, z
 
 
@@ -357,7 +358,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
                                            slot, off, intent, step, out[run])
         memory.clearance_share[run] = clearance.update(
             memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
-        error = intent.turns * pace.velocity_error(off.vx, off.vy, gains)
+        error = intent.alternates * pace.velocity_error(off.vx, off.vy, gains)
         _stiffen(gains, memory, run, error, step)
         _change_frequency(gains, memory, run, tables.steered[slot], error, phase_rate,
                           intent.strode, step)

@@ -191,7 +191,7 @@ class OwnFeedback(ShortRepr):
         enabled: whether the feedback is on where nothing else is said.
         made: how this was found, '' if it is not said.
         laws: whether laws are on, by name.
-        gains: by name, dimensionless: lengths as shares of the legs' length l, times of
+        gains: by name, dimensionless: lengths as fractions of the legs' length l, times of
             sqrt(l/g).
         imu_mount: roll, pitch and yaw of the IMU's frame in the base's, rad; empty for the same.
 

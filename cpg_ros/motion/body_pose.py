@@ -37,12 +37,12 @@ REACHED = 1e-5
 #: WAYPOINTS: number of poses on the way along which angles are followed; STEPS: of the search for
 #: each.
 WAYPOINTS, STEPS = 10, 20
-#: SEATED: least height of the base over its feet when it sits, as a share of the stand's.
+#: SEATED: least height of the base over its feet when it sits, as a fraction of the stand's.
 SEATED = 0.3
-#: QUICK: largest speed of a joint as the body moves, as a share of its limit.
+#: QUICK: largest speed of a joint as the body moves, as a fraction of its limit.
 QUICK = 0.5
-#: FASTEST: largest speed of an approach, as a share of its way per time constant; CONSTANT: that
-#: time constant, s (``c/steering.c``).
+#: FASTEST: largest speed of an approach, as a fraction of its way per time constant; CONSTANT:
+#: that time constant, s (``c/steering.c``).
 FASTEST, CONSTANT = 1.0 / math.e, 0.2
 
 

@@ -30,7 +30,7 @@ import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
-#: END: share of the reach of a leg's last link beyond which its points belong to the foot.
+#: END: fraction of the reach of a leg's last link beyond which its points belong to the foot.
 END = 0.97
 #: SLOW, FASTEST: speed limits, rad/s, below and above which a model's limit is doubted; SERVOS:
 #: text for that message.
@@ -275,13 +275,13 @@ class LegChain(ShortRepr):
             turns vectors of the last link as they are at 0, shape (3, 3).
 
         """
-        turn, axes, points = np.eye(3), np.empty_like(self.axes), [self.anchors[0]]
+        frame, axes, points = np.eye(3), np.empty_like(self.axes), [self.anchors[0]]
         links = np.diff([*self.anchors, self.foot], axis=0)
         for k, angle in enumerate(angles):
-            axes[k] = turn @ self.axes[k]
-            turn = turn @ rotation_about(self.axes[k], float(angle))
-            points.append(points[-1] + turn @ links[k])
-        return axes, np.array(points), turn
+            axes[k] = frame @ self.axes[k]
+            frame = frame @ rotation_about(self.axes[k], float(angle))
+            points.append(points[-1] + frame @ links[k])
+        return axes, np.array(points), frame
 
     def holding(self, angles: Mapping[str, float]) -> 'LegChain':
         """Return the leg of its other joints where some are held at angles, rad."""

@@ -211,8 +211,8 @@ def _transform(kind: str, numbers: np.ndarray) -> np.ndarray:
         made[:3, :3] = np.diag(numbers)
     else:
         x, y, z = numbers[:3] / np.linalg.norm(numbers[:3])
-        turn, angle = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), np.radians(numbers[3])
-        made[:3, :3] += np.sin(angle) * turn + (1.0 - np.cos(angle)) * turn @ turn
+        cross, angle = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), np.radians(numbers[3])
+        made[:3, :3] += np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
     return made
 
 

@@ -33,7 +33,8 @@ import numpy as np
 
 #: POINTS: points of a cycle in the tables of an orbit; a cell may jump within 0.01 cycles.
 POINTS = 4096
-#: LEAST_SHARE: least share of the first harmonic in a waveform's variance for a phase to be read.
+#: LEAST_SHARE: least fraction of the first harmonic in a waveform's variance for a phase to be
+#: read.
 LEAST_SHARE = 0.1
 
 
@@ -219,7 +220,7 @@ def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cell
 
 def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
              ) -> tuple[np.ndarray, np.ndarray]:
-    """Return when each leg begins to stand by itself, and for which share of the stride.
+    """Return when each leg begins to stand by itself, and for which fraction of the stride.
 
     A leg stands while the signal of its cell falls. Phases are those of the cell, cycles; two
     arrays of shape (legs,).

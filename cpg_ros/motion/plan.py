@@ -79,7 +79,7 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
     return None
 
 
-#: AT_REST: share of a cell's range below which its change in a stride counts as rest.
+#: AT_REST: fraction of a cell's range below which its change in a stride counts as rest.
 AT_REST = 0.05
 #: SLOWEST: least stride frequency, Hz; slower strides would look like a stand.
 SLOWEST = 0.01
@@ -98,7 +98,7 @@ class OutOfLimits(PlanError):
 
     Attributes:
         message: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
-        excess: how far beyond, in rad, or as a share of the limit of speed.
+        excess: how far beyond, in rad, or as a fraction of the limit of speed.
         key: which limit it is, as robot files call it: lower, upper or velocity.
 
     """
@@ -126,7 +126,7 @@ class GaitPlan(ShortRepr):
         in_place: the same for legs that take strides of length 0.
         span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
         speed: largest speed of each joint, rad/s, shape (joints,).
-        duty: share of the stride that each leg stands, shape (legs,).
+        duty: fraction of the stride that each leg stands, shape (legs,).
         step: model time per step; the network's own if None.
 
     """
@@ -294,7 +294,7 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         frequency: strides per second (Hz); 0 takes one model time unit as a second.
         amplitude: factor on every joint's readout weights.
         gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.
-        duty: share of the stride that legs stand; 0 for the gait's own, from the robot file or
+        duty: fraction of the stride that legs stand; 0 for the gait's own, from the robot file or
             else from the network.
 
     Raises:

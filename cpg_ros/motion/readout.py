@@ -53,7 +53,7 @@ def at_even_phases(wave: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarra
 
 
 def stance(values: np.ndarray, crest: float) -> float:
-    """Return the share of a cycle that a signal falls from its crest to its trough.
+    """Return the fraction of a cycle that a signal falls from its crest to its trough.
 
     Args:
         values: on even points of a cycle, shape (m,).
@@ -83,11 +83,11 @@ class Duty:
             orbit: the gait.
             leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
             begin: phase of that cell at which each leg begins to stand, cycles, shape (legs,).
-            own: shares that legs stand by themselves, shape (legs,).
-            fractions: wanted shares, shape (legs,).
+            own: fractions that legs stand by themselves, shape (legs,).
+            fractions: wanted, shape (legs,).
 
         Raises:
-            InputError: a share is not from LEAST to MOST, or not one of a cycle.
+            InputError: a fraction is not from LEAST to MOST, or not one of a cycle.
 
         """
         for fraction in fractions[fractions != own]:

@@ -109,10 +109,10 @@ class Motion(ShortRepr):
         frequency: strides per second that it was made for, Hz; None if it does not matter.
         joints: by name.
         steering: None if it has not been measured.
-        duty: share of the stride that legs are to stand, None for what they do by themselves.
+        duty: fraction of the stride that legs are to stand, None for what they do by themselves.
         verdict: of a trial in simulation, which begins with good or poor; '' if there was none.
         stance: phase of a leg's cell at which it begins to stand by the weights there are, and
-            for which share of the stride, cycles; None if it stands while its cell falls.
+            for which fraction of the stride, cycles; None if it stands while its cell falls.
         efference: what the base does by itself, None if it has not been measured.
 
     """

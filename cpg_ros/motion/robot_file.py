@@ -144,7 +144,7 @@ class _Reader(YamlReader):
     def stance(self, value: Any, where: str) -> tuple[float, ...]:
         stance = self.numbers(value, where)
         if len(stance) != 2 or not (-1.0 <= stance[0] <= 1.0 and 0.05 <= stance[1] <= 0.95):
-            raise self.fail(where, 'takes a phase from -1 to 1 and a share of the stride from '
+            raise self.fail(where, 'takes a phase from -1 to 1 and a fraction of the stride from '
                             '0.05 to 0.95')
         return stance
 

@@ -196,7 +196,7 @@ def _of_cell(symmetry: Callable[[Any, str], Symmetry]) -> Callable[[Any, str], S
     """Give symmetries as many variables as the network's cells have: its states tell."""
     @wraps(symmetry)
     def sized(network: Any, gait: str) -> Symmetry:
-        return symmetry(network, gait).sized(type(network).variables)
+        return symmetry(network, gait).with_variables(type(network).variables)
 
     return sized
 

@@ -82,12 +82,12 @@ def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Pre
                                       for name in kind.parameters())))}
 
 
-def chosen_network(args: Namespace) -> Network:
-    """Return the network that the options choose; errors as of chosen_preset."""
-    return chosen_preset(args)[1]
+def network_from(args: Namespace) -> Network:
+    """Return the network that the options choose; errors as of preset_from."""
+    return preset_from(args)[1]
 
 
-def chosen_preset(args: Namespace) -> tuple[Preset, Network]:
+def preset_from(args: Namespace) -> tuple[Preset, Network]:
     """Return the preset that the options choose, and the network with the values of --set.
 
     Raises:

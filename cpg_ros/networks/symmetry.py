@@ -176,17 +176,17 @@ class Symmetry(ShortRepr):
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
         symmetry = _generated(group, tuple(shifts.items()), variables, odd)
-        return symmetry.led(leads)
+        return symmetry.with_leads(leads)
 
-    def led(self, leads: tuple[float, ...]) -> 'Symmetry':
+    def with_leads(self, leads: tuple[float, ...]) -> 'Symmetry':
         """Return the same symmetry with other stated phases of the cells."""
         return self if leads == self.leads else replace(self, leads=leads)
 
-    def sized(self, variables: int) -> 'Symmetry':
+    def with_variables(self, variables: int) -> 'Symmetry':
         """Return the same symmetry of cells with as many variables."""
         if variables == self.variables:
             return self
-        return _generated(self.group, self.shifts, variables, self.odd).led(self.leads)
+        return _generated(self.group, self.shifts, variables, self.odd).with_leads(self.leads)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -204,8 +204,8 @@ class Symmetry(ShortRepr):
         return len(self.shifts) // len(self.k)
 
     @cached_property
-    def turn(self) -> np.ndarray:
-        """Return the cells, shape (cells,), with ``x_i(t + T/m) = x_{turn_i}(t)``."""
+    def permutation(self) -> np.ndarray:
+        """Return the cells, shape (cells,), with ``x_i(t + T/m) = x_{permutation_i}(t)``."""
         name = next(name for name, shift in self.shifts if shift == Fraction(1, self.order) % 1)
         return np.array(self.group.elements[name])
 
@@ -404,9 +404,9 @@ def homomorphisms(group: Group, names: Iterable[str], variables: int = 2, odd: b
 
     """
     orders = {name: group.order(name) for name in names}
-    for turns in product(*(range(order) for order in orders.values())):
-        shifts = {name: Fraction(turn, order)
-                  for (name, order), turn in zip(orders.items(), turns, strict=True)}
+    for steps in product(*(range(order) for order in orders.values())):
+        shifts = {name: Fraction(step, order)
+                  for (name, order), step in zip(orders.items(), steps, strict=True)}
         # If generators are not independent, some of their shifts contradict each other.
         with suppress(InputError):
             yield Symmetry.of(group, shifts, variables, odd)

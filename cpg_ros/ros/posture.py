@@ -148,12 +148,12 @@ class Posture:
 
     def _take(self, message: Pose) -> None:
         """Take a pose as champ has it: z from the stand's height, and an orientation."""
-        place, turn = message.position, message.orientation
-        numbers = np.array([turn.w, turn.x, turn.y, turn.z])
+        place, orientation = message.position, message.orientation
+        numbers = np.array([orientation.w, orientation.x, orientation.y, orientation.z])
         length, log = float(np.linalg.norm(numbers)), self._node.get_logger()
         if not (math.isfinite(length + place.z) and abs(length - 1.0) < 0.01):
-            log.warning(f'body_pose ignored: z {place.z} m, orientation {numbers[1:]} {turn.w} is '
-                        'not finite or has not the length 1', throttle_duration_sec=QUIET)
+            log.warning(f'body_pose ignored: z {place.z} m, orientation {numbers[1:]} {numbers[0]} '
+                        'is not finite or has not the length 1', throttle_duration_sec=QUIET)
             return
         if place.x or place.y:
             log.warning('body_pose asks for a way forward or to the left: x and y are ignored',

@@ -376,7 +376,7 @@ def test_basins_are_counted_and_printed(capsys):
     for one in basins.values():
         assert (one['states'], one['seed']) == (5, 2)
         assert one['returned'] + sum(one['others'].values()) == 5
-        assert one['interval'][0] <= one['share'] == one['returned'] / 5 <= one['interval'][1]
+        assert one['interval'][0] <= one['fraction'] == one['returned'] / 5 <= one['interval'][1]
     for words, why in ((('--basin', '0'), '--basin: 0 is not from 1'),
                        (('--seed', '1'), '--seed: it must be 0 or more, and goes with --basin')):
         assert main([*EXAMPLE_1, *words]) == 2

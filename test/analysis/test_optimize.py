@@ -73,7 +73,7 @@ def test_it_finds_the_walk(found):
     assert x[:, 2] == pytest.approx(x[:, 1], abs=1e-12)
 
 
-def test_the_chosen_set_is_the_best_of_a_front_that_nothing_dominates(found):
+def test_the_selected_set_is_the_best_of_a_front_that_nothing_dominates(found):
     assert found.scores[0].network == found.best.preset.network
     exact = np.array([one.objectives for one in found.tried if one.exact])
     for score in found.scores:
@@ -112,8 +112,8 @@ def test_the_front_is_a_table_with_units(found, written):
     with (written[0] / 'front.csv').open(newline='') as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(found.scores)
-    assert all(name.endswith(']') or name == 'chosen' for name in rows[0])
-    assert [row['chosen'] for row in rows] == ['1'] + ['0'] * (len(rows) - 1)
+    assert all(name.endswith(']') or name == 'selected' for name in rows[0])
+    assert [row['selected'] for row in rows] == ['1'] + ['0'] * (len(rows) - 1)
     assert float(rows[0]['w_a [1]']) == found.best.preset.network.w_21
     assert float(rows[0]['period [model time]']) == pytest.approx(found.best.orbit.period,
                                                                   abs=1e-5)

@@ -94,7 +94,7 @@ def check_in_order(branch):
     """Neighbours are near, folds are where the values turn, and cell 1 peaks at phase zero."""
     signs = np.sign(np.diff(branch.values))
     turning = 1 + np.flatnonzero(signs[1:] * signs[:-1] < 0.0)
-    assert list(turning) == list(branch.turns)
+    assert list(turning) == list(branch.fold_indices)
     assert np.abs(np.diff(branch.amplitudes)).max() < 0.5
     for point in branch.points:
         orbit = point.orbit

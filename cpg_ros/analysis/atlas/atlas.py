@@ -44,7 +44,7 @@ from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
 from cpg_ros.common.workers import add_options, KEPT, working
 from cpg_ros.fitting.inversion.results import library
 from cpg_ros.networks.network import known
-from cpg_ros.networks.network_options import add_network_options, chosen_network
+from cpg_ros.networks.network_options import add_network_options, network_from
 from cpg_ros.networks.registry import reference
 
 EPILOG = """\
@@ -80,7 +80,7 @@ def _parser() -> Parser:
 
 
 def _planned(args: argparse.Namespace) -> tuple[ParameterPlane, tuple[str, ...]]:
-    base = chosen_network(args)
+    base = network_from(args)
     for gait in args.gaits:
         known(gait, base.gaits())
     return (chart_of(reference(base.name), base, args.over, args.points),

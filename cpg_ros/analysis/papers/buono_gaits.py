@@ -283,10 +283,10 @@ def lattice() -> Iterator[ReproducedRow | Picture]:
 def four_cells() -> Iterator[ReproducedRow | Picture]:
     """Theorem 3.1: conjugation by the walk's four-cycle."""
     at = Citation(AUTHORS, 'Theorem 3.1')
-    turn = cycles('(1 3 2 4)', 4)
+    rotation = cycles('(1 3 2 4)', 4)
     for first, second in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
                           ('(1 2)(3 4)', '(1 2)(3 4)')):
-        image = compose(compose(turn, cycles(first, 4)), inverse(turn))
+        image = compose(compose(rotation, cycles(first, 4)), inverse(rotation))
         yield at.word(f'(1 3 2 4) {first} (1 3 2 4)^-1', second, _written(image))
 
 
@@ -446,14 +446,14 @@ def conditions() -> Iterator[ReproducedRow | Picture]:
         yield Citation(AUTHORS, 'appendix A').holds(
             f'{name}: dim Fix(K) = 2 only where K is the whole group',
             all(len(k) == len(group) for (k, _), two in zip(listed, full, strict=True) if two))
-    turn = (1, 2, 3, 0)
-    z4 = generated(turn)
+    quarter = (1, 2, 3, 0)
+    z4 = generated(quarter)
 
     def rotation(g: Permutation) -> np.ndarray:
         angle = 0.5 * np.pi * g[0]
         return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
-    half = generated(tuple(turn[i] for i in turn))
+    half = generated(tuple(quarter[i] for i in quarter))
     yield Citation(AUTHORS, 'eq. A.6').word(
         'conditions that H = Z2, K = 1 of Z4 acting on the plane by rotations does not meet',
         'A.6', ', '.join(Action(z4, rotation).failing(generated(tuple(range(4))), half)))

@@ -169,12 +169,12 @@ def _describing(network: Network, symmetry: Symmetry) -> Describing:
     # One row for each argument, in which all others are 0.
     rows = np.eye(len(kind.arguments))[..., None] * cosine
     first = [0 if argument.source is None else argument.source[0] for argument in kind.arguments]
-    turns = np.exp(2j * np.pi * (symmetry.phases[first] - symmetry.phases[0]))
+    phasors = np.exp(2j * np.pi * (symmetry.phases[first] - symmetry.phases[0]))
     late = np.array([argument.delayed for argument in kind.arguments])
     cosine = cosine * (2.0 / POINTS)
 
     def terms(amplitude: float) -> tuple[complex, complex]:
-        gains = kind.rates(list(amplitude * rows), p)[0] @ cosine / amplitude * turns
+        gains = kind.rates(list(amplitude * rows), p)[0] @ cosine / amplitude * phasors
         return complex(gains[~late].sum()), complex(gains[late].sum())
 
     return terms

@@ -80,11 +80,11 @@ class LoopProgram:
         if not part.args:
             return part
         if isinstance(part, sympy.Function):
-            heard = [self._arguments[symbol] for symbol in part.free_symbols
-                     if symbol in self._arguments]
-            sources = {one.source for one in heard}
-            if len(sources) == 1 and len(heard) == len(part.free_symbols):
-                # Worked out where the cell is that is heard.
+            inputs = [self._arguments[symbol] for symbol in part.free_symbols
+                      if symbol in self._arguments]
+            sources = {one.source for one in inputs}
+            if len(sources) == 1 and len(inputs) == len(part.free_symbols):
+                # Computed where the cell is whose state it reads.
                 source = sources.pop()
                 there = part.xreplace({symbol: self.own(one.variable)
                                        for symbol, one in self._arguments.items()})
@@ -115,12 +115,12 @@ class Writer:
         program = self._program
         behind: dict[Any, Any] = {}
         for symbol, what, source in program.fetched:
-            turn = -source[0] % len(source)
-            ring = tuple((cell - turn) % len(source) for cell in range(len(source)))
+            shift = -source[0] % len(source)
+            ring = tuple((cell - shift) % len(source) for cell in range(len(source)))
             if source == ring and what not in behind.values() and any(
                     what == name for name, _ in program.functions):
                 behind[symbol] = what
-                self.rings[str(symbol)] = turn
+                self.rings[str(symbol)] = shift
         self.arrays, self.extra = 0, 0
         for symbol, *_ in (*program.functions, *program.fetched):
             if symbol in behind.values():
@@ -128,10 +128,10 @@ class Writer:
             used = f'{self.arrays} * m + {self.extra} * lanes'
             self.lines.append(f'{symbol} = work[{used}:{used} + m]')
             if symbol in behind:
-                turn = self.rings[str(symbol)]
-                used += f' + {turn} * lanes'
+                shift = self.rings[str(symbol)]
+                used += f' + {shift} * lanes'
                 self.lines.append(f'{behind[symbol]} = work[{used}:{used} + m]')
-                self.extra += turn
+                self.extra += shift
             self.arrays += 1
 
     def _elements(self, part: Any) -> str:
@@ -164,12 +164,12 @@ class Writer:
         self.lines += ['for i in range(m):', f'    {target}[i] = {code}']
 
     def _copy(self, target: str, array: str, source: Source) -> None:
-        """Fetch what each cell hears, in blocks of cells that lie evenly in both arrays."""
+        """Fetch the inputs of each cell, in blocks of cells that lie evenly in both arrays."""
         if target in self.rings:
             # The ring lies straight in memory: only what it begins with has to be copied.
-            turn = self.rings[target]
-            self.lines += [f'to, of = {target}[:{turn} * lanes], {array}[m - {turn} * lanes:m]',
-                           f'for i in range({turn} * lanes):', '    to[i] = of[i]']
+            shift = self.rings[target]
+            self.lines += [f'to, of = {target}[:{shift} * lanes], {array}[m - {shift} * lanes:m]',
+                           f'for i in range({shift} * lanes):', '    to[i] = of[i]']
             return
         place = self.sources.setdefault(source, len(self.sources))
         self.lines.append(f'fetch(lanes, SOURCE_{place}, {array}, {target})')
@@ -249,7 +249,7 @@ class LoweredPart(NamedTuple):
 
 
 def lowered_parts(equations: Equations) -> list[LoweredPart]:
-    """Return ``drive``, where anything is heard a delay ago, and ``field``.
+    """Return ``drive``, where any input is delayed, and ``field``.
 
     The results of ``drive`` stand in those of ``field`` as d0, d1 ...
     """
@@ -415,11 +415,11 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
     """Return C of a function: a loop for the terms of other cells, and one for all results."""
     waiting, done = list(part.program.functions), set[Any]()
     lines: list[str] = []
-    heard = {symbol: what for symbol, what, _ in part.program.fetched}
+    inputs = {symbol: what for symbol, what, _ in part.program.fetched}
     needed = {symbol for symbol, _ in waiting}
     while waiting:
         ready = [one for one in waiting if not
-                 {heard.get(symbol, symbol) for symbol in one[1].free_symbols} & needed - done]
+                 {inputs.get(symbol, symbol) for symbol in one[1].free_symbols} & needed - done]
         lines += _loop([f'{symbol}[i] = {names.element(part, call)};' for symbol, call in ready])
         done |= {symbol for symbol, _ in ready}
         waiting = [one for one in waiting if one not in ready]

@@ -81,9 +81,9 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
         d = back.shape[-1]
         steps = np.eye(d) + summed(back, lengths[::-1], answers)
         whole = chained(steps)
-        # z(L) = z(0)[turn], and z along the flow 1/T.
+        # z(L) = z(0)[permutation], and z along the flow 1/T.
         start = orbit.solution.points[-1]
-        matrix = np.vstack([whole[-1, reduced.turn] - np.eye(d),
+        matrix = np.vstack([whole[-1, reduced.permutation] - np.eye(d),
                             orbit.period * reduced.rates(start)])
         end, _, _, sizes = np.linalg.lstsq(matrix, np.append(np.zeros(d), 1.0), rcond=None)
     except np.linalg.LinAlgError as error:
@@ -193,8 +193,8 @@ class Flow:
         self._jacobians = network.jacobian(orbit.stages[..., index])
         #: Lengths of the intervals, model time.
         self.lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
-        self._turn = (symmetry.turn
-                      + np.arange(network.variables)[:, None] * network.cells).ravel()
+        self._permutation = (symmetry.permutation
+                             + np.arange(network.variables)[:, None] * network.cells).ravel()
 
     def on(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the flow over each interval, and the permutation of cells after T/m.
@@ -203,12 +203,12 @@ class Flow:
             columns: orthonormal, of a subspace that the flow keeps, shape (components, d).
 
         Returns:
-            Matrices of the intervals, shape (n, d, d), and x -> x[turn], shape (d, d).
+            Matrices of the intervals, shape (n, d, d), and x -> x[permutation], shape (d, d).
 
         """
         jacobians, answers = self.solved(columns)
         steps = np.eye(columns.shape[1]) + summed(jacobians, self.lengths, answers)
-        return steps, columns.T @ columns[self._turn]
+        return steps, columns.T @ columns[self._permutation]
 
     def solved(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return Jacobians and flow at the nodes of each interval, shape (n, S, d, d) each."""
@@ -294,8 +294,9 @@ class Variational:
         self.slope: States = rates, None
         n, s, d = rates.shape
         self._shape = n, s, d
-        self._turn = (orbit.symmetry.turn
-                      + np.arange(orbit.network.variables)[:, None] * orbit.network.cells).ravel()
+        network = orbit.network
+        self._permutation = (orbit.symmetry.permutation
+                             + np.arange(network.variables)[:, None] * network.cells).ravel()
         matrices = np.eye(s * d) - np.einsum('i,pq,iqrc->iprqc', self._lengths, collocation.A,
                                              self._jacobians).reshape(n, s * d, s * d)
         self._inverse = np.linalg.inv(matrices)
@@ -347,7 +348,7 @@ class Variational:
         for k in range(n):
             rows[k][k] = scipy.sparse.csr_array(-self._steps[k])
             # With a single interval both are the same block.
-            ahead = ones if k < n - 1 else factor * ones[self._turn]
+            ahead = ones if k < n - 1 else factor * ones[self._permutation]
             before = rows[k][(k + 1) % n]
             rows[k][(k + 1) % n] = ahead if before is None else before + ahead
         return scipy.sparse.block_array(rows, format='csc', dtype=complex)

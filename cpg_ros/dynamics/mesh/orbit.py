@@ -55,7 +55,7 @@ class Reduced(Field):
 
     Attributes:
         symmetry: of the gait.
-        turn: ``y(T/m) = y(0)[turn]``.
+        permutation: ``y(T/m) = y(0)[permutation]``.
 
     """
 
@@ -64,8 +64,9 @@ class Reduced(Field):
         super().__init__(network, symmetry.classes)
         first = self.kept[:self.size]
         blocks = np.arange(network.variables)[:, None]
-        self.symmetry = symmetry.led(network.leads)
-        self.turn = (symmetry.classes[symmetry.turn[first]] + blocks * self.size).ravel()
+        self.symmetry = symmetry.with_leads(network.leads)
+        self.permutation = (symmetry.classes[symmetry.permutation[first]]
+                            + blocks * self.size).ravel()
 
 
 @dataclass(eq=False, repr=False)
@@ -110,7 +111,7 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
     """Return the matrix of boundary and phase conditions in (dy_0, dL)."""
     d = p.shape[-1]
     matrix = np.zeros((d + 1, d + 1))
-    matrix[:d, :d] = p[-1] - np.eye(d)[reduced.turn]
+    matrix[:d, :d] = p[-1] - np.eye(d)[reduced.permutation]
     matrix[:d, d] = r[-1, :, 0]
     matrix[d, :d] = reduced.linearised(now.points[0])[1][0]
     return matrix
@@ -131,7 +132,7 @@ def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bo
         try:
             p, r, by_start, by_source = linearised(reduced, now)
             right = np.empty(d + 1)
-            right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+            right[:d] = now.points[0, reduced.permutation] - now.points[-1] - r[-1, :, 1]
             right[d] = -reduced.rates(now.points[0])[0]
             solution = np.linalg.solve(bordered(reduced, now, p, r), right)
         except np.linalg.LinAlgError:
@@ -296,7 +297,7 @@ class MeshOrbit(Orbit):
         """Derivatives of the coefficients by the parameters at fixed theta.
 
         A family of weights that the symmetry carries into one another acts as one: each has an
-        equal share of what moving all of them does. Shape (S + 1, n, d, parameters).
+        equal part of what moving all of them does. Shape (S + 1, n, d, parameters).
         """
         return self._derivatives[0]
 
@@ -328,7 +329,7 @@ def columns_of(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
     columns, cell = [], int(symmetry.first[wave])
     for _ in range(symmetry.order):
         columns.append(int(symmetry.classes[cell] + variable * (symmetry.classes.max() + 1)))
-        cell = int(symmetry.turn[cell])
+        cell = int(symmetry.permutation[cell])
     return columns
 
 

@@ -207,7 +207,7 @@ class MeshCurve(ShortRepr):
         row = weighted[:now.points.size].reshape(now.points.shape)
         matrix[d + 1, :d] = np.einsum('ki,kij->j', row, p)
         matrix[d + 1, d:] = np.einsum('ki,kij->j', row, r)[[0, 2]] + weighted[-2:]
-        right[:d, 0] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+        right[:d, 0] = now.points[0, reduced.permutation] - now.points[-1] - r[-1, :, 1]
         right[d, 0] = -reduced.rates(now.points[0])[0]
         right[d + 1] = -(row * r[..., 1]).sum(), 1.0
         answers = []
@@ -255,13 +255,13 @@ class MeshCurve(ShortRepr):
         return float(index + near[path(near)[:, columns[index]].argmax()])
 
     def _turned(self, reduced: Reduced, path: Callable, start: float) -> Callable:
-        """Return the path from another start, where y(s + 1) = y(s)[turn]."""
+        """Return the path from another start, where y(s + 1) = y(s)[permutation]."""
         def later(positions: np.ndarray) -> np.ndarray:
             positions = positions + start
             periods = np.floor(positions).astype(int)
             out = path(positions - periods)
             for k in range(1, periods.max(initial=0) + 1):
-                out[periods >= k] = out[periods >= k][:, reduced.turn]
+                out[periods >= k] = out[periods >= k][:, reduced.permutation]
             return out
         return later
 

@@ -127,7 +127,7 @@ class Substitutes:
             self._take_joints(latencies[JOINTS], memory, dt)
         time = max(ages[IMU], latencies[IMU])
         if late[IMU] or time > PROMPT:
-            self._turn(measured, min(time, EXTRAPOLATED))
+            self._rotate(measured, min(time, EXTRAPOLATED))
         begins = EXTRAPOLATED if late[JOINTS] else LEANT
         if ages[IMU] > begins:
             # In a stand, one that arrives but is not believed may be that of a robot on its edges.
@@ -182,7 +182,7 @@ class Substitutes:
         self._angles += dt * np.clip(rates, -FASTEST, FASTEST)
         self.sensors.joint_positions[0] = self._angles
 
-    def _turn(self, measured: SensorData, time: float) -> None:
+    def _rotate(self, measured: SensorData, time: float) -> None:
         """Extrapolate the orientation by the angular velocity for a time in s."""
         roll, pitch, _ = measured.rpy[0]
         x, y, z = measured.angular_velocity[0]

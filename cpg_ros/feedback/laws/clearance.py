@@ -28,18 +28,18 @@ LAW = Law(
                                'time for which a foot has to stumble until all are lifted so far'),
         'clearance_memory': Gain(10.0, 100.0, 's', 'time constant with which the lift fades')},
     memory={
-        'clearance_share': StateVariable('share of the largest lift')})
+        'clearance_share': StateVariable('fraction of the largest lift')})
 
 
 @jit
 def stumbles(contact, swinging, progress):
-    """Return whether a foot in swing, a share of which is over, has hit something."""
+    """Return whether a foot in swing, a fraction of which is over, has hit something."""
     return contact and swinging and STUMBLE < progress < EARLY
 
 
 @jit
 def update(before, stumbling, gains, dt):
-    """Return the share of the largest lift, dt in s later.
+    """Return the fraction of the largest lift, dt in s later.
 
     Args:
         before: the same, dt earlier.
@@ -57,5 +57,5 @@ def update(before, stumbling, gains, dt):
 
 @jit
 def lift(fraction, progress, gains):
-    """Return how far to draw in a foot, a share of whose swing is over, m."""
+    """Return how far to draw in a foot, a fraction of whose swing is over, m."""
     return fraction * gains.clearance_most * 4.0 * progress * (1.0 - progress)

@@ -31,7 +31,7 @@ LAW = Law(
         'pace_from': Gain(0.12, 1.2, 'm/s',
                           'velocity error above which strides become faster'),
         'pace_forward': Gain(0.7, 1.0, '',
-                             'share of the forward velocity error beside the sideways one'),
+                             'fraction of the forward velocity error beside the sideways one'),
         'pace_gain': Gain(4.0, 40.0, 's/m',
                           'relative increase of the stride frequency per m/s above pace_from'),
         'pace_most': Gain(2.4, 8.0, '', 'largest relative increase of the stride frequency'),

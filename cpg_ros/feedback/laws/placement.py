@@ -40,9 +40,9 @@ LAW = Law(
         'step_decay': Gain(3.1, 31.0, '1/s',
                            "rate at which placement's displacement decays in stance"),
         'give': Gain(0.0, 1.0, '',
-                     'share of the forward velocity error to which feet in stance yield'),
+                     'fraction of the forward velocity error to which feet in stance yield'),
         'give_left': Gain(0.8, 8.0, '',
-                          'share of the sideways velocity error to which feet in stance yield'),
+                          'fraction of the sideways velocity error to which feet in stance yield'),
         # A trot, whose feet in stance all yield at once, would sway for seconds.
         'give_recovering': Gain(1.35, 5.0, '',
                                 'factor of give_left while the body recovers from a push, as '

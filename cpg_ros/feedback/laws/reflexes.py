@@ -35,10 +35,10 @@ LAW = Law(
     memory={
         'reflex_state': StateVariable('of each leg, see LIFT to LANDED', ('legs', 5))})
 
-#: A contact between the shares STUMBLE and EARLY of the swing is a stumble, from EARLY on an early
-#: landing; before STUMBLE the foot may not have left the ground yet.
+#: A contact between the fractions STUMBLE and EARLY of the swing is a stumble, from EARLY on an
+#: early landing; before STUMBLE the foot may not have left the ground yet.
 STUMBLE, EARLY = 0.2, 0.65
-#: MISSED: share of the stance from which on a foot without contact reaches for the ground.
+#: MISSED: fraction of the stance from which on a foot without contact reaches for the ground.
 MISSED = 0.1
 #: LEANS: lift of a foot by an unexpected lean, m, above which it does not reach: the lean, not a
 #: hole, explains why it has no contact.
@@ -58,7 +58,7 @@ def advance(state, contact, swinging, progress, height, lifted, gains, dt):
         state: of its reflexes, shape (5,), changed in place.
         contact: whether the foot is on the ground.
         swinging: whether it is meant to be in the air.
-        progress: share of that swing, or else of its stance, that is over.
+        progress: fraction of that swing, or else of its stance, that is over.
         height: of the foot that is planned, base's frame, m.
         lifted: by an unexpected lean, m.
         gains: of the law.

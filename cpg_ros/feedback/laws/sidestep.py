@@ -26,13 +26,13 @@ LAW = Law(
     'sidestep', 'follow the sideways speed of cmd_vel', True,
     gains={
         'sidestep_share': Gain(1.1, 11.0, '',
-                               'share of the commanded sideways motion that feet carry out'),
+                               'fraction of the commanded sideways motion that feet carry out'),
         'sidestep_most': Gain(0.08, 0.8, 'm', 'the most that a foot is carried sideways'),
         'sidestep_rate': Gain(0.5, 5.0, '1/s',
                               'how fast the sideways speed that feet are asked for is '
                               'corrected by what is missing of it'),
         'sidestep_more': Gain(1.0, 10.0, '',
-                              'largest such correction, as a share of the commanded sideways '
+                              'largest such correction, as a fraction of the commanded sideways '
                               'speed'),
         'sidestep_turning': Gain(0.5, 5.0, 'm',
                                  'and, while a turn is commanded, this times its rad/s'),

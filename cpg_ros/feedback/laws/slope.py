@@ -23,7 +23,7 @@ LAW = Law(
     'slope', 'move the feet under the centre of mass on slopes', True,
     gains={
         'slope_share': Gain(0.7, 7.0, '',
-                            'share of the way to the vertical through the body by which feet '
+                            'fraction of the way to the vertical through the body by which feet '
                             'are moved'),
         'slope_share_up': Gain(0.35, 7.0, '',
                                'the same uphill in gaits whose legs swing two or more at a '

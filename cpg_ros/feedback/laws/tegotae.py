@@ -38,9 +38,9 @@ def rate(load, swinging, progress, gains):
     """Return the change of a leg's phase rate by its load, rad/s.
 
     Args:
-        load: on the foot, share of the weight.
+        load: on the foot, fraction of the weight.
         swinging: whether it is meant to be in the air.
-        progress: share of that swing, or else of its stance, that is over.
+        progress: fraction of that swing, or else of its stance, that is over.
         gains: of the law.
 
     """

@@ -26,14 +26,14 @@ LAW = Law(
     'touchdown', "begin a leg's stance when its foot lands", False,
     gains={
         'touchdown_gain': Gain(0.5, 5.0, '',
-                               "share of a landing's phase error that is corrected")},
+                               "fraction of a landing's phase error that is corrected")},
     memory={
         'phase_correction': StateVariable('still to be made after landings [cycles]')})
 
 #: SETTLING: time constant with which a change of the phase is made, s; MOST: largest relative
 #: change of the stride frequency.
 SETTLING, MOST = 0.05, 0.5
-#: EARLIEST: share of the swing before which a contact is an obstacle, not the ground.
+#: EARLIEST: fraction of the swing before which a contact is an obstacle, not the ground.
 EARLIEST = 0.5
 
 
@@ -43,8 +43,8 @@ def phase_change(swinging, progress, duty, gains):
 
     Args:
         swinging: whether it is meant to be in the air.
-        progress: share of that swing, or else of its stance, that is over.
-        duty: share of the stride that it stands.
+        progress: fraction of that swing, or else of its stance, that is over.
+        duty: fraction of the stride that it stands.
         gains: of the law.
 
     """

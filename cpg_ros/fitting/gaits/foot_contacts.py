@@ -14,8 +14,9 @@
 
 """Stance and swing from the loads on the feet; walk and run by the flight.
 
-A stride is from touchdown to touchdown; duty is the share of it in stance. In a walk a foot is on
-the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
+A stride is from touchdown to touchdown; duty is the fraction of it in stance. In a walk a foot is
+on the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal
+Locomotion).
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -26,22 +27,23 @@ from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError
 from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike, true_runs
 import numpy as np
 
-#: LOADED: a foot is on the ground above this share of the span from its least to its largest load.
-#: ALWAYS: a foot is never lifted if its least load exceeds this share of its largest.
+#: LOADED: a foot is on the ground above this fraction of the span from its least to its largest
+#: load. ALWAYS: a foot is never lifted if its least load exceeds this fraction of its largest.
 LOADED, ALWAYS = 0.15, 0.5
 #: LEAST, LARGEST: percentiles of a foot's loads that count as its least and largest.
 LEAST, LARGEST = 5.0, 95.0
-#: BOUNCE: share of a stride below which a contact or a lift is a bounce and is ignored.
+#: BOUNCE: fraction of a stride below which a contact or a lift is a bounce and is ignored.
 BOUNCE = 0.08
 #: STRIDES: fewest strides from which the phase of touchdown is read.
-#: DISAGREE: largest mean share of strides that contradict the majority about stance or swing.
+#: DISAGREE: largest mean fraction of strides that contradict the majority about stance or swing.
 #: POINTS: number of phases of the cycle at which stance is averaged over the strides.
 #: NEAR: width, in cycles, of the window that averages samples of similar phase.
 STRIDES, DISAGREE, POINTS, NEAR = 3.0, 0.15, 200, 0.02
 #: FEWEST: smallest number of samples of a stride that tells stance from swing.
 FEWEST = 12
-#: WALK: share of the time in flight up to which a gait is a walk; RUN: share from which it is a
-#: run. WALK is above 0, as a foot that is about to be lifted bears little and may count as lifted.
+#: WALK: fraction of the time in flight up to which a gait is a walk; RUN: fraction from which it
+#: is a run. WALK is above 0, as a foot that is about to be lifted bears little and may count as
+#: lifted.
 WALK, RUN = 0.1, 0.15
 
 
@@ -69,12 +71,12 @@ class FootContacts(ShortRepr):
 
     @property
     def duty(self) -> dict[str, float]:
-        """Share of the time in stance, for each leg."""
+        """Fraction of the time in stance, for each leg."""
         return dict(zip(self.legs, self.down.mean(axis=0).tolist(), strict=True))
 
     @property
     def flight(self) -> float:
-        """Share of the time without a foot on the ground."""
+        """Fraction of the time without a foot on the ground."""
         return float(1.0 - self.down.any(axis=1).mean())
 
     @property
@@ -126,13 +128,13 @@ class FootContacts(ShortRepr):
 
 
 #: FALLS: downward acceleration over GRAVITY (m/s^2) from which on a body falls freely.
-#: NEVER, OFTEN: shares of a stride of free fall up to which it walks, and from which on it runs.
-#: HARMONICS: number of harmonics of the body's height.
+#: NEVER, OFTEN: fractions of a stride of free fall up to which it walks, and from which on it
+#: runs. HARMONICS: number of harmonics of the body's height.
 FALLS, GRAVITY, NEVER, OFTEN, HARMONICS = 0.7, 9.81, 0.02, 0.1, 6
 
 
 def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
-    """Return the share of a stride in which a body falls freely: no foot is on the ground then.
+    """Return the fraction of a stride in which a body falls freely: no foot is on the ground then.
 
     Args:
         phases: of the stride, cycles, shape (n,).
@@ -140,11 +142,12 @@ def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> f
         frequency: of the stride, Hz.
 
     """
-    turn = 2j * np.pi * np.arange(1, HARMONICS + 1)
-    waves = np.exp(np.multiply.outer(phases, turn))
+    exponents = 2j * np.pi * np.arange(1, HARMONICS + 1)
+    waves = np.exp(np.multiply.outer(phases, exponents))
     basis = np.column_stack([np.ones_like(phases), phases - phases.mean(), waves.real, waves.imag])
     weights = np.linalg.lstsq(basis, height, rcond=None)[0][2:].reshape(2, -1)
-    grid = np.exp(np.multiply.outer(np.arange(POINTS) / POINTS, turn)) * (turn * frequency)**2
+    grid = (np.exp(np.multiply.outer(np.arange(POINTS) / POINTS, exponents))
+            * (exponents * frequency)**2)
     downward = -(grid.real @ weights[0] + grid.imag @ weights[1])
     return float(np.mean(downward > FALLS * GRAVITY))
 
@@ -152,7 +155,7 @@ def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> f
 def _touchdown(stands: np.ndarray) -> float | None:
     """Return where the longest stance begins, cycles, or None if the strides disagree too much.
 
-    Stands is the share of strides in which the leg stands at each phase, shape (POINTS,).
+    Stands is the fraction of strides in which the leg stands at each phase, shape (POINTS,).
     """
     most = stands > 0.5
     if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
@@ -161,7 +164,7 @@ def _touchdown(stands: np.ndarray) -> float | None:
     ends = np.flatnonzero(~most & np.roll(most, 1))
     long = (ends[np.searchsorted(ends, begins) % len(ends)] - begins) % len(most)
     k = int(begins[np.argmax(long)])
-    # The touchdown is where the share crosses one half, by linear interpolation.
+    # The touchdown is where the fraction crosses one half, by linear interpolation.
     before, after = stands[k - 1], stands[k]
     return float((k - (after - 0.5) / (after - before)) / len(most))
 

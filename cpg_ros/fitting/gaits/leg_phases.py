@@ -36,7 +36,7 @@ from scipy.special import stdtrit
 
 # Scatter of the legs' phases: by how much each leg is early or late in every stride.
 
-#: ENOUGH: least slope of a stride, as a share of the median stride's, for its phase to be
+#: ENOUGH: least slope of a stride, as a fraction of the median stride's, for its phase to be
 #: estimated.
 ENOUGH = 0.5
 #: STRIDES: fewest strides from which a scatter is estimated.
@@ -132,8 +132,8 @@ def _roles(joints: Sequence[str]) -> list[str]:
     return joints_of_role if all(joints_of_role) else []
 
 
-def _turn(axis: str, angle: np.ndarray) -> np.ndarray:
-    """Matrices of turns about an axis, shape (n, 3, 3)."""
+def _rotations(axis: str, angle: np.ndarray) -> np.ndarray:
+    """Return rotation matrices about an axis, shape (n, 3, 3)."""
     i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
     matrix = np.tile(np.eye(3), (angle.size, 1, 1))
     matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
@@ -151,7 +151,7 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
     """
     turned, position = np.tile(np.eye(3), (angles[0].size, 1, 1)), np.zeros((angles[0].size, 3))
     for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
-        turned = turned @ _turn(axis, angle)
+        turned = turned @ _rotations(axis, angle)
         if k in BEGINS:
             position = position - LENGTHS[pair][BEGINS.index(k)] * turned[:, :, 2]
     return position
@@ -173,10 +173,10 @@ def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
     roles = {leg: _roles(joints) for leg, joints in legs.items()}
     if set(legs) != set(HEXAPOD) or not all(roles.values()):
         return None
-    turns = np.exp(2j * np.pi * np.outer(np.arange(POINTS) / POINTS,
+    waves = np.exp(2j * np.pi * np.outer(np.arange(POINTS) / POINTS,
                                          np.arange(next(iter(c.values())).size)))
-    turns[:, 1:] *= 2.0
-    forward = {leg: np.fft.rfft(foot([(turns @ c[name]).real for name in names], leg[1])[:, 0])[1]
+    waves[:, 1:] *= 2.0
+    forward = {leg: np.fft.rfft(foot([(waves @ c[name]).real for name in names], leg[1])[:, 0])[1]
                for leg, names in roles.items()}
     first = next(iter(forward.values()))
     return {leg: round(float(np.angle(position / first)) / (2.0 * np.pi) % 1.0, 9) % 1.0
@@ -187,7 +187,8 @@ def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 SIGNED = 1.0
 #: CLEARER: least difference of the correlations in either sense that decides a joint's sense.
 CLEARER = 0.2
-#: TELLING: variance of a joint, as a share of the largest, below which it decides no leg's phase.
+#: TELLING: variance of a joint, as a fraction of the largest, below which it decides no leg's
+#: phase.
 TELLING = 0.05
 #: SCATTER: RMS distance of real legs from the phases of their gait, cycles, for the odds of gaits.
 SCATTER = 0.06
@@ -325,8 +326,8 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             total = np.zeros_like(terms)
         elif not sense:
             # Choose the sense that agrees with the pairs that move more.
-            turn = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
-            sense = 1.0 if np.sum(terms * turn).real >= 0.0 else -1.0
+            phasor = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
+            sense = 1.0 if np.sum(terms * phasor).real >= 0.0 else -1.0
         if sense < 0.0:
             mirrored.append(other)
         total = total + sense * terms
@@ -434,7 +435,7 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
     Args:
         match: by the legs' phases.
         contacts: of the feet, if they are known.
-        falling: share of the stride in which the body falls freely, if its height is known.
+        falling: fraction of the stride in which the body falls freely, if its height is known.
 
     """
     if set(match.alike) != {'walk', 'run'}:

@@ -221,8 +221,8 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
             spikes[joint] = np.count_nonzero(~keep)
             left[joint] = rests[joint][1].var() / max(variance, 1e-300)
     c = coefficients_of(weights)
-    lead = c[1, list(first)]
-    zero = -float(np.angle(lead[np.argmax(np.abs(lead))])) / (2.0 * np.pi)
+    first_harmonic = c[1, list(first)]
+    zero = -float(np.angle(first_harmonic[np.argmax(np.abs(first_harmonic))])) / (2.0 * np.pi)
     turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
     spread, error = (np.array(values) for values in zip(*scatter, strict=True))

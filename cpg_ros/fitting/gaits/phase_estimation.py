@@ -38,19 +38,19 @@ from scipy.linalg import solveh_banded
 #: BLOCKS: blocks in a period, at each of which a window begins; POINTS: points in a block.
 BLOCKS, POINTS = 8, 4
 # A motion is steady if it meets the following four limits.
-#: WEAKEST: least amplitude, as a share of the typical one.
+#: WEAKEST: least amplitude, as a fraction of the typical one.
 WEAKEST = 0.4
 #: STRONGEST: largest amplitude, as a multiple of the typical one.
 STRONGEST = 2.5
 #: TOLERANCE: largest relative difference of a stride's rate from the median.
 TOLERANCE = 0.15
-#: ALIKE: least share of the motion in the typical direction; a walk has 1/4 of a trot's.
+#: ALIKE: least fraction of the motion in the typical direction; a walk has 1/4 of a trot's.
 ALIKE = 0.5
 #: A stride at the end of a stretch is left out if its RMS residual exceeds ODD times the median
 #: one and MARKED of the motion,
 ODD, MARKED = 3.0, 0.05
 #: or if its rate differs from the median by more than ODD_RATE times the median deviation and by
-#: more than the share MARKED_RATE.
+#: more than the fraction MARKED_RATE.
 ODD_RATE, MARKED_RATE = 4.5, 0.03
 #: HARMONICS: harmonics that determine the phase; FEW: cycles below which there are no inner knots.
 HARMONICS, FEW = 8, 4.0
@@ -117,10 +117,10 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
     period = BLOCKS * POINTS * step
     blocks = len(y) // POINTS
     parts = y[:blocks * POINTS].reshape(blocks, POINTS, -1)
-    turn = np.exp(-2j * np.pi * np.arange(blocks * POINTS).reshape(blocks, POINTS)
-                  / (BLOCKS * POINTS))
+    phasor = np.exp(-2j * np.pi * np.arange(blocks * POINTS).reshape(blocks, POINTS)
+                    / (BLOCKS * POINTS))
     sums = np.concatenate([np.zeros((1, y.shape[1])),
-                           np.cumsum(np.einsum('bp,bpj->bj', turn, parts), axis=0)])
+                           np.cumsum(np.einsum('bp,bpj->bj', phasor, parts), axis=0)])
     z = sums[BLOCKS:] - sums[:-BLOCKS]
     middles = grid[0] + (np.arange(len(z)) + 0.5 * BLOCKS) * POINTS * step - 0.5 * step
     inside = ((middles >= seed.begin + 0.499 * period) & (middles <= seed.end - 0.499 * period))
@@ -264,14 +264,14 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
         if abs(step) * span < 1e-6:
             break
     # Blocks of an eighth of a cycle, all joints together, vary independently; the few harmonics
-    # have taken their share of what is left.
+    # have taken their part of what is left.
     scores = np.einsum('jn,jn->n', by_rate, left)
     block = (np.interp(grid, [0.0, span], phases - phases[0]) * BLOCKS).astype(int)
     sums = np.bincount(block, scores)
     free = max(1.0 - (2 * HARMONICS + 1) / grid.size, 0.1)
     own = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
     # Strides wander besides, slowly: what blocks and their neighbours are early or late together
-    # is that, and counts once a cycle. The mean cycle takes one cycle's share of it.
+    # is that, and counts once a cycle. The mean cycle takes one cycle's part of it.
     early = (np.bincount(block, np.einsum('jn,jn->n', slope, left))
              / np.maximum(np.bincount(block, np.einsum('jn,jn->n', slope, slope)), 1e-300))
     cycles = float(phases[1] - phases[0])

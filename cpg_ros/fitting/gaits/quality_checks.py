@@ -27,11 +27,13 @@ import numpy as np
 
 #: SURE: number of cycles below which the errors are rough.
 SURE = 3.0
-#: DRIFT: change of the frequency over the stretch, as a share of it, from which on a note is made.
+#: DRIFT: change of the frequency over the stretch, as a fraction of it, from which on a note is
+#: made.
 DRIFT = 0.04
 #: SAMPLES: samples per stride below which the true gait may be several times as fast (aliasing).
 SAMPLES = 20.0
-#: ALIKE: a mean cycle is n strides if less than this share of its power is off the multiples of n.
+#: ALIKE: a mean cycle is n strides if less than this fraction of its power is off the multiples of
+#: n.
 ALIKE = 0.1
 #: SLOW: stride frequency, Hz, below which no leg steps; USUAL: range of frequencies, Hz, in which
 #: the same times in another unit must lie for that unit to be suggested.
@@ -49,7 +51,7 @@ PARTS, STRIDES, FEWEST = ('at its beginning', 'in its middle', 'at its end'), 1,
 #: TOGETHER: largest phase difference, cycles, of legs that move together.
 #: SWAY: range of the joints, rad, below which such legs may only sway on the spot.
 TOGETHER, SWAY = 0.06, 0.3
-#: LIMPS: a leg limps if it moves by less than this share of the other legs' median motion.
+#: LIMPS: a leg limps if it moves by less than this fraction of the other legs' median motion.
 LIMPS = 0.6
 
 
@@ -229,9 +231,9 @@ def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[st
 #: PATH, SURE_AREA: area of the loop that two joints of a leg describe, relative to an ellipse of
 #: the same amplitudes. Below PATH the leg goes to and fro; above SURE_AREA its sense is certain.
 PATH, SURE_AREA = 0.25, 0.4
-#: MOVES: a joint is ignored if it moves by less than this share of the leg's largest motion.
+#: MOVES: a joint is ignored if it moves by less than this fraction of the leg's largest motion.
 MOVES = 0.1
-#: COPY: largest share of its motion that a copy of another joint has for itself.
+#: COPY: largest fraction of its motion that a copy of another joint has for itself.
 #: JOINT_WORDS: words in common of joints that are copies whatever their ratio.
 COPY, JOINT_WORDS = 0.1, frozenset({'hip', 'thigh', 'knee', 'calf', 'shank', 'ankle'})
 #: TRAVELS: travel of the body in a stride from which on it does not step on the spot, m.

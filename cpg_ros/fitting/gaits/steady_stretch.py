@@ -77,11 +77,10 @@ GRID = 1 << 18
 REPEATS = 0.25
 #: CYCLES: fewest cycles in which a repetition is found.
 CYCLES = 1.4
-#: A multiple of the lag is the period if its difference is less than the share BETTER of that of
-#: the lag reduced by LESS,
-BETTER, LESS = 0.5, 0.02
-#: and if it repeats for at least the share LASTING of the lag's stretch.
-LASTING = 0.7
+#: A multiple of the lag is the period if its difference is less than the fraction BETTER of that
+#: of the lag reduced by LESS, and if it repeats for at least the fraction LASTING of the lag's
+#: stretch.
+BETTER, LESS, LASTING = 0.5, 0.02, 0.7
 #: NEAR: relative difference up to which two lags belong to one gait.
 NEAR = 0.1
 #: LAGS: lags that are tried on a grid, and windows of the local variance, points.

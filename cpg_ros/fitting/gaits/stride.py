@@ -173,7 +173,7 @@ STILL = 0.01
 #: ALIKE: largest mean square difference, over twice the variance, of stretches with fewer cycles
 #: than SURE.
 ALIKE = 0.1
-#: UNEXPLAINED: largest share of the joints' variance that the mean cycle may leave unexplained.
+#: UNEXPLAINED: largest fraction of the joints' variance that the mean cycle may leave unexplained.
 UNEXPLAINED = 0.5
 #: SEEDS: most stretches that are followed; OTHERS: cycles of another one from which on it is
 #: noted.

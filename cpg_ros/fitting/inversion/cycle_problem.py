@@ -136,7 +136,7 @@ class CycleProblem:
         self._placed: tuple[bytes, ReadoutFit] | None = None
 
     def duty(self, values: np.ndarray) -> float | None:
-        """Return the share of the stride that legs are to stand; None for what they do."""
+        """Return the fraction of the stride that legs are to stand; None for what they do."""
         return float(values[self._own]) if self._of_duty.any() else self.readout.duty
 
     @property
@@ -244,7 +244,7 @@ class CycleProblem:
         return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - self.weights))
 
     def stance_share(self, values: np.ndarray) -> float:
-        """Return the share of the stride that the leg of the first joint stands."""
+        """Return the fraction of the stride that the leg of the first joint stands."""
         duty = self.duty(values)
         if duty is not None:
             return duty

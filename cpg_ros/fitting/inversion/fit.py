@@ -290,8 +290,8 @@ class Fit(ShortRepr):
         fractions: order of the readout -> mean RMS error over range with that order, the
             parameters kept.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
-        duty: share of the stride that legs are to stand; None for what the network's cells do.
-        stance: phase at which legs begin to stand by themselves, and for which share, as in a
+        duty: fraction of the stride that legs are to stand; None for what the network's cells do.
+        stance: phase at which legs begin to stand by themselves, and for which fraction, as in a
             robot file; None if they stand while their cells fall.
         parameters: free number -> estimate; then those that were read off the legs' phases.
         correlation: of the free numbers, in their order; nan where the data do not separate one

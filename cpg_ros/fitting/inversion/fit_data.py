@@ -135,7 +135,7 @@ class Signals(ShortRepr):
         """
         k = np.arange(self.terms.shape[1])
         terms = self.terms[waves]
-        series = _turns(theta, k.size) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=-1)
+        series = _waves(theta, k.size) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=-1)
         return series[..., 0].real, series[..., 1].real, series[..., 2].real
 
     def derivatives(self, theta: np.ndarray, waves: np.ndarray, members: np.ndarray) -> np.ndarray:
@@ -152,15 +152,15 @@ class Signals(ShortRepr):
         """
         k = np.arange(self.terms.shape[1])
         slopes = (self.slopes @ members)[waves]
-        return (_turns(theta, k.size) @ np.stack([slopes, 1j * k[:, None] * slopes])).real
+        return (_waves(theta, k.size) @ np.stack([slopes, 1j * k[:, None] * slopes])).real
 
 
-def _turns(theta: np.ndarray, count: int) -> np.ndarray:
+def _waves(theta: np.ndarray, count: int) -> np.ndarray:
     """``exp(2 pi i k theta)``, shape (..., count)."""
-    turns = np.empty((*theta.shape, count), dtype=complex)
-    turns[..., 0] = 1.0
-    turns[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
-    return np.cumprod(turns, axis=-1)
+    waves = np.empty((*theta.shape, count), dtype=complex)
+    waves[..., 0] = 1.0
+    waves[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
+    return np.cumprod(waves, axis=-1)
 
 
 def signals(orbit: Orbit, harmonics: int) -> Signals:
@@ -208,7 +208,7 @@ def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.nda
     return terms, (slopes - np.multiply.outer(terms, 0.5 * (high - low))) / half
 
 
-#: KNOWN: least standard error of a mean cycle, as a share of the joint's range.
+#: KNOWN: least standard error of a mean cycle, as a fraction of the joint's range.
 KNOWN = 1e-4
 
 

@@ -248,7 +248,7 @@ def joints(result: RecordingFit) -> list[tuple[str, ...]]:
     """Return rows of the joints' errors, with a head."""
     fit = result.fit
     rms, fraction = fit.rms, fit.rms_share
-    rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'share of range')]
+    rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'fraction of range')]
     return rows + [(name, str(fit.cells[name]), f'{rms[name]:.4f}',
                     f'{100 * fraction[name]:.2f} %')
                    for name in fit.joints]

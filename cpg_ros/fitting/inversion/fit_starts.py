@@ -28,7 +28,7 @@ from cpg_ros.fitting.inversion.free_parameters import Free, TINY
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
 
-#: SHARES: names of free numbers that are the stance's share of a stride.
+#: SHARES: names of free numbers that are the stance's fraction of a stride.
 SHARES = (GAIT_DUTY, 'duty')
 #: DUTIES: values of the gait's duty that are tried.
 DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)

@@ -94,13 +94,13 @@ def _points(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride:
     first, last = int(np.ceil(phases[0])), int(np.floor(phases[-1]))
     number = np.floor(phases).astype(int) - first
     whole = (number >= 0) & (number < last - first)
-    turn = np.exp(-2j * np.pi * phases[whole])
+    phasor = np.exp(-2j * np.pi * phases[whole])
     sums = []
     for leg in stride.phases:
         name = max((joint for joint in legs[leg] if joint in stride.joints),
                    key=lambda joint: float(np.ptp(stride.mean[stride.joints.index(joint)])))
         x = recording.positions[inside, joints.index(name)][whole]
-        x = np.where(np.isfinite(x), x - np.nanmean(x), 0.0) * turn
+        x = np.where(np.isfinite(x), x - np.nanmean(x), 0.0) * phasor
         sums.append(np.bincount(number[whole], x.real, last - first)
                     + 1j * np.bincount(number[whole], x.imag, last - first))
     ahead = np.array(sums[1:]) * np.conj(sums[0])
@@ -222,7 +222,7 @@ def fit_stretches(recording: Recording, robot: Robot | None = None, network: str
         robot: as of fit_recording.
         network: one for all stretches; by default as of fit_recording.
         order: of the readouts, 1 to 3.
-        done: called with the share of the fits that is done, 0 to 1.
+        done: called with the fraction of the fits that is done, 0 to 1.
 
     Raises:
         CpgError: as of cut.

@@ -108,8 +108,8 @@ def _parser() -> Parser:
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
                         "parameters that are not free (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
-                        help=f'parameters to fit, and {GAIT_DUTY}, the share of the stride that '
-                        'legs stand (default: ' + ', '.join(
+                        help=f'parameters to fit, and {GAIT_DUTY}, the fraction of the stride in '
+                        'stance (default: ' + ', '.join(
                             f'{name} {" ".join(kind.free) or "none"}'
                             for name, kind in SHIPPED.items()) + f'; and {GAIT_DUTY} if the '
                         'robot file has one for the gait or the recording shows one)')

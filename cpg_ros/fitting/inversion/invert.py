@@ -172,7 +172,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         network: parameters; those that are not free keep their values.
         gait: one of its gaits.
         free: names of parameters to fit, or of groups of them; the usual ones by default.
-            GAIT_DUTY is the share of the stride that legs stand.
+            GAIT_DUTY is the fraction of the stride that legs stand.
         order: of the readouts, 1 to 3.
         starts: free number -> value to start from; {} starts from the network's own values. By
             default from these, and from the best of many values all over the ranges.
@@ -182,7 +182,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             as the generator's frequency does.
         orbits: of earlier fits of the same parameters, gait and readout.
         straight: whether intervals are quadratic however wide they are, which is quicker.
-        done: called with the share of the work that is done, 0 to 1.
+        done: called with the fraction of the work that is done, 0 to 1.
 
     Raises:
         InputError: names, bounds or starts cannot be used.

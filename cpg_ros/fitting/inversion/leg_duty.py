@@ -43,9 +43,9 @@ class GaitReadout:
     Attributes:
         leading: cell -> the cell that gives its leg's phase, both from 1; other cells lead
             themselves.
-        duty: share of the stride that legs stand; None for what the network's cells do.
+        duty: fraction of the stride that legs stand; None for what the network's cells do.
         stance: phase of the leading cell at which a leg begins to stand by itself, after the
-            cell's peak, and for which share of the stride, cycles; None if it stands while the
+            cell's peak, and for which fraction of the stride, cycles; None if it stands while the
             cell falls.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
         weights: joint -> its weights of x and y in the robot file; they say which half of a
@@ -127,12 +127,12 @@ def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, 
 def _extremum(terms: np.ndarray, slopes: np.ndarray, phase: float) -> tuple[float, np.ndarray]:
     """Return the phase of an extremum near a place, cycles, and its derivatives."""
     k = np.arange(terms.size)
-    bend, turns = 0.0, np.ones_like(terms)
+    bend, waves = 0.0, np.ones_like(terms)
     for _ in range(STEPS):
-        turns = np.exp(TURN * 1j * phase * k)
-        slope, bend = float((1j * k * terms @ turns).real), float((-k * k * terms @ turns).real)
+        waves = np.exp(TURN * 1j * phase * k)
+        slope, bend = float((1j * k * terms @ waves).real), float((-k * k * terms @ waves).real)
         phase -= float(np.clip(slope / bend / TURN, -1.0 / GRID, 1.0 / GRID)) if bend else 0.0
-    return phase % 1.0, -((1j * k * turns) @ slopes).real / (bend * TURN if bend else np.inf)
+    return phase % 1.0, -((1j * k * waves) @ slopes).real / (bend * TURN if bend else np.inf)
 
 
 def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
@@ -141,7 +141,7 @@ def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
 
     Args:
         theta: phases of cells, cycles, any shape.
-        duty: share of the stride that the leg is to stand.
+        duty: fraction of the stride that the leg is to stand.
         own: when it does by itself.
         ahead: phases of the cells before those of their legs' leading cells, cycles, likewise.
         members: how much each parameter moves with each free number, (parameters, numbers).

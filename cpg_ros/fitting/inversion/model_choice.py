@@ -83,7 +83,7 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
         recording: joints over time.
         robot: whose networks, legs and cells are taken; all shipped ones by default.
         order: of the readouts, 1 to 3.
-        done: called with the share of the work that is done, 0 to 1.
+        done: called with the fraction of the work that is done, 0 to 1.
 
     Raises:
         CpgError: there are no legs or no steady gait, or no network has such legs.

@@ -32,7 +32,7 @@ import numpy as np
 import yaml
 
 #: Limits of joints without a robot file. ROOM: margin on either side of the recorded range, as a
-#: share of it; FASTER: speed limit as a multiple of the fastest fitted speed.
+#: fraction of it; FASTER: speed limit as a multiple of the fastest fitted speed.
 ROOM, FASTER = 0.25, 3.0
 #: IN_PLACE: factors of a robot file's weights at a stride of 0; the largest one that keeps the
 #: joints within their limits, with the fitted offsets, is used.

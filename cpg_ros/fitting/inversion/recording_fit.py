@@ -48,10 +48,11 @@ import numpy as np
 
 # A fit to every steady gait: where the requested fit has no orbit, a simpler one.
 
-#: STAYS: half width of the bounds that hold a parameter at its value, as a share of that value.
+#: STAYS: half width of the bounds that hold a parameter at its value, as a fraction of that value.
 STAYS = 1e-9
 #: ASKED: standard errors by which the cells' own stance must fit worse before duty is fitted.
-#: KNOWN: standard error of the duty (share of a stride) from which on a warning calls it unknown.
+#: KNOWN: standard error of the duty (fraction of a stride) from which on a warning calls it
+#: unknown.
 ASKED, KNOWN = 3.3, 0.03
 #: One attempt at a fit: free parameters, order of the readout, starts, and a text that describes
 #: it.
@@ -161,7 +162,7 @@ def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())
 
 
-#: POOR: order of the readout -> mean RMS error, as a share of the range, above which a fit is
+#: POOR: order of the readout -> mean RMS error, as a fraction of the range, above which a fit is
 #: poor; fits of real trots and walks have 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04.
 #: POOR_FACTOR: factor of the confidence of a poor fit.
 POOR, POOR_FACTOR = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
@@ -385,13 +386,13 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         robot: which joints belong to which legs and cells; by default their names decide.
         network: name or file; by default the robot's first, or the first that has such legs.
         gait: of the network; by default the recorded one, as it is recognised.
-        free: parameters to fit, among them GAIT_DUTY, the share of the stride that legs stand; by
-            default the network's usual ones and that, if the robot's gait has a duty or the
+        free: parameters to fit, among them GAIT_DUTY, the fraction of the stride that legs stand;
+            by default the network's usual ones and that, if the robot's gait has a duty or the
             recording tells it.
         order: of the readouts, 1 to 3.
         preset: whose parameters are taken that are not free; the gait's by default.
         starts: free number -> value to start from; by default several that cover the ranges.
-        done: called with the share of the fit that is done, 0 to 1.
+        done: called with the fraction of the fit that is done, 0 to 1.
 
     Raises:
         CpgError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no

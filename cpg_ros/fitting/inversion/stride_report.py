@@ -89,7 +89,7 @@ class LegStrides(ShortRepr):
 
     @property
     def fractions(self) -> np.ndarray:
-        """Shares of the retractions in their strides, shape (n,)."""
+        """Fractions of the retractions in their strides, shape (n,)."""
         return self.retractions / self.periods
 
 

@@ -138,7 +138,7 @@ def contacts(events: Mapping[str, Any], start: float, times: np.ndarray) -> Foot
         return None
     begin, end = (most([one([time for time, _ in own]) for own in known.values()])
                   for most, one in ((max, min), (min, max)))
-    # Whole strides where there are any, so that shares of the time are those of a stride.
+    # Whole strides where there are any, so that fractions of the time are those of a stride.
     landed = [[time for time, down in own if down and begin <= time <= end]
               for own in known.values()]
     begin, end = max(((own[0], own[-1]) for own in map(sorted, landed) if len(own) > 1),

@@ -203,7 +203,7 @@ def load_segments(name: str | Path) -> Segments:
     return listed
 
 
-#: SHORTEST: share of a segment's length across the axis below which it has no direction.
+#: SHORTEST: fraction of a segment's length across the axis below which it has no direction.
 SHORTEST = 1e-3
 #: UNITS: what files call the unit of places -> that in m.
 UNITS = {'mm': 1e-3, 'cm': 1e-2, 'm': 1.0}

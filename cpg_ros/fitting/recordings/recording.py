@@ -88,7 +88,7 @@ class Recording(ShortRepr):
         notes: what was repaired or left out, one line each.
         loads: on the feet, where they were recorded, too.
         cycle: duration of a stride, s, of which the recording is copies; nan where its times are
-            shares of one stride of unknown duration; 0 for all other recordings.
+            fractions of one stride of unknown duration; 0 for all other recordings.
         body: where the body was, m, the last axis upward, shape (n, 3), where that was recorded.
 
     Raises:
@@ -453,7 +453,7 @@ COPIES = 6
 #: declared stride; GAP_RECOGNISED: of a recognised one.
 GAP_DECLARED, GAP_RECOGNISED = 0.3, 0.1
 #: Recognised strides. DURATIONS: shortest and longest, s; SEAM_SPEED: least speed at the seam,
-#: over the mean one, as a motion from rest to rest closes, too; ODD_SHARE: least share of odd
+#: over the mean one, as a motion from rest to rest closes, too; ODD_SHARE: least fraction of odd
 #: harmonics in the power, as two strides have none.
 DURATIONS, SEAM_SPEED, ODD_SHARE = (0.1, 3.0), 0.3, 0.2
 
@@ -472,7 +472,7 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
     """
     length, step = float(recording.times[-1]), float(np.median(np.diff(recording.times)))
     if not duration and math.isnan(recording.cycle):
-        raise RecordingError(f'{recording.source}: its times are shares of a stride: give the '
+        raise RecordingError(f'{recording.source}: its times are fractions of a stride: give the '
                              'duration of the stride in s (--cycle)')
     if not 0.0 <= duration < math.inf:
         raise RecordingError(f'{recording.source}: a stride cannot last {duration:g} s')

@@ -29,7 +29,8 @@ import numpy as np
 #: FARTHEST: largest position of a joint, rad.
 FARTHEST = 1e6
 #: SPIKE_RATIO: distance from the median, over the spread of the positions, at least 1 rad, above
-#: which a position is implausible; RARE: such positions are dropped if their share is up to this.
+#: which a position is implausible; RARE: such positions are dropped if their fraction is up to
+#: this.
 SPIKE_RATIO, RARE = 100.0, 0.01
 #: A gap of more than ASTRAY times the duration of all samples, and of more than GAP, ns, separates
 #: recordings that do not belong together, or stamps that are wrong.

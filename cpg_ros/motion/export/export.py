@@ -46,7 +46,7 @@ example: cpg export --robot quadruped --network delayed --gaits trot walk --out 
          cc -std=c99 gait/*.c -lm -o test_cpg && ./test_cpg
 
 exit codes: 0 written, 1 a gait cannot run on the robot, 2 invalid arguments."""
-#: TOLERANCES: type of numbers -> error of a table, as a share of half the range of its values.
+#: TOLERANCES: type of numbers -> error of a table, as a fraction of half the range of its values.
 TOLERANCES = {'float32': 1e-4, 'float64': 1e-9}
 MOST_STEPS = 2000
 

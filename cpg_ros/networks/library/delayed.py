@@ -108,8 +108,8 @@ class Delayed(Network):
     def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry.
 
-        On four legs the sign of d turns the ring: the wave of walk and jump runs forward (j = 1,
-        LF leads LH) for d < 0 and backward (j = 3, LH leads LF) otherwise.
+        On four legs the sign of d sets the direction of the wave in walk and jump: forward (j = 1,
+        LF leads LH) for d < 0, backward (j = 3, LH leads LF) otherwise.
 
         Raises:
             ValueError: the gait is not one of the primary ones.
@@ -133,8 +133,8 @@ class Delayed(Network):
 
     def least_coupling(self, gait: str) -> LeastCoupling:
         """Roots of ``lambda = A + B exp(-lambda tau)`` cross where |B| > |Re A|."""
-        turn = self.modes()[gait][0] / leg_count(type(self))
-        least = abs(self.a + self.b + self.d * round(math.cos(2.0 * math.pi * turn), 15))
+        shift = self.modes()[gait][0] / leg_count(type(self))
+        least = abs(self.a + self.b + self.d * round(math.cos(2.0 * math.pi * shift), 15))
         return LeastCoupling('|c|', abs(self.c), least)
 
     def sufficient_gain(self, rate: float) -> float:
@@ -163,9 +163,9 @@ def _presets(network: type[Delayed]) -> dict[str, Preset]:
     """
     presets = {}
     for gait, (j, k) in network.modes().items():
-        turn = 2.0 * math.pi * j / leg_count(network)
+        angle = 2.0 * math.pi * j / leg_count(network)
         d = -1.0 if j > 0 else 1.0
-        a = round(-3.5 - d * math.cos(turn), 1)
+        a = round(-3.5 - d * math.cos(angle), 1)
         if 2 * j % leg_count(network) == 0:
             a, d = -4.5, 2.0 * d
         presets[gait] = Preset(gait, network(a, 1.0, 6.5 if k else -6.5, d, 0.4))

@@ -22,7 +22,7 @@ Righetti & Ijspeert (ICRA 2008), without feedback:
 
 The leg is in stance while x falls, for y > 0. With ``omega_stance = pi nu / duty`` and
 ``omega_swing = pi nu / (1 - duty)``, an uncoupled oscillator has, for large b, the period 1/nu, of
-which the share duty is stance. The weights k_ij choose the gait.
+which the fraction duty is stance. The weights k_ij choose the gait.
 """
 
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ class HopfOscillators(LegPairs):
         'mu': Range(-10.0, 10.0, 'square of the amplitude of an uncoupled oscillator'),
         'b': Range(0.0, 100.0, 'how sharply stance changes to swing'),
         'nu': Range(0.1, 10.0, 'frequency of an uncoupled oscillator [cycles/model time]'),
-        'duty': Range(0.1, 0.95, 'duty factor: share of the stride in stance')}
+        'duty': Range(0.1, 0.95, 'duty factor: fraction of the stride in stance')}
     usual: ClassVar[dict[str, float]] = {
         'alpha': 5.0, 'beta': 50.0, 'mu': 1.0, 'b': 20.0, 'nu': 1.0, 'duty': 0.6}
     free: ClassVar[tuple[str, ...]] = ('duty',)

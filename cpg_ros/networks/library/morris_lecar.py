@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The Morris-Lecar cell: membrane potential v and the share w of open potassium channels.
+"""The Morris-Lecar cell: membrane potential v and the fraction w of open potassium channels.
 
 ``v' = -gCa m(v)(v - vCa) - gK w (v - vK) - gL (v - vL) + i``, ``w' = phi tau(v) (n(v) - w)``,
 ``m = (1 + tanh((v - v1)/v2))/2``, ``n = (1 + tanh((v - v3)/v4))/2`` and

@@ -115,8 +115,8 @@ class PhaseOscillators(Network):
             x_j, y_j, _ = cell.now(lambda i, n=n: i + n)
             phi = TURN * (getattr(p, f'offset{n}') - p.offset0)
             # r_j sin(theta_j - phi) and r_j cos(theta_j - phi).
-            rise, lead = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
-            speed = speed + p.w * (rise * x - lead * y) / r
+            sine, cosine = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
+            speed = speed + p.w * (sine * x - cosine * y) / r
         return (s * x / r - speed * y, s * y / r + speed * x, p.a * (p.a / 4.0 * (p.r - r) - s))
 
     @classmethod
@@ -133,7 +133,7 @@ class PhaseOscillators(Network):
         """
         known(gait, self.gaits())
         stating = self if stated_gait(self) == gait else self.presets()[gait].network
-        return _alone(self.cells).led(stating.leads)
+        return _alone(self.cells).with_leads(stating.leads)
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float]:
         """Return the gait's state where the first leg's oscillator peaks, and the period."""

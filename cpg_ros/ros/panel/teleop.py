@@ -171,7 +171,7 @@ class Teleop:
     # -- steering ---------------------------------------------------------------------------
 
     def steer(self, page: Page, stamp: float, now: float, speed: float, turn: float) -> None:
-        """Steer, by shares of full deflection given after a stamp and received now, both in s.
+        """Steer, by fractions of full deflection given after a stamp and received now, both in s.
 
         Raises:
             LeaseError: another page has the lease, or other nodes steer.

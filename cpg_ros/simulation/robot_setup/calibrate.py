@@ -112,7 +112,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
 def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Sequence[int]) -> float:
     """Return by how many cycles the pattern's phase is ahead of the recording's.
 
-    The pattern's joints are those in place and a share, any, of what full strides add.
+    The pattern's joints are those in place and any fraction of what full strides add.
 
     Args:
         theta: phases of the recording, cycles, shape (m,).

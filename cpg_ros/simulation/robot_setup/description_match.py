@@ -51,7 +51,7 @@ MASS_RATIO = 1.25
 #: LONGEST_LEG: length of the longest leg of a robot, m; DENSITIES: least and largest mass over the
 #: cube of the longest leg, kg/m^3 (of robots 50 to 600).
 LONGEST_LEG, DENSITIES = 5.0, (5.0, 6000.0)
-#: FORWARD: share of a stride by which a foot must go the wrong way; LEAST: least way of a foot,
+#: FORWARD: fraction of a stride by which a foot must go the wrong way; LEAST: least way of a foot,
 #: over the leg's length.
 FORWARD, LEAST = 0.25, 0.002
 #: LEVEL: largest tilt of a sole in the stand, rad.
@@ -92,7 +92,7 @@ class GaitCheck:
         network, name: which.
         frequency: strides per second (Hz), nan where there is no such gait.
         room: least distance in rad of any joint from a limit; negative beyond it.
-        fraction: largest speed of any joint as a share of its limit.
+        fraction: largest speed of any joint as a fraction of its limit.
         room_at, share_at: the joints of these two.
         faults: what does not fit.
 
@@ -262,14 +262,14 @@ def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
             yield f'{one} is {"behind" if x < 0.0 else "ahead of"} {other} in the {what}'
     stand = {joint.name: joint.offset for joint in robot.joints}
     for leg, chain in chains.items():
-        _, points, turn = chain.posed([stand[name] for name in chain.joints])
+        _, points, frame = chain.posed([stand[name] for name in chain.joints])
         high = float(points[-1, 2] - points[:-1, 2].min())
         if high > 0.0:
             yield (f'{leg}: in the stand its foot is {high:.3g} m above its lowest joint: its '
                    f"joints' limits, axes or offsets do not let it stand")
         if len(robot.legs) == 2 and len(chain.joints) > 4:
             up = sole_up(known, chain.joints[-1])
-            if (tilt := acos(min(1.0, float((turn @ up)[2])))) > LEVEL:
+            if (tilt := acos(min(1.0, float((frame @ up)[2])))) > LEVEL:
                 yield f'{leg}: in the stand its sole is {tilt:.2g} rad off level'
 
 
@@ -356,9 +356,9 @@ def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str
     if set(own.joints) == set(other.joints) and own.joints != other.joints:
         yield f"joints: {', '.join(own.joints)} come in the {what} as {', '.join(other.joints)}"
         return
-    for name, turn, described in zip(own.joints, own.turns, other.turns, strict=False):
-        if turn != described:
-            yield (f'turns: {name} turns the other way in the {what}: {turn:g} where it has '
+    for name, sign, described in zip(own.joints, own.turns, other.turns, strict=False):
+        if sign != described:
+            yield (f'turns: {name} turns the other way in the {what}: {sign:g} where it has '
                    f'{described:g}')
     for key in ('hip', 'thigh', 'calf', 'foot'):
         mine, theirs = np.array(getattr(own, key)), np.array(getattr(other, key))

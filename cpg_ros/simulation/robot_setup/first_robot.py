@@ -49,8 +49,8 @@ RAISED, LOWERED = 0.4, 1.3
 SWING, LIFTS = 0.15, (0.02, 0.06)
 #: Limits of joints that have none. UNBOUNDED: of the angle, rad; SPEED: of the speed, rad/s.
 UNBOUNDED, SPEED = pi, 20.0
-#: MARGIN: least distance of the stand from a joint's limits, as a share of its range; USED:
-#: largest share of the room to the limits that gaits use.
+#: MARGIN: least distance of the stand from a joint's limits, as a fraction of its range; USED:
+#: largest fraction of the room to the limits that gaits use.
 MARGIN, USED = 0.1, 0.8
 #: STARTS: poses from which a stand is searched; MIDDLE: weight of the distance from the middle of
 #: the joints' ranges; OTHER_WAY, STRAIGHT: price of a knee that is bent the unusual way or not.
@@ -204,12 +204,12 @@ class _StandingLeg:
                          wide)
 
         def off(angles: np.ndarray) -> np.ndarray:
-            axes, points, turn = self.chain.posed(angles)
+            axes, points, frame = self.chain.posed(angles)
             rest = MIDDLE * (angles - middle) / wide
             if self.aside is not None:
                 return np.array([*(points[-1] - [*self.aside[:2], ground]) / length, *rest])
             down = (points[self.end] - points[self.top]) / length
-            tilt = [] if self.sole is None else turn @ self.sole - [0.0, 0.0, 1.0]
+            tilt = [] if self.sole is None else frame @ self.sole - [0.0, 0.0, 1.0]
             return np.array([down[0], (points[self.end, 2] - ground) / length,
                              *axes[self.bend, ::2], *tilt, *rest])
 

@@ -34,12 +34,13 @@ import numpy as np
 
 #: FACING: directions in which a robot may face, by quarter turns to the left of x.
 FACING = ('x', 'y', '-x', '-y')
-#: MIDDLE: distance from the middle of the body, as a share of the largest, up to which a joint is
-#: on it.
+#: MIDDLE: distance from the middle of the body, as a fraction of the largest, up to which a joint
+#: is on it.
 MIDDLE = 0.05
-#: UNLIKE: largest difference in place or length between opposite legs, as a share of their length.
+#: UNLIKE: largest difference in place or length between opposite legs, as a fraction of their
+#: length.
 UNLIKE = 0.2
-#: Largest differences from the lowest leg, as shares of its length. SHORTER: height of a leg's
+#: Largest differences from the lowest leg, as fractions of its length. SHORTER: height of a leg's
 #: end;
 #: HIGHER: height of its first joint.
 SHORTER, HIGHER = 0.35, 0.4
@@ -69,24 +70,25 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
         return _cleaned(description, _named(description, given))
     paths = _paths(description)
     crosswise = _crosswise(description, paths)
-    turns = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
-    by_turn = {turn: legs for turn in turns if (legs := _assigned(description, paths, turn))}
+    quarters = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
+    by_quarter = {quarter: legs for quarter in quarters
+                  if (legs := _assigned(description, paths, quarter))}
     if crosswise and not faces_x and (legs := _assigned(description, paths, 0)) and all(
             place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
-        by_turn = {0: legs}
-    if not by_turn:
+        by_quarter = {0: legs}
+    if not by_quarter:
         raise LegsError(_question(description, paths))
-    fitting = [turn for turn in by_turn if faces_x or not _misnamed(by_turn[turn])]
+    fitting = [quarter for quarter in by_quarter if faces_x or not _misnamed(by_quarter[quarter])]
     if not fitting:
-        raise LegsError(_contradiction(description, next(iter(by_turn.values()))))
+        raise LegsError(_contradiction(description, next(iter(by_quarter.values()))))
     if fitting[0]:
-        ways = ' or '.join(FACING[turn] for turn in fitting)
+        ways = ' or '.join(FACING[quarter] for quarter in fitting)
         raise LegsError(
             f'the robot faces {ways} of the {description.format}, by '
             f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
             f'forward (REP 103): --forward={FACING[fitting[0]]} makes a URDF that is turned, '
             '--forward x takes x for forward')
-    return _cleaned(description, by_turn[fitting[0]])
+    return _cleaned(description, by_quarter[fitting[0]])
 
 
 def _paths(description: RobotDescription) -> list[tuple[str, ...]]:
@@ -108,10 +110,10 @@ def _crosswise(description: RobotDescription, paths: Sequence[Sequence[str]]) ->
     return bool(along[0] > CROSSWISE * along[1])
 
 
-def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], turn: int
+def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], quarter: int
               ) -> dict[str, tuple[str, ...]]:
     """Return the legs of a robot that faces a direction, from behind; nothing without pairs."""
-    ahead = np.round([np.cos(turn * np.pi / 2), np.sin(turn * np.pi / 2), 0.0])
+    ahead = np.round([np.cos(quarter * np.pi / 2), np.sin(quarter * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
     legs = [pair for pair in _pairs(_limbs(description, paths, left), left) if not any(
         no_leg(limb.joints) or sum(not description.joints[name].flaw for name in limb.joints)

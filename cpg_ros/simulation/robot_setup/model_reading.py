@@ -149,7 +149,7 @@ def _link(model: Any, data: Any, bodies: Sequence[int], place: np.ndarray, axes:
 def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
     """Return points in the world that are a shape's corners but for a distance, both m."""
     mujoco, kind, round_ = engine(), model.geom_type[geom], 0.0
-    size, turn = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
+    size, frame = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
         corners, round_ = np.array([[0.0, 0.0, size[1]], [0.0, 0.0, -size[1]]]), size[0]
     elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
@@ -161,7 +161,7 @@ def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
     else:
         signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
         corners = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]
-    return data.geom_xpos[geom] + corners @ turn.T, float(round_)
+    return data.geom_xpos[geom] + corners @ frame.T, float(round_)
 
 
 def _kind(mujoco: Any, model: Any, k: int) -> str:

@@ -46,8 +46,8 @@ SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'sp
 FACTOR, SPREAD, DIGITS = 3.0, 0.15, 4
 #: TOGETHER: designs of a job; BATCH: walks of a job that judges.
 TOGETHER, BATCH = 3, 8
-#: PUSHES: number of pushes of each impulse; IMPULSES: as shares of m sqrt(g h); SPEEDS, m/s, and
-#: TILES, height of tiles, m: for a robot of the G1's size.
+#: PUSHES: number of pushes of each impulse; IMPULSES: as fractions of m sqrt(g h); SPEEDS, m/s,
+#: and TILES, height of tiles, m: for a robot of the G1's size.
 PUSHES, IMPULSES, SPEEDS, TILES = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
 #: Sensors as those of a real robot: late, in s, and noisy.
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)

@@ -39,7 +39,7 @@ from scipy.stats import binomtest
 
 # Benefit of feedback for a robot in simulation: pushes survived with it and without it.
 
-#: BENEFIT_IMPULSES: impulses of pushes, as shares of m sqrt(g l) with the legs' length l.
+#: BENEFIT_IMPULSES: impulses of pushes, as fractions of m sqrt(g l) with the legs' length l.
 BENEFIT_IMPULSES = (0.2, 0.4, 0.6)
 #: BENEFIT_PUSHES: number of pushes of each impulse; UNDISTURBED: number of undisturbed runs;
 #: WALKED: duration of these, s; PUSHED: earliest time of a push, s; WATCHED: time observed after,
@@ -221,7 +221,7 @@ FACTOR, SPREAD = 8.0, 0.35
 #: TOGETHER: designs of a job; PUSHES: number of pushes of each impulse; FIELDS: number of fields
 #: of rough ground.
 TOGETHER, PUSHES, FIELDS = 3, 8, 3
-#: IMPULSES: of pushes, as shares of m sqrt(g l); harder than most robots survive.
+#: IMPULSES: of pushes, as fractions of m sqrt(g l); harder than most robots survive.
 IMPULSES = (0.6, 1.0, 1.4)
 #: ROUGH: height of the fields, as a fraction of the legs' length.
 ROUGH = 0.12

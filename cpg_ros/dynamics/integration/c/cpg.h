@@ -29,7 +29,7 @@ typedef @REAL@ cpg_real;
 
 typedef struct {
     uint8_t gait;
-    cpg_real transition, progress;  /* s, and the share of it that is over */
+    cpg_real transition, progress;  /* s, and the fraction of it that is over */
     cpg_real phase, phase_carry;    /* of the first leg, cycles */
     cpg_real angle[CPG_JOINTS];     /* from the stand, rad */
     cpg_real d_angle_d_phase[CPG_JOINTS];  /* rad per cycle */

@@ -158,7 +158,7 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
     c->state = newest->net.now;
 }
 
-/* Fill the inputs of a correction: level, phase of the first leg, share of the gait that is
+/* Fill the inputs of a correction: level, phase of the first leg, fraction of the gait that is
  * entered, strides per second, whether the gait changes, roll, pitch and yaw of the body; keys of
  * both gaits, the entered last. */
 void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)

@@ -1,7 +1,7 @@
 
 /* SHIFTING: joint speed allowed in ramps and fades, 1/s, per rad from the stand to the gait's
  * mean.
- * SHORT_OF: share of the speed bound up to which the clock lets joints go.
+ * SHORT_OF: fraction of the speed bound up to which the clock lets joints go.
  * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
  * FADES: whether two gaits can fade into each other. */
 #define SHIFTING R(2.0)
@@ -45,7 +45,7 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
     ramp->parts++;
 }
 
-/* Value and rate at a share s of the duration of a path that ends at rest. */
+/* Value and rate at a fraction s of the duration of a path that ends at rest. */
 static cpg_real come_to_rest(const cpg_ramp_part *way, cpg_real s, cpg_real *rate)
 {
     cpg_real slope;
