@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pseudo-arclength continuation of curves of solutions, past their folds.
+"""Pseudo-arclength continuation of solution curves, past their folds.
 
-n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. The
+n equations in n + 1 unknowns, the last of which is a parameter, define a curve of solutions. The
 tangent at a point predicts the next point, and Newton's method corrects it in the hyperplane
 normal to the tangent (Keller 1977; Doedel, Keller & Kernevez, *Numerical analysis and control of
-bifurcation problems*, 1991). The parameter is an unknown like the others, so a fold is a regular
-point of the curve.
+bifurcation problems*, 1991). A fold is a regular point of the curve.
 """
 
 from collections.abc import Callable, Iterator
@@ -46,14 +45,14 @@ def locate(event: Callable[[Point], float], point_at: Callable[[float], Point], 
            high: float, tolerance: float) -> Point:
     """Return the point of a curve at which an event function is zero.
 
-    Folds, Hopf points, period doublings, branch points, tori and points of codimension two are
-    all located by this function.
+    It locates folds, Hopf points, period doublings, branch points, tori and points of codimension
+    two.
 
     Args:
-        event: changes its sign between the ends.
-        point_at: from a coordinate to the point of the curve; called once for each coordinate.
-        low: coordinate on one side.
-        high: coordinate on the other side.
+        event: function of a point that changes sign between the ends.
+        point_at: coordinate -> point of the curve; called once for each coordinate.
+        low: coordinate of one end.
+        high: coordinate of the other end.
         tolerance: of the coordinate.
 
     """
@@ -69,9 +68,9 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
     An extremum near zero is refined, so that two zeros between neighbouring points are found.
 
     Args:
-        function: of a number; nan where it is not defined.
-        grid: rising numbers, shape (n,).
-        values: of the function at the grid; by default they are computed.
+        function: of a number; nan where it is undefined.
+        grid: ascending numbers, shape (n,).
+        values: of the function on the grid; computed by default.
 
     """
     values = np.array([function(x) for x in grid]) if values is None else np.asarray(values)
@@ -146,15 +145,15 @@ LARGEST_FALL = 0.6
 
 def derivatives(values: Callable[[np.ndarray], Any], x: np.ndarray, difference: float
                 ) -> np.ndarray:
-    """Return the derivatives of a function by its arguments, from central differences.
+    """Return derivatives of a function by central differences.
 
     Args:
-        values: function of m numbers, or of one.
-        x: its argument, shape (n,).
+        values: function with m values, or one.
+        x: argument, shape (n,).
         difference: of the argument.
 
     Returns:
-        Shape (m, n), or (n,) if the function has one number.
+        Shape (m, n), or (n,) for one value.
 
     """
     return np.array([(values(x + step) - values(x - step)) / (2.0 * difference)
@@ -163,12 +162,12 @@ def derivatives(values: Callable[[np.ndarray], Any], x: np.ndarray, difference: 
 
 def newton(equations: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, steps: int,
            tolerance: float, difference: float, longest: float) -> np.ndarray | None:
-    """Solve n equations in n unknowns by Newton's method; None where it does not converge.
+    """Solve n equations in n unknowns by Newton's method; None if it does not converge.
 
     Args:
-        equations: residuals, shape (n,), at unknowns, shape (n,).
-        x: unknowns to start from.
-        steps: at most.
+        equations: residuals, shape (n,), of unknowns, shape (n,).
+        x: initial unknowns.
+        steps: largest number of steps.
         tolerance: largest change in the last step.
         difference: of the unknowns, for the derivatives.
         longest: change of an unknown at which the method counts as diverged.
@@ -189,14 +188,14 @@ def newton(equations: Callable[[np.ndarray], np.ndarray], x: np.ndarray, *, step
 
 def continue_steps(advance: Callable[[Point, float], Point | None], point: Point, first: float,
                    shortest: float, longest: float) -> Iterator[Point]:
-    """Yield the points that follow one on a curve; a step that fails is halved.
+    """Yield the points that follow on a curve; halve a step that fails.
 
     Args:
-        advance: from a point and a step to the next point; None if there is none.
-        point: to start from.
+        advance: (point, step) -> next point, or None.
+        point: start.
         first: first step.
         shortest: step below which the continuation ends.
-        longest: step.
+        longest: longest step.
 
     """
     step = first
@@ -213,16 +212,16 @@ def continue_along_tangents(
         correct: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray] | None],
         start: np.ndarray, tangent: np.ndarray, steps: tuple[float, float, float], *,
         aligned: float, most: int) -> Iterator[np.ndarray]:
-    """Yield the points that follow one on a curve, until it ends or returns to the start.
+    """Yield the points that follow on a curve, until it ends or returns to the start.
 
     Args:
-        correct: from a guess and the tangent at the last point to a point of the curve and the
-            unit tangent there, in either direction; None if there is none.
+        correct: (guess, tangent at the last point) -> point of the curve and its unit tangent, in
+            either direction, or None.
         start: point of the curve, shape (n,).
-        tangent: unit tangent there, in the direction to continue in.
+        tangent: unit tangent at the start, in the direction to follow.
         steps: first, shortest and longest.
-        aligned: least cosine of the angle between the tangents of two neighbours.
-        most: points.
+        aligned: smallest cosine of the angle between neighbouring tangents.
+        most: largest number of points.
 
     """
     def advance(last: tuple[np.ndarray, np.ndarray], step: float
@@ -285,26 +284,26 @@ class SolutionCurve(Protocol):
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['SolutionCurve', np.ndarray, np.ndarray] | None:
-        """Return a finer discretisation, z and border in it; None if z is resolved.
+        """Return a finer discretisation, with z and border in it; None if z is resolved.
 
-        Again: this discretisation was itself made to resolve z.
+        ``again``: this discretisation was itself made to resolve z.
 
         Raises:
-            NoOrbit: it cannot be resolved.
+            NoOrbit: z cannot be resolved.
 
         """
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurvePoint(ShortRepr):
-    """A point of a curve and the unit tangent there.
+    """A point of a curve and its unit tangent.
 
     Attributes:
-        curve: the discretisation that it is a point of.
+        curve: its discretisation.
         z: unknowns; the last two are a period and the parameter.
         tangent: in the direction of the continuation.
         steps: of Newton's method.
-        cosine: of the angle between the tangent and the border, if the border is a unit vector.
+        cosine: of the angle between tangent and border, if the border is a unit vector.
 
     """
 
@@ -339,11 +338,11 @@ def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
     """Find the curve's point z + v with (v, border) = 0; None if Newton's method diverges.
 
     Args:
-        curve: in a fixed discretisation.
+        curve: fixed discretisation.
         z: unknowns near the point.
-        border: that v is normal to.
-        exact: take the tangent at the point itself. Otherwise it is taken before Newton's last
-            step, which saves a step and suffices to continue, but not to locate a fold.
+        border: normal to v.
+        exact: compute the tangent at the point itself, as needed to locate a fold; otherwise it is
+            that before Newton's last step, which suffices to continue.
 
     """
     before = 0.0
@@ -405,7 +404,7 @@ def predict_and_correct(point: CurvePoint, step: float) -> CurvePoint:
 
 
 def point_at_value(point: CurvePoint, value: float) -> CurvePoint | None:
-    """Return the curve's point with a value of the parameter, from one nearby; None if lost."""
+    """Return the curve's point at a parameter value, from a point nearby; None if it is lost."""
     z = point.z + (value - point.value) / point.rate * point.tangent
     z[-1] = value
     ahead = resolve_point(point.curve, z, fixed_unknown(z.size, -1))
@@ -417,12 +416,12 @@ def point_at_value(point: CurvePoint, value: float) -> CurvePoint | None:
 
 
 def next_crossing(start: CurvePoint, direction: float, value: float) -> CurvePoint | None:
-    """Return the next point with a value of the parameter; None if Newton's method finds none.
+    """Return the next point at a parameter value; None if Newton's method finds none.
 
     Args:
         start: a point before it, which may be a fold.
         direction: 1 or -1, along the tangent or back.
-        value: that the parameter reaches monotonically.
+        value: of the parameter, which reaches it monotonically.
 
     """
     def ahead(step: float) -> CurvePoint:
@@ -469,7 +468,7 @@ def rate_along(point: CurvePoint) -> Callable[[float], float]:
 
 
 def _longest_step(point: CurvePoint) -> float:
-    """Longest step in which the amplitude falls by no more than LARGEST_FALL."""
+    """Return the longest step in which the amplitude falls by no more than LARGEST_FALL."""
     size = point.amplitude
     ahead = point.curve.amplitude(point.z + 1e-3 * size * point.tangent)
     falling = (size - ahead) / (1e-3 * size)
@@ -483,17 +482,17 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
 
     Args:
         start: a resolved point.
-        low: least value of the parameter.
-        high: greatest value of the parameter.
-        visit: gets every point after start; it returns why to end there, or ''.
+        low: smallest value of the parameter.
+        high: largest value of the parameter.
+        visit: called with every point after start; returns why to end there, or ''.
         first_step: arclength of the first step.
         longest_step: of any step.
-        most: points, at most.
+        most: largest number of points.
 
     Returns:
-        The indices of the points that are folds, and why it ended: what visit returned,
-        'bound' (the last point is on it), 'steps', 'steep' (it cannot be resolved) or 'lost'
-        (Newton fails however short the step).
+        Indices of the folds, and why the curve ended: the result of visit, 'bound' (the last point
+            is on it), 'steps', 'steep' (a point cannot be resolved) or 'lost' (Newton's method
+            fails at any step length).
 
     """
     folds: list[int] = []

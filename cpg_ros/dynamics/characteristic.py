@@ -42,7 +42,7 @@ def frequencies(a: complex, b: complex) -> list[float]:
 
 
 def critical_delay(a: complex, b: complex, omega: float) -> float:
-    """Return the smallest one, ``(-arg((i omega - A)/B) mod 2 pi) / omega``."""
+    """Return the smallest critical delay, ``(-arg((i omega - A)/B) mod 2 pi) / omega``."""
     return _delay((1j * omega - a) / b, omega)
 
 
@@ -53,7 +53,7 @@ def _delay(z: complex, omega: float) -> float:
 def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, float]]:
     """Return omega > 0 and the smallest delay of every crossing, the fast ones first.
 
-    The others with the same omega have delays that are longer by multiples of 2 pi / omega.
+    Further crossings at the same omega follow at multiples of 2 pi / omega.
 
     Args:
         now: L0, shape (n, n).
@@ -96,7 +96,7 @@ FIRST = 9
 
 
 def rightmost_first(values: np.ndarray) -> np.ndarray:
-    """Sort roots by falling real part; of a pair, the one with positive imaginary part first."""
+    """Sort roots by descending real part; of a pair, positive imaginary part first."""
     return values[np.lexsort((-values.imag, -np.round(values.real, 12)))]
 
 
@@ -130,7 +130,7 @@ def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count:
 
 def roots_right_of(bound: float, now: np.ndarray, past: np.ndarray, delay: float,
                    real: bool = False) -> np.ndarray:
-    """Return all roots whose real part is above a bound, by falling real part."""
+    """Return all roots whose real part is above a bound, by descending real part."""
     count = FIRST
     while True:
         roots = characteristic_roots(now, past, delay, count, real)

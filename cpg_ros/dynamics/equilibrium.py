@@ -48,9 +48,9 @@ class NoEquilibrium(CpgError):
 
 
 class Quotient(Field[Network]):
-    """A network in which all cells are equal: a cell that is its own input, now and a delay ago.
+    """A network with all cells equal: a cell that is its own input, now and a delay ago.
 
-    The first cell's values count for parameters that each cell has of its own.
+    Of parameters that each cell has of its own, the first cell's count.
     """
 
     def __init__(self, network: Network) -> None:
@@ -85,7 +85,7 @@ class Quotient(Field[Network]):
         return next(iter(self.newton_from_all(state[None], most)), None)
 
     def newton_from_all(self, states: np.ndarray, most: int = 50) -> np.ndarray:
-        """Return the equilibria that newton reaches from states, shape (n, variables)."""
+        """Return the equilibria that Newton's method reaches from states, shape (n, variables)."""
         arrived = [states[:0]]
         sizes = np.full(len(states), np.inf)
         with np.errstate(all='ignore'):
@@ -104,7 +104,7 @@ class Quotient(Field[Network]):
 
 
 def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
-    """Return the state of the network with all cells in one state, shape (..., components)."""
+    """Return the network's state with all cells in one state, shape (..., components)."""
     return np.repeat(cell, network.cells, axis=-1)
 
 
@@ -120,9 +120,9 @@ def named(network: Network, cell: np.ndarray) -> dict[str, float]:
 
 
 def equilibria(network: Network) -> np.ndarray:
-    """Find equilibria with equal cells, states of a cell by rising first variable.
+    """Find equilibria with equal cells, states of a cell by ascending first variable.
 
-    All of them with x from -100 to 100 where the rates are linear in all variables but an x;
+    These are all with x from -100 to 100 where the rates are linear in all variables but an x;
     otherwise those that Newton's method reaches from many states.
 
     Returns:
@@ -193,8 +193,8 @@ def _scattered(n: int) -> np.ndarray:
 def equilibrium(network: Network) -> np.ndarray:
     """Find the equilibrium that continues that of the uncoupled cells, shape (variables,).
 
-    All couplings grow from 0 to their values (Buono & Golubitsky 2001, proposition 5.1). With
-    diffusive coupling it does not move; with the symmetry x -> -x it is 0.
+    All couplings grow from 0 to their values (Buono & Golubitsky 2001, proposition 5.1). Diffusive
+    coupling does not move it; with the symmetry x -> -x it is 0.
 
     Raises:
         NoEquilibrium: it ends in a fold, or the uncoupled cell has several equilibria, or none.

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Floquet multipliers of a gait: the factors by which small disturbances grow in a period.
+"""Floquet multipliers of a gait: factors by which small disturbances grow in a period.
 
 They split into those within the gait's symmetry class, 1 among them, and those transverse to it,
-which only the symmetry lock -g (I - P) x damps.
+which the symmetry lock -g (I - P) x damps.
 """
 
 from dataclasses import dataclass
@@ -40,11 +40,11 @@ VERDICTS = {True: 'stable', False: 'unstable', None: 'cannot tell'}
 
 
 def stable(modulus: float, error: float = 0.0) -> bool | None:
-    """Whether a disturbance with a multiplier decays; None if the multiplier is 1 to the error.
+    """Return whether a disturbance decays; None if its multiplier is 1 to within the error.
 
     Args:
         modulus: of the multiplier.
-        error: of the modulus; 1e-7 at least is assumed.
+        error: of the modulus; at least 1e-7 is assumed.
 
     """
     error = max(error, 1.0 - ATTRACTS)
@@ -55,14 +55,14 @@ def stable(modulus: float, error: float = 0.0) -> bool | None:
 class Multipliers(ShortRepr):
     """Floquet multipliers of an orbit over a period, largest first.
 
-    A delay gives infinitely many; those that decay to nothing are rounding errors.
+    A delay gives infinitely many; those below rounding errors are meaningless.
 
     Attributes:
         period: T in model time.
         gain: of the symmetry lock, 1/model time.
         within: in the gait's symmetry class, without the trivial one.
-        trivial: the multiplier along the orbit, 1 up to the numerical error.
-        parts: the transverse ones of each subspace that the flow keeps apart.
+        trivial: multiplier along the orbit, 1 up to the numerical error.
+        parts: transverse ones of each invariant subspace.
 
     """
 
@@ -88,22 +88,22 @@ class Multipliers(ShortRepr):
 
     @property
     def leading_within(self) -> float:
-        """Modulus of the largest in the class but the trivial one; 0 if there is none."""
+        """Largest modulus in the class except the trivial one; 0 if there is none."""
         return float(np.abs(self.within).max(initial=0.0))
 
     @property
     def leading_transverse(self) -> float:
-        """Modulus of the largest outside the class; 0 if there is none."""
+        """Largest modulus outside the class; 0 if there is none."""
         return float(np.abs(self.transverse).max(initial=0.0))
 
     @property
     def leading(self) -> float:
-        """Modulus of the largest but the trivial one."""
+        """Modulus of the largest multiplier except the trivial one."""
         return max(self.leading_within, self.leading_transverse)
 
     @property
     def unstable(self) -> int:
-        """Number of multipliers that are not inside the unit circle, without the trivial one."""
+        """Number of multipliers that are not inside the unit circle, except the trivial one."""
         return sum(int((np.abs(part) >= ATTRACTS).sum()) for part in (self.within, *self.parts))
 
     @property
@@ -144,12 +144,12 @@ def multipliers_within(orbit: Orbit) -> Multipliers:
 
 
 def by_size(values: np.ndarray) -> np.ndarray:
-    """Return multipliers by falling modulus."""
+    """Return multipliers by descending modulus."""
     return values[np.argsort(-np.abs(values), kind='stable')]
 
 
 def attracts_with(orbit: Orbit, gain: float) -> bool | None:
-    """Whether all disturbances decay with a symmetry lock, gain in 1/model time; None as above."""
+    """Return whether all disturbances decay with a lock, gain in 1/model time; None as above."""
     inside = multipliers_within(orbit)
     if not inside.attracts:
         return inside.attracts
@@ -188,8 +188,8 @@ def smallest_gain(orbit: Orbit) -> float:
 def sufficient_gain(orbit: Orbit, rate: float) -> float:
     """Return a symmetry gain with which transverse disturbances decay at a rate, 1/model time.
 
-    It is the network's own bound, which holds in any state, also during a change of gait; where
-    the network has none, it follows from the orbit's multipliers.
+    It is the network's own bound, which holds in any state, also during a change of gait; without
+    one it follows from the orbit's multipliers.
     """
     bound = orbit.network.sufficient_gain(rate)
     if bound is not None:

@@ -73,8 +73,8 @@ class NormalForm:
     def supercritical(self) -> bool:
         """Whether the orbits attract on the centre manifold: k2 < 0.
 
-        They then lie where the equilibrium is unstable. Liu & Zhang (2024), theorem 2.1, call
-        k2 < 0 stable and k1 k2 < 0 supercritical, which is the same for k1 > 0.
+        They exist where the equilibrium is unstable. Liu & Zhang (2024), theorem 2.1, call k2 < 0
+        stable and k1 k2 < 0 supercritical, which is the same for k1 > 0.
         """
         return self.k2.real < 0.0
 
@@ -86,7 +86,7 @@ class NormalForm:
         return 1 if self.k1.real * self.k2.real < 0.0 else -1
 
     def radius(self, mu: float) -> float:
-        """Return the radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
+        """Return the radius of the orbit at a parameter distance mu, ``sqrt(-k1 mu / k2)``.
 
         Raises:
             NoOrbit: there is none on this side, or the form is degenerate.
@@ -178,7 +178,7 @@ class HopfPoint(ShortRepr):
 
     @cached_property
     def normal_form(self) -> NormalForm:
-        """In model time, mu = value' - value; z belongs to q."""
+        """Normal form in model time, mu = value' - value; z belongs to q."""
         expansion, delay = self._expansion, self.network.delay
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
         unit, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
@@ -214,7 +214,7 @@ class HopfPoint(ShortRepr):
 
     @property
     def in_delays(self) -> NormalForm:
-        """In units of the delay, as in Liu & Zhang (2024).
+        """Normal form in units of the delay, as in Liu & Zhang (2024).
 
         The delay scales the time as well; z is half the amplitude of a cell's first variable.
         """
@@ -252,7 +252,7 @@ class HopfPoint(ShortRepr):
         return self.normal_form.k2.real / self.omega
 
     def but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
-        """Return a block's roots without the critical one or pair."""
+        """Return a block's roots except the critical one or pair."""
         shifts = dict(block.symmetry.shifts)
         for critical, symmetry in ((1j * self.omega, self.block.symmetry),
                                    (-1j * self.omega, power(self.block.symmetry, -1))):
@@ -269,7 +269,7 @@ class HopfPoint(ShortRepr):
 
     @property
     def leading_other(self) -> complex:
-        """The rightmost root but for the critical pair, 1/model time."""
+        """Rightmost root except the critical pair, 1/model time."""
         return complex(rightmost_first(np.concatenate([
             self.but_critical(block, block.roots(3))
             for block in blocks(self.network, self.rest)]))[0])
@@ -342,9 +342,9 @@ def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
 
 
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:
-    """Return the Hopf point at a gait's critical delay; None if it has none.
+    """Return the Hopf point at a gait's smallest critical delay, or None.
 
-    It is the smallest delay at which a pair of roots of the gait's class moves to the right.
+    There a pair of roots of the gait's class moves to the right.
 
     Args:
         network: parameters; its own delay does not matter.
@@ -395,21 +395,21 @@ SPARE = 2
 
 def hopf_points(network: Network, line: ParameterLine | str, low: float, high: float
                 ) -> list[HopfPoint]:
-    """Find all Hopf points of the equilibrium between two values of parameters, by rising value.
+    """Find all Hopf points of the equilibrium between two parameter values, in ascending order.
 
-    Values without an equilibrium are skipped. Along other lines than the delay, points closer than
+    Values without an equilibrium are skipped. Along lines other than the delay, points closer than
     (high - low)/240 are distinguished only if a pair crosses twice in the same class.
 
     Args:
         network: the other parameters.
-        line: the line of parameters, or its text: 'tau', 'alpha=-beta', or a group.
-        low: least value, in the parameter's unit.
-        high: greatest value, in the parameter's unit.
+        line: line of parameters, or its text: 'tau', 'alpha=-beta', or a group.
+        low: smallest value, in the parameter's unit.
+        high: largest value, in the parameter's unit.
 
     Raises:
         NoEquilibrium: there is none on the whole line.
-        InputError: low is not below high, no such parameter, one is not finite, the delay would be
-            negative, or the weights lack the symmetry of the network.
+        InputError: low is not below high, there is no such parameter, a parameter is not finite,
+            the delay would be negative, or the weights lack the network's symmetry.
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):

@@ -203,7 +203,7 @@ class Block(ShortRepr):
     def wave(self) -> str:
         """Direction of the wave, such as 'LF leads LH', or '' where all phases are 0 or 1/2.
 
-        Legs have the phase of their first cell in the network's first assignment.
+        A leg has the phase of its first cell in the network's first assignment.
         """
         legs = next(iter(self.network.legs.values()))
         first, *others = ((leg.upper(), cells[0] - 1) for leg, cells in legs.items())
@@ -215,12 +215,12 @@ class Block(ShortRepr):
 
     @property
     def vector(self) -> np.ndarray:
-        """The character's value for every cell, shape (cells,)."""
+        """Value of the character for every cell, shape (cells,)."""
         return character(self.symmetry)
 
     @property
     def leading(self) -> complex:
-        """The rightmost root; of a conjugate pair, one."""
+        """Rightmost root; one of a conjugate pair."""
         return complex(self.roots(1)[0])
 
     def roots(self, count: int) -> np.ndarray:
@@ -234,7 +234,7 @@ class Block(ShortRepr):
     def within(self, other: 'Block') -> bool:
         """Return whether the class lies in the fixed-point space of the K of the other's gait.
 
-        With the symmetry x -> -x, the elements with a shift of 1/2 belong to K, too.
+        With the symmetry x -> -x, elements with a shift of 1/2 belong to K, too.
         """
         own = dict(self.symmetry.shifts)
         kept = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
@@ -243,7 +243,7 @@ class Block(ShortRepr):
 
 @cache
 def character(symmetry: Symmetry) -> np.ndarray:
-    """Values of a character for the cells, powers of i without rounding errors."""
+    """Return a character's values for the cells, with exact powers of i."""
     quarters = 4.0 * symmetry.phases
     exact = np.array([1.0, 1j, -1.0, -1j])[np.round(quarters).astype(int) % 4]
     return np.where(quarters == np.round(quarters), exact, np.exp(0.5j * np.pi * quarters))
@@ -251,11 +251,10 @@ def character(symmetry: Symmetry) -> np.ndarray:
 
 @cache
 def characters(group: Group, variables: int, odd: bool) -> tuple[Symmetry, ...]:
-    """All characters of a network's group, as the symmetries of oscillations.
+    """Return all characters of a network's group, as symmetries of oscillations.
 
     Raises:
-        InputError: the group has not one element for each cell that takes the first one there,
-            or its elements do not commute.
+        InputError: the group does not act regularly on the cells, or is not abelian.
 
     """
     group.check_regular()
@@ -273,14 +272,14 @@ def block_of(expansion: Expansion, symmetry: Symmetry) -> Block:
 
     Args:
         expansion: at the equilibrium.
-        symmetry: the class's, the shifts of the whole group.
+        symmetry: of the class, the shifts of the whole group.
 
     """
     return Block(expansion.network, symmetry, *expansion.linear(character(symmetry)))
 
 
 def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
-    """Split the linearisation at an equilibrium, one block for each cell, by rising mode.
+    """Split the linearisation at an equilibrium, one block for each cell, by ascending mode.
 
     Args:
         network: parameters.
@@ -288,7 +287,7 @@ def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
 
     Raises:
         InputError: weights differ that the network's symmetry makes equal, or its group does not
-            take the first cell to each cell in exactly one way.
+            act regularly on the cells.
 
     """
     expansion = Expansion(network, np.asarray(state, dtype=float))
@@ -296,13 +295,13 @@ def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
 
 
 def block_at(network: Network, state: np.ndarray, mode: tuple[int, ...]) -> Block:
-    """Return the block of one class by its mode, as blocks has it."""
+    """Return the block of one class by its mode, as of blocks."""
     symmetry = next(symmetry for symmetry in classes(network) if symmetry.mode == mode)
     return block_of(Expansion(network, np.asarray(state, dtype=float)), symmetry)
 
 
 def classes(network: Network) -> tuple[Symmetry, ...]:
-    """Return the symmetries of the classes, as blocks has them; it raises the same."""
+    """Return the symmetries of the classes; order and errors as of blocks."""
     symmetry = network.symmetry(network.gaits()[0])
     split = characters(symmetry.group, network.variables, symmetry.odd)
     broken = network.broken(split[0])

@@ -67,14 +67,14 @@ SAME = 1e-4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orbit(ShortRepr, ABC):
-    """A gait of a network: its waveforms, its period, and the phase of each cell.
+    """A gait of a network: waveforms, period, and phase of each cell.
 
-    Called with times it returns states, so it serves as a history for the simulation. Cell i's
+    Called with times it returns states, so it serves as a history for simulations. Cell i's
     variable q is ``u_{w,q}(t/T + phi_i)``, w its wave, phi_i its phase; at phase zero the first
     variable of cell 1 peaks.
 
     Attributes:
-        network: the parameters for which it solves the equations.
+        network: parameters.
         symmetry: of the gait; gives waves and phases of the cells.
         period: T in model time.
 
@@ -134,13 +134,13 @@ class Orbit(ShortRepr, ABC):
 
     @property
     def leg_phases(self) -> dict[str, float]:
-        """Leg -> cycles by which its first cell is ahead of cell 1, from 0 to 1."""
+        """Leg -> lead of its first cell on cell 1, cycles, from 0 to 1."""
         legs = next(iter(self.network.legs.values()))
         return {leg: float(self.phases[cells[0] - 1]) for leg, cells in legs.items()}
 
     @property
     def waves(self) -> np.ndarray:
-        """Number of each cell's waveform, from 0, shape (cells,)."""
+        """Waveform of each cell, from 0, shape (cells,)."""
         return self.symmetry.waves
 
     @cached_property
@@ -164,7 +164,7 @@ class Orbit(ShortRepr, ABC):
 
     @property
     def peak(self) -> float:
-        """The largest value of cell 1."""
+        """Largest value of cell 1."""
         return float(self.levels[0, 0].sum())
 
     def of_cells(self, times: np.ndarray, waveform: Waveforms) -> np.ndarray:
@@ -183,15 +183,15 @@ class Orbit(ShortRepr, ABC):
             theta, order, wave, variable))
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
-        """All states at model times, cell 1 peaking at 0; shape times.shape + (components,)."""
+        """Return all states at model times, cell 1 peaking at 0; times.shape + (components,)."""
         return self._states(times, 0)
 
     def cycle(self, points: int) -> np.ndarray:
-        """States at even times of a cycle from cell 1's peak on, shape (points, components)."""
+        """Return states at even times of a cycle from cell 1's peak, (points, components)."""
         return self(np.arange(points) / points * self.period)
 
     def derivative(self, times: np.ndarray) -> np.ndarray:
-        """Slopes of all states, per model time; shape times.shape + (components,)."""
+        """Return slopes of all states, per model time; shape times.shape + (components,)."""
         return self._states(times, 1) / self.period
 
 
@@ -217,10 +217,10 @@ def check_values(network: Network, gait: str) -> None:
 
 
 def extra_symmetry(orbit: Orbit) -> str:
-    """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
+    """Name a symmetry that an orbit has beyond its gait's, or ''.
 
-    The equations of a gait also hold for orbits with more symmetry, such as a walk for a skip,
-    whose two waveforms then agree, and for several revolutions of an orbit.
+    The equations of a gait also hold for orbits with more symmetry, such as a walk in place of a
+    skip, and for several revolutions of an orbit.
     """
     # A multiple of the denominator of every possible shift.
     points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
@@ -240,9 +240,9 @@ def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
 
     Args:
         symmetry: of the cycle.
-        x: the cells' first variable at even times of a cycle, shape (points, cells), the number of
-            points a multiple of the group's exponent.
-        same: difference of equal signals, over the range of all.
+        x: first variable of the cells at even times of a cycle, shape (points, cells), points a
+            multiple of the group's exponent.
+        same: largest difference of equal signals, over the range of all.
 
     """
     most = same * np.ptp(x)

@@ -34,13 +34,13 @@ import numpy as np
 class PhaseResponse(ShortRepr):
     """The infinitesimal phase response curves of an orbit.
 
-    Called with times it gives the cycles by which a unit of each variable, added to it at once,
-    advances the phase.
+    Called with times it returns the cycles by which a unit impulse of each variable advances the
+    phase.
 
     Attributes:
-        orbit: whose phase is shifted.
-        waveform: the curve of a wave and a variable over theta in cycles, as an orbit's waveforms:
-            cell i's is that of its wave at ``t/T + phi_i``.
+        orbit: the orbit.
+        waveform: curve of a wave and a variable over theta in cycles; cell i has that of its wave
+            at ``t/T + phi_i``.
 
     """
 
@@ -91,8 +91,8 @@ def locking(response: PhaseResponse, periods: int = 1) -> np.ndarray:
         periods: of the input in a cycle of the gait.
 
     Returns:
-        How far the gait's frequency follows, in cycles per model time, for an input of amplitude 1
-        to the rate of each variable, shape (cells, variables); proportional to the amplitude.
+        Range of the gait's frequency, cycles per model time, for an input of amplitude 1 to the
+            rate of each variable, shape (cells, variables); proportional to the amplitude.
 
     """
     if not 1 <= periods < POINTS // 2:
@@ -102,7 +102,7 @@ def locking(response: PhaseResponse, periods: int = 1) -> np.ndarray:
 
 
 def phase_diffusion(response: PhaseResponse, noise: float) -> float:
-    """Return the coefficient D by which weak white noise makes the phase diffuse.
+    """Return the phase diffusion coefficient D of a gait under weak white noise.
 
     Args:
         response: of the gait.
@@ -110,7 +110,7 @@ def phase_diffusion(response: PhaseResponse, noise: float) -> float:
             as of ``simulate``.
 
     Returns:
-        Half the rate at which the phase's variance grows, in cycles squared per model time.
+        Half the rate at which the phase's variance grows, cycles squared per model time.
 
     """
     return float(0.5 * noise**2 * (_over_a_cycle(response)**2).sum(axis=(1, 2)).mean())

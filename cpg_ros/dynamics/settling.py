@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Limit cycles that simulations settle on, of a free network or locked to a symmetry."""
+"""Limit cycles on which simulations settle, of a free network or one locked to a symmetry."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -42,15 +42,15 @@ RETURNED = 0.1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LimitCycle(ShortRepr):
-    """The final cycle of a simulation.
+    """Final cycle of a simulation.
 
     Attributes:
         run: the simulation.
         begin: time of cell 1's last peak but one, model time.
         period: in model time.
         signals: mean of the last cycles at even points, shape (POINTS, components).
-        drift: largest difference between states whole periods apart, over the range of the
-            states; infinite for fewer than three states.
+        drift: largest difference between states whole periods apart, over the range of the states;
+            infinite for fewer than three states.
 
     """
 
@@ -61,15 +61,15 @@ class LimitCycle(ShortRepr):
     drift: float
 
     def __call__(self, theta: np.ndarray) -> np.ndarray:
-        """States at times in cycles after that peak, 0 to 1, shape (m, components)."""
+        """Return states at times in cycles after that peak, 0 to 1, shape (m, components)."""
         return self.run(self.begin + theta * self.period)
 
 
 def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarray:
     """Start every network near the gait's pattern on a typical cycle, with the same disturbance.
 
-    Only gaits that attract survive it. A second waveform starts smaller than the first and at a
-    random phase.
+    Only attracting gaits persist. A second waveform starts smaller than the first and at a random
+    phase.
 
     Returns:
         States, shape (networks, components).
@@ -90,7 +90,7 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
 
 
 def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajectory:
-    """Simulate networks from a start each, all at once, on all cores."""
+    """Simulate networks from one start each, in one batch on all cores."""
     step = COARSE_STEPS * networks[0].step
     return simulate(networks, starts, SPAN, step, every=max(1, round(KEPT_FRACTION / step)),
                     progress=False)
@@ -98,7 +98,7 @@ def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajector
 
 def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = ALIVE
                ) -> LimitCycle | None:
-    """Find a simulation's cycle; None if it rests, runs away or does not repeat.
+    """Find a simulation's cycle; None if it rests, diverges or does not repeat.
 
     A cycle begins where the cell with the largest range crosses its middle upwards, at a similar
     state of the whole network.
@@ -185,7 +185,7 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
            ) -> LimitCycle | None:
     """Simulate from a state, locked to a symmetry, and return the final cycle.
 
-    None if the network comes to rest or does not repeat within three periods.
+    Return None if the network comes to rest or does not repeat within three periods.
     """
     step = min(network.step, period / 400.0)
     lock = HOLD, symmetry
@@ -203,7 +203,7 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
 
 
 def _ends(run: Trajectory, first: int) -> bool:
-    """Whether the network rests after a step, or has diverged."""
+    """Return whether the network rests after a step, or has diverged."""
     return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
 
 
@@ -223,14 +223,13 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
 
 def find_orbit(network: Network, gait: str, random: int = RANDOM,
                longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
-    """Yield the cycles with a gait's symmetry that the network settles on in the gait's class.
+    """Yield the cycles with a gait's symmetry on which the network settles in the gait's class.
 
     Args:
         network: parameters.
         gait: one of its gaits.
-        random: number of states at random, besides the waves.
-        longer: whether to continue runs that have not settled, as slow relaxation oscillations
-            need.
+        random: number of random states, besides the waves.
+        longer: continue runs that have not settled, as slow relaxation oscillations need.
 
     Yields:
         States over cycles, and the period in model time.

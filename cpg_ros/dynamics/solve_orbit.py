@@ -12,15 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Solving for the orbits of a gait: from a preset, an orbit nearby, on branches, or all of them.
+"""Solution for the orbits of a gait: from a preset, from an orbit nearby, on branches, or all.
 
 A gait may have several orbits, and the network need not settle on the one that Newton's method
 reaches first. Simulations in the gait's symmetry class settle on orbits that attract in it;
-unstable ones lie on the branches of the class's Hopf points, or follow from deflation.
+unstable ones are on the branches of the class's Hopf points, or follow from deflation.
 
 With a delay one branch gives many orbits: an orbit of period T at a delay is an orbit at the delay
-plus any whole number of periods (Yanchuk & Perlikowski 2009, Phys. Rev. E 79, 046221). So only the
-first Hopf point of each frequency is followed.
+plus any whole number of periods (Yanchuk & Perlikowski 2009, Phys. Rev. E 79, 046221). Therefore
+only the first Hopf point of each frequency is followed.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -134,17 +134,18 @@ def _crossings(network: Network, branch: Branch, value: float, periods: int) -> 
 def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit:
     """Solve for one orbit of the gait, with exact derivatives by every parameter.
 
-    A gait may have several: ``coexisting_orbits`` finds them and which of them attract.
+    A gait may have several; ``coexisting_orbits`` finds them and tells which attract.
 
     Args:
         network: parameters.
         gait: one of the network's gaits.
-        near: an orbit of that gait of the same kind of network to start from; by default, where
-            the network has no delay, that of the shipped preset.
+        near: an orbit of that gait of the same kind of network to start from; without a delay, by
+            default that of the shipped preset.
 
     Raises:
-        InputError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoOrbit: this set has no such orbit, or none was found; the message gives the reason.
+        InputError: an unknown gait, parameters that are not finite, or a delay that is not
+            positive.
+        NoOrbit: there is no such orbit, or none was found; the message gives the reason.
 
     """
     preset = network.presets().get(gait)
@@ -197,15 +198,15 @@ def _from_hopf_point(network: Network, gait: str, error: NoOrbit) -> Orbit:
 def solve_from_path(network: Network, symmetry: Symmetry,
                     path: Callable[[np.ndarray], np.ndarray], period: float,
                     periods: Sequence[float] = ()) -> Orbit | None:
-    """Solve for an orbit from a guess; None where Newton's method leads to none.
+    """Solve for an orbit from a guess; None where Newton's method finds none.
 
     Args:
         network: parameters.
         symmetry: of the gait.
-        path: states, shape (m, components), as a function of times in cycles, shape (m,), that
-            begin where cell 1 peaks.
-        period: in model time.
-        periods: periods, model time, of orbits that Newton's method is to be kept off.
+        path: states, shape (m, components), as a function of times in cycles, shape (m,), from
+            cell 1's peak.
+        period: guess, model time.
+        periods: of orbits to keep away from, model time.
 
     """
     orbit: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period,
@@ -232,14 +233,14 @@ COMPARED = 120
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CoexistingOrbits(ShortRepr):
-    """The orbits of a gait at one parameter set.
+    """Orbits of a gait at one parameter set.
 
     Attributes:
         gait: one of the network's.
-        orbits: those that attract within the gait's class first, sorted by the distance of their
-            period from the given orbit's.
-        starts: number of states in the gait's class from which simulations were run.
-        hopf_points: number of Hopf points of its class whose branches were followed.
+        orbits: those that attract within the gait's class first, by the distance of their period
+            from the given orbit's.
+        starts: number of simulated states in the gait's class.
+        hopf_points: number of Hopf points of the class whose branches were followed.
         deflated: whether Newton's method was deflated about the orbits.
 
     """
@@ -252,7 +253,7 @@ class CoexistingOrbits(ShortRepr):
 
     @property
     def searched(self) -> str:
-        """The extent of the search, as 'searched from 15 starts and 2 Hopf points', or ''."""
+        """Extent of the search, such as 'searched from 15 starts and 2 Hopf points', or ''."""
         counts = [f'{count} {what}{"" if count == 1 else "s"}' for count, what in (
             (self.starts, 'start'), (self.hopf_points, 'Hopf point')) if count]
         deflated = ', and by deflation' if self.deflated and self.orbits else ''
@@ -265,7 +266,7 @@ class CoexistingOrbits(ShortRepr):
 
 def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
                       starts: bool = True, everything: bool = True) -> CoexistingOrbits:
-    """Find the orbits that a gait has at one parameter set.
+    """Find the orbits of a gait at one parameter set.
 
     If the first orbit does not attract within its class, all searches run, except that branches
     without a delay are followed on request only.
@@ -279,9 +280,10 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
             Hopf points and deflate Newton's method about each orbit.
 
     Raises:
-        InputError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoEquilibrium: a gait without a known start, of a network without equilibrium.
-        NoOrbit: there is none; the message says from how many starts and Hopf points.
+        InputError: an unknown gait, parameters that are not finite, or a delay that is not
+            positive.
+        NoEquilibrium: the gait has no known start, and the network no equilibrium.
+        NoOrbit: there is none; the message gives the number of starts and Hopf points.
 
     """
     check_values(network, gait)
@@ -405,7 +407,7 @@ def _same(orbit: Orbit, other: Orbit) -> bool:
 
 
 def _near(path: Path, period: float, orbit: Orbit) -> bool:
-    """Whether the cycle of a simulation is an orbit that has been solved for."""
+    """Return whether the cycle of a simulation is an orbit that is known."""
     if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
         return False
     exact, states = orbit.cycle(COMPARED), path(np.arange(COMPARED) / COMPARED)

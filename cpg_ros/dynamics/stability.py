@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The gaits of a parameter set: existence, amplitude, period and stability.
+"""Gaits of a parameter set: existence, amplitude, period and stability.
 
-Where there is none, ``nearest_threshold`` names the threshold of the nearest one.
+Where there is none, ``nearest_threshold`` names the nearest threshold.
 """
 
 from collections.abc import Callable
@@ -53,7 +53,7 @@ class Stability:
 
 
 def stability(orbit: Orbit) -> Stability:
-    """Judge an orbit by its multipliers; the network's own bound gives the gain, if it has one."""
+    """Judge an orbit by its multipliers; the gain follows from the network's own bound, if any."""
     bound = orbit.network.sufficient_gain(RATE)
     if bound is None:
         enough, gain = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
@@ -76,10 +76,10 @@ class GaitAssessment(ShortRepr):
 
     Attributes:
         gait: one of the network's gaits.
-        orbit: its orbit, or None; of several, one that attracts within the gait's class if any
-            does, nearest in period to that of the preset.
+        orbit: of the gait, or None; of several, one that attracts within the gait's class if any
+            does, nearest in period to the preset's.
         why: reason why there is none, or ''.
-        others: the same for each coexisting orbit of the gait.
+        others: assessments of coexisting orbits.
         searched: extent of the search for others, or ''.
 
     """
@@ -92,12 +92,12 @@ class GaitAssessment(ShortRepr):
 
     @property
     def orbits(self) -> tuple['GaitAssessment', ...]:
-        """Itself and the others; none where there is no orbit."""
+        """This assessment and the others; empty where there is no orbit."""
         return () if self.orbit is None else (self, *self.others)
 
     @property
     def known_orbit(self) -> Orbit:
-        """The orbit of a gait that exists; NoOrbit otherwise."""
+        """Orbit of a gait that exists; NoOrbit otherwise."""
         if self.orbit is None:
             raise NoOrbit(f'there is no {self.gait}: {self.why}')
         return self.orbit
@@ -132,16 +132,16 @@ class GaitAssessment(ShortRepr):
 
     @cached_property
     def default_gain(self) -> float:
-        """The gain the generator would choose, 1/model time."""
+        """Gain that the generator selects, 1/model time."""
         return sufficient_gain(self.known_orbit, RATE)
 
     @cached_property
     def stable_with_default_gain(self) -> bool | None:
-        """Whether the gait attracts with the gain the generator would choose; None as above."""
+        """Whether the gait attracts with the generator's gain; None as above."""
         return floquet.attracts_with(self.known_orbit, self.default_gain)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything in plain types, for JSON."""
+        """Return everything in plain types, for JSON."""
         if self.orbit is None:
             return {'exists': False, 'why': self.why}
         return {'exists': True, 'period': self.orbit.period, 'amplitude': self.amplitude,
@@ -160,16 +160,16 @@ def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
     """Judge every gait of a network by all of its orbits.
 
     If the first orbit is not stable, simulations from starts in the gait's class look for others;
-    if none attracts in the class, deflation and, with a delay, branches do so, too.
+    if none attracts in the class, deflation and, with a delay, branches follow.
 
     Args:
         network: parameters, all finite.
-        done: called with the number of gaits that are done.
+        done: called with the number of finished gaits.
         near: orbit of one of the gaits, from which that gait is solved for.
         everything: look for all orbits of every gait.
 
     Raises:
-        InputError: a parameter that is not finite, or a delay that is not positive.
+        InputError: a parameter is not finite, or a delay is not positive.
 
     """
     assessments = {}
@@ -195,7 +195,7 @@ def _assessed(orbits: CoexistingOrbits) -> GaitAssessment:
 
 
 def nearest_threshold(network: Network) -> str:
-    """Name the threshold of the nearest gait, of a network with a delay that has no gait.
+    """Name the nearest threshold, for a network with a delay that has no gait.
 
     It is the nearest critical delay above the delay or, if there is none, the least coupling.
     """

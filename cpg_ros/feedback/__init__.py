@@ -15,7 +15,7 @@
 """Feedback from sensors to the pattern: kinematics, estimate, laws and the efference copy.
 
 Arrays have a leading axis of robots, of length 1 for a single robot. Imports ``motion`` and the
-rooms below it; knows nothing of ROS and of no physics engine.
+rooms below it; knows nothing of ROS or of a physics engine.
 """
 
 __all__ = ['biped', 'by_address', 'closed_loop', 'efference_copy', 'estimate', 'feedback',

@@ -42,9 +42,9 @@ import numpy as np
 
 #: FURTHEST: largest difference between wanted and measured heading, rad.
 FURTHEST = 0.5
-#: DIES_OUT: time at a fraction of 0 after which all displacements have decayed, s.
+#: DIES_OUT: time at a share of 0 after which all displacements have decayed, s.
 DIES_OUT = 0.3
-#: AGREES: least mean fraction of legs whose contacts agree with the gait.
+#: AGREES: least mean share of legs whose contacts agree with the gait.
 AGREES = 0.5
 #: FLIGHT: longest time for which all feet may be unloaded, s.
 FLIGHT = 0.3
@@ -172,14 +172,14 @@ def take_in(senses, sensors, legs, now, moving):
 
 
 #: Indices of a loop's state. WANTED: whether feedback is requested; SPENT: time for which its
-#: fraction has been 0, s; FRACTION: that fraction; WAY, GOOD_FOR: see fade; AGREEMENT: mean
-#: fraction of legs whose contacts agree with the gait; OUT: number of inputs that are out; MOUNT:
-#: index of the IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts disagree; CLOSED:
-#: whether feedback acts. STATE is the number of these.
+#: share has been 0, s; FRACTION: that share; WAY, GOOD_FOR: see fade; AGREEMENT: mean share of
+#: legs whose contacts agree with the gait; OUT: number of inputs that are out; MOUNT: index of the
+#: IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts disagree; CLOSED: whether feedback
+#: acts. STATE is the number of these.
 (WANTED, SPENT, FRACTION, WAY, GOOD_FOR, AGREEMENT, OUT, MOUNT, CONTRARY, CLOSED,
  STATE) = range(11)
 #: Indices of an instant. DT: length of the tick, s; NOW: time, s; LEVEL: of the ramp, 0 to 1;
-#: PHASE: cycles; MIX: fraction of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
+#: PHASE: cycles; MIX: share of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
 #: whether the gait changes; ROLL, and pitch and yaw behind it: of the body against its feet, rad.
 DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES, ROLL = range(8)
 

@@ -14,7 +14,7 @@
 
 """Efference copy: the body's own motion in a gait, by stride phase and speed.
 
-Only what differs from it is fed back. The term is von Holst and Mittelstaedt's (1950).
+The feedback acts on deviations from it. The term is von Holst and Mittelstaedt's (1950).
 """
 
 from dataclasses import dataclass
@@ -28,17 +28,17 @@ import numpy as np
 # Linear interpolation in tables: periodic ones over the stride, and ones over rising speeds.
 
 def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """Interpolate values given at even phases of a cycle, from 0 on, at phases in cycles."""
+    """Interpolate values at even phases of a cycle, from 0, at phases in cycles."""
     grid = np.arange(values.size + 1) / values.size
     return np.interp(phase % 1.0, grid, np.append(values, values[0]))
 
 
 @jit
 def between_phases(phase, points):
-    """Return the points of a cycle on either side of a place, and the fraction of the second.
+    """Return the points of a cycle around a phase, and the fraction of the second.
 
     Args:
-        phase: in points, from 0 on.
+        phase: in points, from 0.
         points: number of points in the cycle.
 
     """
@@ -48,12 +48,12 @@ def between_phases(phase, points):
 
 @jit
 def between_speeds(speeds, speed):
-    """Return the rows of a table on either side of a speed, and the fraction of the second.
+    """Return the rows of a table around a speed, and the fraction of the second.
 
     Beyond the table, the nearest end counts.
 
     Args:
-        speeds: of the rows, m/s, rising, shape (rows,).
+        speeds: of the rows, m/s, ascending, shape (rows,).
         speed: m/s.
 
     """
@@ -74,7 +74,7 @@ class EfferenceCopy:
     """Expected motion of the base.
 
     Attributes:
-        speeds: at which it was measured, m/s, rising, shape (speeds,), at most SPEEDS.
+        speeds: at which it was measured, m/s, ascending, shape (speeds,), at most SPEEDS.
         table: shape (speeds, BINS, SIGNALS).
 
     """
@@ -84,19 +84,19 @@ class EfferenceCopy:
 
     @classmethod
     def blank(cls) -> 'EfferenceCopy':
-        """Return a copy that expects nothing but the wanted speed."""
+        """Return a copy that expects only the wanted speed."""
         table = np.zeros((2, BINS, SIGNALS))
         table[:, :, 0] = [[-10.0], [10.0]]
         return cls(np.array([-10.0, 10.0]), table)
 
     @classmethod
     def of(cls, table: EfferenceTable) -> 'EfferenceCopy':
-        """Return the copy that a robot file's table states."""
+        """Return the copy for a robot file's table."""
         return cls(np.array(table.speeds),
                    np.stack([table.rows[key] for key in body_file.SIGNALS], axis=-1))
 
     def as_table(self) -> EfferenceTable:
-        """Return it as a robot file has it."""
+        """Return the table for a robot file."""
         return EfferenceTable(tuple(self.speeds.round(4).tolist()), {
             key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
             for k, key in enumerate(body_file.SIGNALS)})

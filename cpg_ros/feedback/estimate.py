@@ -80,8 +80,8 @@ def loads_of(rows, columns, angles, efforts, roll, pitch, out):
         out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
 
 
-#: TOUCH: fraction of the weight above which a foot is on the ground; LEAVE: fraction below which
-#: it is in the air again.
+#: TOUCH: share of the weight above which a foot is on the ground; LEAVE: share below which it is
+#: in the air again.
 TOUCH, LEAVE = 0.10, 0.04
 #: PULL: time constant, s, with which a leg that bears the whole weight corrects the velocity.
 PULL = 0.02
@@ -232,14 +232,14 @@ class BodyState:
 
 # All but STATES are standard deviations or intensities of noise.
 #: Slow velocity error, measured on a simulated Go2 that trots, walks, turns and is pushed.
-#: STILL: its size at rest, m/s; SHARE: as a fraction of the speed; SLOWLY: correlation time, s.
+#: STILL: its size at rest, m/s; SHARE: as a share of the speed; SLOWLY: correlation time, s.
 STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
 #: SCALE: constant relative error of the velocity of a robot whose odometry was not calibrated.
 SCALE = 0.05
 #: White noise. PLACE: of the position, m/sqrt(s); HEADING: of the heading, rad/sqrt(s), at which
 #: an IMU drifts by half a degree in a minute.
 PLACE, HEADING = 0.001, 0.001
-#: LEVEL: slope of the ground, as a fraction of the distance covered.
+#: LEVEL: slope of the ground, as a share of the distance covered.
 LEVEL = 0.05
 #: HEIGHT: height above level ground, m.
 HEIGHT = 0.01
@@ -303,7 +303,7 @@ class Odometry:
     Attributes:
         pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
         covariance: of x, y, heading, the slow velocity error forward and to the left, and the
-            fraction by which velocities are wrong, in m, rad and m/s, shape (6, 6).
+            share by which velocities are wrong, in m, rad and m/s, shape (6, 6).
         twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The feedback of robots: from sensor data to corrected angles, strides and frequency."""
+"""Feedback of robots: from sensor data to corrected angles, strides and frequency."""
 
 from collections.abc import Callable
 
@@ -28,20 +28,20 @@ import numpy as np
 
 
 class Feedback:
-    """The feedback of as many robots of one kind as there are runs; a tick allocates nothing.
+    """Feedback of robots of one kind, one for each run; a tick allocates nothing.
 
     Attributes:
         geometry: of the legs.
         gains: of the laws; may be replaced between ticks.
         memory: state and output of the laws.
-        tables: of the gaits that it has learnt.
-        angles: the last corrected ones, rad, shape (runs, joints).
+        tables: of the learnt gaits.
+        angles: last corrected ones, rad, shape (runs, joints).
 
     """
 
     def __init__(self, geometry: Geometry, gains: Gains | None = None, runs: int = 1,
                  joints: int | None = None) -> None:
-        """Prepare; gaits have to be learnt before they are entered."""
+        """Prepare; each gait must be learnt before it is entered."""
         legs = len(geometry.hips)
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
@@ -55,8 +55,8 @@ class Feedback:
     def learn(self, plan: GaitPlan, expected: EfferenceCopy | None = None) -> int:
         """Add a gait to the tables; return its slot.
 
-        It replaces the oldest where there is no room. Without an efference copy, and without one
-        in the robot file, nothing but the gait's speed is expected.
+        It replaces the oldest if there is no room. Without an efference copy, also in the robot
+        file, only the gait's speed is expected.
         """
         if expected is None and plan.motion.efference is not None:
             expected = EfferenceCopy.of(plan.motion.efference)
@@ -68,14 +68,14 @@ class Feedback:
         return slot
 
     def slot(self, plan: GaitPlan) -> int:
-        """Return the slot of a gait; one that is new is learnt without an efference copy."""
+        """Return the slot of a gait; learn a new one without an efference copy."""
         for k, plan_of_slot in enumerate(self._programs):
             if plan_of_slot is plan:
                 return k
         return self.learn(plan)
 
     def reset(self) -> None:
-        """Start again from an empty memory."""
+        """Restart with an empty memory."""
         for part, blank in zip(self.memory, Memory.empty(*self.memory.contact.shape),
                                strict=True):
             part[...] = blank
@@ -83,18 +83,18 @@ class Feedback:
     def advance(self, sensors: SensorData, planned: PlannedMotion, dt: float,
                 fraction: float = 1.0,
                 level: float = 1.0, delay: float = 0.0) -> np.ndarray:
-        """Return the corrected angles, rad, shape (runs, joints), which no limit holds yet.
+        """Return the corrected angles, rad, shape (runs, joints), before any limits.
 
         Args:
             sensors: present measurements.
-            planned: what the pattern plans for now.
-            dt: since the last time, s.
+            planned: present plan of the pattern.
+            dt: since the last tick, s.
             fraction: of all corrections, 0 to 1.
             level: of the pattern: 0 at the stand, 1 in the full gait.
             delay: age of the measured angles, s.
 
         Raises:
-            InputError: the gains are new, and one is outside its limits.
+            InputError: a new gain is outside its limits.
 
         """
         # A plain tuple, which is made faster than a named one.

@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The feedback laws of quadrupeds: their list, gains and memory; gains for robots of any size.
+"""Feedback laws of quadrupeds: list, gains and memory; gains for robots of any size.
 
-Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983):
-as gravity is the same, lengths go with the length l of the legs, and times with sqrt(l/g). Forces
-are fractions of the weight in all laws of a quadruped, so mass does not matter there; a biped's
-gains are proportional to it. The unit of a gain determines how it scales. The usual gains were
-found on a Unitree Go2.
+Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983): as
+gravity is the same, lengths scale with the leg length l, and times with sqrt(l/g). Forces are
+fractions of the weight in all laws of a quadruped, so mass does not matter there; a biped's gains
+are proportional to it. The unit of a gain determines how it scales. The default gains were found
+on a Unitree Go2.
 """
 
 from collections.abc import Sequence
@@ -52,9 +52,9 @@ _Fields: Any = named_tuple('Gains', _DEFAULTS, _DEFAULTS.values())
 
 
 class Gains(_Fields):  # type: ignore[misc]
-    """Which laws are on, and their gains in SI units.
+    """Switches of the laws, and their gains in SI units.
 
-    The fields are the switches of LAWS by their names, then GAINS.
+    The fields are the switches of LAWS by name, then GAINS.
     """
 
     __slots__ = ()
@@ -95,7 +95,7 @@ _MemoryFields: Any = named_tuple('Memory', [*VARIABLES, *SCRATCH])
 
 
 class Memory(_MemoryFields):  # type: ignore[misc]
-    """Arrays of VARIABLES, whose first axis is that of the runs, and of SCRATCH."""
+    """Arrays of VARIABLES, whose first axis is the run, and of SCRATCH."""
 
     __slots__ = ()
 
@@ -122,7 +122,7 @@ DIGITS = 3
 
 
 def leg_length(geometry: Geometry) -> float:
-    """Return the mean length of the outstretched legs, m; that of a Go2 for no legs.
+    """Return the mean length of the outstretched legs, m; a Go2's for no legs.
 
     Unlike the height of the stand, it does not depend on how far a file bends the knees.
     """
@@ -143,7 +143,7 @@ def _powers(unit: str) -> tuple[int, ...]:
 
 
 def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
-    """Return the value of a dimensionless gain of 1 in its unit, such as sqrt(g l) for 'm/s'.
+    """Return the value in a unit of a dimensionless gain of 1, such as sqrt(g l) for 'm/s'.
 
     Args:
         unit: of the gain.
@@ -156,7 +156,7 @@ def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
 
 
 def scaled_gains(length: float) -> Gains:
-    """Return the usual gains for legs of a length, m, held to their limits."""
+    """Return the default gains for legs of a length, m, within their limits."""
     result = {}
     for name, gain in GAINS.items():
         ratio = scale_of(gain.unit, length) / scale_of(gain.unit, LENGTH)
@@ -167,16 +167,16 @@ def scaled_gains(length: float) -> Gains:
 
 
 def dimensionless(gains: Gains, length: float) -> dict[str, float]:
-    """Return gains by name as a robot file has them; length of the legs, m."""
+    """Return gains by name as in a robot file; length of the legs, m."""
     return {name: float(f'{getattr(gains, name) / scale_of(gain.unit, length):.{DIGITS + 1}g}')
             for name, gain in GAINS.items()}
 
 
 def robot_gains(robot: Robot) -> Gains:
-    """Return a robot's gains: the usual ones for legs of its length, and its file's own.
+    """Return a robot's gains: defaults for the length of its legs, and those of its file.
 
     Raises:
-        InputError: the file names a law or a gain that does not exist, or one beyond its limits.
+        InputError: the file names an unknown law or gain, or a gain beyond its limits.
 
     """
     if robot.geometry is None:

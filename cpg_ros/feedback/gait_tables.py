@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tables of the gaits that the feedback corrects, in arrays that are filled once."""
+"""Tables of the gaits that the feedback corrects, in preallocated arrays."""
 
 import ctypes
 import itertools
@@ -40,15 +40,14 @@ class Timetable:
     Attributes:
         angles: from the stand at full strides, rad, shape (POINTS, joints).
         in_place: the same at strides of length 0.
-        swinging: whether each leg is meant to, shape (POINTS, legs).
-        progress: fraction of that swing, or else of its stance, that is over, shape (POINTS,
-            legs).
+        swinging: whether each leg should swing, shape (POINTS, legs).
+        progress: completed fraction of that swing or stance, shape (POINTS, legs).
         hops: whether the left and right leg of each pair swing together.
 
     """
 
     def __init__(self, plan: GaitPlan, geometry: Geometry) -> None:
-        """Tabulate a gait: a leg swings while its foot goes forward relative to the body."""
+        """Tabulate a gait: a leg swings while its foot moves forward relative to the body."""
         robot, theta = plan.robot, np.arange(POINTS) / POINTS
         phases = theta[:, None] - plan.readout.start + plan.orbit.phases[robot.cells]
         self.angles, self.in_place = (
@@ -75,7 +74,7 @@ def _paired(robot: Robot, leg: str, other: str) -> bool:
 
 
 def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the swing from the foot furthest back to the foot furthest ahead, if it moves."""
+    """Find the swing from the rearmost to the foremost position of a foot, if it moves."""
     lift, land = int(x.argmin()), int(x.argmax())
     swing = (land - lift) % x.size
     if np.ptp(x) < 1e-9:
@@ -93,20 +92,20 @@ class GaitTables(NamedTuple):
     """Tables of several gaits; the first axis is the gait's slot.
 
     Attributes:
-        swinging: whether each leg is meant to, shape (SLOTS, POINTS, legs).
-        progress: fraction of that swing, or else of its stance, that is over, the same.
+        swinging: whether each leg should swing, shape (SLOTS, POINTS, legs).
+        progress: completed fraction of that swing or stance, the same.
         duty: fraction of the stride that each leg stands, shape (SLOTS, legs).
-        one_by_one: 1 where, for most of the stride, at most one leg swings, else 0, the same.
+        one_by_one: 1 where for most of the stride at most one leg swings, else 0, the same.
         alternates: 1 where left and right legs alternate, 0 where they hop, shape (SLOTS,).
         speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
         expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
         steered: whether strides can be changed, shape (SLOTS,).
         at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
-        turn: rad/s of yaw for each unit by which right strides exceed left ones, the same.
-        sides: -1/2 of left legs and 1/2 of right ones, shape (legs,); 0 before a gait that can
-            be steered is known.
+        turn: yaw rate, rad/s, for each unit by which right strides exceed left ones, the same.
+        sides: -1/2 for left legs and 1/2 for right ones, shape (legs,); 0 until a gait with
+            steering is known.
         copied: whether the robot file has an efference copy of the gait, shape (SLOTS,).
-        keys: addresses of the gaits as the core has them, shape (SLOTS,).
+        keys: addresses of the gaits in the core, shape (SLOTS,).
 
     """
 
@@ -126,7 +125,7 @@ class GaitTables(NamedTuple):
 
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
-        """Return tables in which all slots are empty."""
+        """Return tables with empty slots."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
                    np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
@@ -139,7 +138,7 @@ class GaitTables(NamedTuple):
         """Fill the slot of a gait.
 
         Raises:
-            InputError: its tables have more rows than there is room for.
+            InputError: its tables have more rows than fit.
 
         """
         self.swinging[slot], self.progress[slot] = timetable.swinging, timetable.progress

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Plausibility of sensor messages: each is checked before the feedback uses it.
+"""Plausibility checks of sensor messages before the feedback uses them.
 
-Rules of thumb for legged robots. A value that is far too large counts as a fault only if it lasts
-longer than a stumble does.
+They are rules of thumb for legged robots. A value that is far too large counts as a fault only if
+it lasts longer than a stumble.
 """
 
 import math
@@ -58,10 +58,10 @@ def note(monitor, now, stamp, same, verdict, patience):
     Args:
         monitor: numbers of an input, see above.
         now: s.
-        stamp: of the message, the same clock's, s; NaN if it has none.
-        same: whether its numbers are those of the last one.
-        verdict: on them, an index into VERDICTS.
-        patience: longest time for which the same numbers may come again, s.
+        stamp: of the message, on the same clock, s; nan if it has none.
+        same: whether its numbers equal those of the last one.
+        verdict: on the numbers, an index into VERDICTS.
+        patience: longest time for which the same numbers may repeat, s.
 
     """
     monitor[CAME] = now
@@ -78,9 +78,9 @@ def note(monitor, now, stamp, same, verdict, patience):
 
 @jit
 def is_out(monitor, now, peaks):
-    """Update the low-passed age of the measurements, s; tell whether the input is out.
+    """Update the low-passed age of the measurements, s; return whether the input is out.
 
-    With peaks the age rises at once, and falls as low-passed.
+    With peaks the age rises at once, and falls low-passed.
     """
     stale, late = now - monitor[BELIEVED] > STALE, False
     if stale:
@@ -105,18 +105,18 @@ def is_out(monitor, now, peaks):
 
 
 class InputMonitor:
-    """Monitors the age of one input and the faults of its messages.
+    """Monitor of one input: age, and faults of its messages.
 
     Attributes:
         name: of the input.
-        numbers: see BELIEVED and what follows it.
+        numbers: see BELIEVED and the constants after it.
         other: fault of messages that no check could read.
 
     """
 
     def __init__(self, name: str, latest: float = math.inf, numbers: np.ndarray | None = None
                  ) -> None:
-        """Monitor an input of which measurements count up to an age in s."""
+        """Monitor an input whose measurements are valid up to an age in s."""
         self.name, self._latest, self.other = name, latest, ''
         self.numbers = np.empty(LATEST + 1) if numbers is None else numbers
         self.restart()
@@ -129,22 +129,22 @@ class InputMonitor:
 
     @property
     def believed(self) -> float:
-        """When the last valid message came, s; -inf before the first one."""
+        """Time of arrival of the last valid message, s; -inf before the first one."""
         return float(self.numbers[BELIEVED])
 
     @property
     def since(self) -> float:
-        """When it went out, s; NaN while it is in."""
+        """Time at which it went out, s; nan while it is in."""
         return float(self.numbers[SINCE])
 
     @property
     def age(self) -> float:
-        """Age of the newest measurement when it is used, by its stamp, low-passed, s, or NaN."""
+        """Age of the newest measurement when it is used, by its stamp, low-passed, s, or nan."""
         return float(self.numbers[AGE])
 
     @property
     def refused(self) -> bool:
-        """Whether messages have come, none of them valid."""
+        """Whether messages have come, but none was valid."""
         return self.believed == -math.inf and bool(self.numbers[WRONG])
 
     def latency(self, now: float) -> float:
@@ -153,13 +153,13 @@ class InputMonitor:
         return 0.0 if math.isnan(measured) else max(now - measured, 0.0)
 
     def fault(self, now: float) -> str:
-        """Say why the input is out, or ''."""
+        """Return why the input is out, or ''."""
         is_out(self.numbers, now, False)
         return self.reason
 
     @property
     def reason(self) -> str:
-        """Why it was out when this was last judged, or ''."""
+        """Why it was out at the last check, or ''."""
         wrong, late = int(self.numbers[WRONG]), self.numbers[LAG]
         if math.isnan(self.numbers[SINCE]):
             return ''
@@ -177,11 +177,11 @@ class InputMonitor:
 
 @jit
 def fade(way, good, valid, dt):
-    """Return how far the feedback is faded in, and for how long inputs are valid, dt s later.
+    """Return the progress of the feedback's fade, and how long inputs are valid, dt s later.
 
     Args:
-        way: 0 to 1, of which the smooth step is the fraction of the feedback.
-        good: for how long all inputs have been valid, s.
+        way: 0 to 1; its smooth step is the fraction of the feedback.
+        good: how long all inputs have been valid, s.
         valid: whether they are.
         dt: s.
 
@@ -251,7 +251,7 @@ def turned_by(mount, x, y, z):
 
 @jit
 def _contradicts(up, turning, memory):
-    """Tell whether the change of the vertical contradicts the angular velocity, base's frame."""
+    """Return whether the change of the vertical contradicts the angular velocity, base's frame."""
     if up[0] == memory[3] and up[1] == memory[4] and up[2] == memory[5]:
         # A driver may repeat an orientation, or its last message.
         return memory[19] > 0.0
@@ -290,7 +290,7 @@ def _contradicts(up, turning, memory):
 
 @jit
 def _is_off_gravity(up, acceleration, moving, dt, memory):
-    """Tell whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
+    """Return whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
     # One message after a gap, such as the first, says no more than any other.
     dt = min(dt, GAP)
     memory[17] += dt
@@ -309,17 +309,17 @@ def _is_off_gravity(up, acceleration, moving, dt, memory):
 
 @jit_entry
 def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
-    """Fill the last three arguments if the message is plausible; return an index into VERDICTS.
+    """Fill the last three arguments if a message is plausible; return an index into VERDICTS.
 
     Args:
-        values: the numbers of a sensor_msgs/Imu in its order, shape (IMU,).
+        values: numbers of a sensor_msgs/Imu in its order, shape (IMU,).
         dt: since the last one, s.
         moving: whether the robot walks.
         mount: orientation of the IMU in the base's frame, x y z w, shape (4,).
         memory: shape (IMU_MEMORY,), zeros at first; overwritten.
         rpy: roll, pitch and yaw of the base, rad, shape (3,).
         angular_velocity: of the base in its own frame, rad/s, shape (3,).
-        acceleration: what the accelerometer shows, base's frame, m/s^2, shape (3,).
+        acceleration: accelerometer's reading in the base's frame, m/s^2, shape (3,).
 
     """
     memory[20] += dt
@@ -370,14 +370,14 @@ def judge_joints(positions, velocities, places, lower, upper, fastest, angles, r
     """Fill angles and rates if they are plausible; return an index into VERDICTS.
 
     Args:
-        positions: of a message, in its own order, rad.
+        positions: of a message, in its order, rad.
         velocities: the same, rad/s.
         places: index of each joint in the message, shape (joints,).
-        lower: limits of the joints, rad, shape (joints,).
-        upper: the same.
-        fastest: the same, rad/s.
-        angles: rad, shape (joints,).
-        rates: rad/s, shape (joints,).
+        lower: smallest angles, rad, shape (joints,).
+        upper: largest angles, the same.
+        fastest: largest speeds, rad/s, the same.
+        angles: filled, rad, shape (joints,).
+        rates: filled, rad/s, shape (joints,).
 
     """
     for k in range(len(places)):
@@ -427,10 +427,10 @@ def agreement(loads, least, swinging, fraction, before):
 
     Args:
         loads: of the feet, N, shape (legs,).
-        least: load of a foot that stands, N.
-        swinging: whether each leg is meant to, shape (legs,).
+        least: smallest load of a foot on the ground, N.
+        swinging: whether each leg should swing, shape (legs,).
         fraction: weight of the new value in the mean.
-        before: the mean so far.
+        before: previous mean.
 
     """
     same = 0

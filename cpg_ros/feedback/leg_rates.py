@@ -14,9 +14,9 @@
 
 """Comparison of the measured angular velocity with the motion of the legs on the ground.
 
-Two feet that stand keep their distance and its direction in the world, so the legs' kinematics
-show how the base turns about every axis but the line from one foot to the other. An IMU that is
-mounted turned about the vertical contradicts nothing but this.
+Two standing feet keep their distance and its direction in the world, so the legs' kinematics give
+the base's rotation about every axis except the line between the feet. Of all checks, only this one
+detects an IMU whose mount is rotated about the vertical.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
@@ -46,7 +46,7 @@ BETTER, MOVES = 0.5, 0.0025
 
 @jit
 def _add(leg, other, turning, dt, memory):
-    """Add a pair of feet that stand, each with its velocity at rest and its place, shape (6,)."""
+    """Add a pair of standing feet, each with its velocity at rest and its position, shape (6,)."""
     count, least = len(MOUNTS), np.inf
     ax, ay, az = leg[3] - other[3], leg[4] - other[4], leg[5] - other[5]
     square = ax * ax + ay * ay + az * az
@@ -75,7 +75,7 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
     Args:
         legs: LegArrays of the robot.
         sensors: SensorData of one run.
-        dt: since the last time, s.
+        dt: since the last tick, s.
         memory: shape (RATES_MEMORY,), zeros at first; overwritten.
         seen: scratch, shape (legs, 6).
         scratch: shape (4, 3).

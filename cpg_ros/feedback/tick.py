@@ -54,11 +54,11 @@ class PlannedMotion(NamedTuple):
     Attributes:
         angles: of the joints, rad, shape (runs, joints).
         phase: of the first leg, cycles, shape (runs,).
-        gaits: slots of the gait that is left and of that which is entered, shape (runs, 2).
-        mix: fraction of the one that is entered, shape (runs,).
+        gaits: slots of the gait that is left and of the entered one, shape (runs, 2).
+        mix: fraction of the entered gait, shape (runs,).
         velocity: wanted forward and to the left, m/s, shape (runs, 2).
         heading: wanted, rad, shape (runs,).
-        turn: wanted, rad/s, shape (runs,).
+        turn: wanted yaw rate, rad/s, shape (runs,).
         lean: wanted roll, pitch and yaw of the body against its feet, rad, shape (runs, 3).
 
     """
@@ -74,14 +74,14 @@ class PlannedMotion(NamedTuple):
 
     @classmethod
     def zeros(cls, runs: int, joints: int) -> 'PlannedMotion':
-        """Return zeros, to be filled in place."""
+        """Return zeros to fill in place."""
         return cls(np.zeros((runs, joints)), np.zeros(runs), np.zeros((runs, 2), dtype=np.int64),
                    np.zeros(runs), np.zeros((runs, 2)), np.zeros(runs), np.zeros(runs),
                    np.zeros((runs, 3)))
 
 
 class Deviation(NamedTuple):
-    """Difference of the body's motion from the expected one: m/s, rad/s, rad."""
+    """Deviation of the body's motion from the expected one: m/s, rad/s, rad."""
 
     vx: float
     vy: float
@@ -92,7 +92,7 @@ class Deviation(NamedTuple):
 
 
 class Intent(NamedTuple):
-    """Motion of all feet of a run that the laws want; pairs are forward and to the left.
+    """Motion of all feet of a run that the laws request; pairs are forward and to the left.
 
     Attributes:
         alternates: 1 where left and right legs alternate, 0 where they hop.
@@ -117,7 +117,7 @@ class Intent(NamedTuple):
 
 @jit
 def _approach(target, dt, now, rate):
-    """Advance a velocity and its rate by dt in s towards a target, as strides are (cpg_steer)."""
+    """Advance a velocity and its rate by dt in s towards a target, as cpg_steer does strides."""
     decay = math.exp(-dt / APPROACH)
     for k in range(len(now)):
         gap = now[k] - target[k]
@@ -209,8 +209,8 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
         gains: Gains.
         memory: Memory, changed in place.
         at: run, leg, slot of the gait, and the rows of its tables with LEAD and without.
-        foot: as planned, base's frame, m, shape (3,).
-        middle: of the feet that stand, forward and to the left, m.
+        foot: planned position, base's frame, m, shape (3,).
+        middle: of the standing feet, forward and to the left, m.
         off: Deviation.
         intent: Intent.
         dt: s.
@@ -254,7 +254,7 @@ def _move_feet(legs, tables, gains, memory, sensors, planned, run, slot, off, in
     """Move the feet of a run; out are its angles, rad, shape (joints,).
 
     Returns:
-        Sum of the changes of the legs' phase rates, rad/s, and how many feet stumble.
+        Sum of the changes of the legs' phase rates, rad/s, and number of feet that stumble.
 
     """
     rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
@@ -339,8 +339,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory: Memory of all runs, changed in place.
         sensors: SensorData.
         planned: PlannedMotion.
-        step: its length dt in s, the fraction of all corrections, the pattern's level, 0 to 1
-            both, and the age of the measured angles, s.
+        step: dt in s, the fraction of all corrections, the pattern's level, 0 to 1 both, and the
+            age of the measured angles, s.
         out: filled.
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a network to moving joints: the robot and its file, plan, readout and pattern; export.
+"""From a network to moving joints: robot, plan, readout and pattern; export.
 
 Imports ``dynamics``, ``networks`` and ``common``; knows nothing of ROS.
 """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parts of a robot file for feedback: biped, own laws and gains, leg geometry, efference tables.
+"""Parts of a robot file for feedback: biped, gains, leg geometry, efference tables.
 
-Part ``geometry`` has the lengths and axes of legs that feedback can displace, ``efference`` of a
-gait what the base does by itself in it.
+``geometry`` has the lengths and axes of the legs; ``efference`` of a gait has the base's own
+motion.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -46,21 +46,21 @@ GAIT_SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05,
 
 @dataclass(frozen=True)
 class BipedLink:
-    """A joint, the link that it moves, and the servo that drives it.
+    """A joint, the link that it moves, and its servo.
 
     Attributes:
-        parent: joint that moves the link before, or BASE.
-        axis: of the joint, a unit vector.
+        parent: joint of the previous link, or BASE.
+        axis: unit vector of the joint.
         anchor: a point on the axis, m.
         mass: of the link, kg.
-        center: of that mass, m.
-        kp: proportional gain of the servo, N m / rad.
-        kd: its damping, N m s / rad.
-        effort: the most it can, N m.
-        armature: inertia of its rotor at the joint, kg m^2.
-        angle: where a joint that is no leg's is held, rad; None of the legs' joints.
-        cell: of the network that swings such a joint, from 1; 0 for none.
-        swing: by how much it does at the peak of the cell's recovery variable, rad.
+        center: of mass, m.
+        kp: proportional gain, N m / rad.
+        kd: damping, N m s / rad.
+        effort: largest torque, N m.
+        armature: reflected inertia of the rotor, kg m^2.
+        angle: at which the joint is held, rad; None for a joint of a leg.
+        cell: of the network that swings a held joint, from 1; 0 for none.
+        swing: amplitude at the peak of the cell's recovery variable, rad.
 
     """
 
@@ -84,14 +84,14 @@ class BipedBody(ShortRepr):
 
     Attributes:
         mass: of the base, kg.
-        center: of that mass, m.
-        links: by the names of their joints.
-        soles: middle of each leg's sole, m, by leg.
+        center: of the base's mass, m.
+        links: by joint.
+        soles: middle of the sole, m, by leg.
         sole_size: length and width of a sole, m.
-        gains: of the feedback where they are not the usual ones, by name.
-        gait_gains: the same in one gait alone, by gait and name.
-        scale: height of the centre of mass and mass of the robot over those of the G1, for which
-            the usual gains were found: they are scaled by them, as their units say (Froude).
+        gains: of the feedback that differ from the defaults, by name.
+        gait_gains: gait -> gains in this gait alone.
+        scale: height of the centre of mass, and mass, relative to the G1; default gains are scaled
+            by them according to their units (Froude).
 
     """
 
@@ -105,24 +105,24 @@ class BipedBody(ShortRepr):
     gait_gains: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def speeds(self, gait: str) -> tuple[float, float]:
-        """Return the slowest and the fastest speed forward of a gait with feedback, m/s."""
+        """Return the slowest and fastest forward speed of a gait with feedback, m/s."""
         slowest, fastest = GAIT_SPEEDS[gait]
         factor = math.sqrt(self.scale[0])
         return factor * slowest, factor * fastest
 
     @property
     def total(self) -> float:
-        """Mass of all of it, kg."""
+        """Total mass, kg."""
         return self.mass + sum(link.mass for link in self.links.values())
 
     @property
     def held(self) -> dict[str, float]:
-        """Joints that are held, and where, rad."""
+        """Held joint -> angle, rad."""
         return {name: link.angle for name, link in self.links.items() if link.angle is not None}
 
 
 def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]]) -> BipedBody:
-    """Read the part ``biped``; legs are those of the file with the names of their joints."""
+    """Read the part ``biped``; ``legs`` are those of the file with their joint names."""
     tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'},
                        {'gains', 'scale'})
     base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
@@ -185,15 +185,14 @@ def biped_tree(biped: BipedBody) -> dict[str, Any]:
 
 @dataclass(frozen=True, repr=False)
 class OwnFeedback(ShortRepr):
-    """Laws and gains of a robot's feedback that differ from the usual ones.
+    """Laws and gains of a robot's feedback that differ from the defaults.
 
     Attributes:
-        enabled: whether the feedback is on where nothing else is said.
-        made: how this was found, '' if it is not said.
-        laws: whether laws are on, by name.
-        gains: by name, dimensionless: lengths as fractions of the legs' length l, times of
-            sqrt(l/g).
-        imu_mount: roll, pitch and yaw of the IMU's frame in the base's, rad; empty for the same.
+        enabled: default of the parameter ``feedback.enabled``.
+        made: how the values were found, '' if unknown.
+        laws: law -> whether it is on.
+        gains: by name, dimensionless: lengths over the leg length l, times over sqrt(l/g).
+        imu_mount: roll, pitch and yaw of the IMU's frame in the base's, rad; empty for none.
 
     """
 
@@ -205,7 +204,7 @@ class OwnFeedback(ShortRepr):
 
 
 def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
-    """Read the part ``feedback``; names of laws and gains are checked where they are used."""
+    """Read the part ``feedback``; laws and gains are checked where they are used."""
     def mount(value: Any, where: str) -> tuple[float, ...]:
         if not isinstance(value, list) or len(value) not in (0, 3):
             raise reader.fail(where, 'must be a list of roll, pitch and yaw in rad')
@@ -226,21 +225,20 @@ SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
 
 @dataclass(frozen=True)
 class LegGeometry:
-    """A leg with all joints at 0, in the frame of the base: x forward, y left, z up, m.
+    """A leg at joint angles of 0, in the base's frame: x forward, y left, z up, m.
 
     Attributes:
-        joints: names of hip, thigh and calf, or of the last two.
-        turns: 1 or -1 by the sense of each about x, y and y, or y and y; of a leg with a yaw,
-            about z for the hip and, for the others, about the level axis that is 90 degrees to
-            the left of it.
-        hip: the hip joint, from the base; of a leg without one that of the thigh.
-        thigh: the thigh joint, from the hip.
-        calf: the calf joint, from the thigh joint.
-        foot: the middle of the foot, from the calf joint.
-        yaw: of a leg whose hip turns about z, the way in which it reaches from there: 0 forward,
-            positive to the left, rad.
-        roll: by how much the other joints' axes are turned about x from y, rad, of a leg that is
-            spread where all joints are at 0.
+        joints: names of hip, thigh and calf, or of thigh and calf.
+        turns: 1 or -1, sense of rotation of each joint about x, y and y, or y and y; with ``yaw``,
+            of the hip about z, of the others about the level axis 90 degrees to the left.
+        hip: hip joint from the base; without a hip joint, the thigh joint.
+        thigh: thigh joint from the hip joint.
+        calf: calf joint from the thigh joint.
+        foot: middle of the foot from the calf joint.
+        yaw: direction in which a leg whose hip turns about z extends, 0 forward, positive to the
+            left, rad; None for other legs.
+        roll: rotation about x of the other joints' axes from y, rad, for a leg that is spread at
+            0.
 
     """
 
@@ -256,12 +254,12 @@ class LegGeometry:
 
 @dataclass(frozen=True, repr=False)
 class BodyGeometry(ShortRepr):
-    """Geometry of a body, as feedback needs it.
+    """Geometry of a body for feedback.
 
     Attributes:
         mass: of the robot, kg.
         foot_radius: m.
-        legs: those that feedback can displace, by name.
+        legs: leg -> geometry, for legs that feedback can displace.
 
     """
 
@@ -273,12 +271,12 @@ class BodyGeometry(ShortRepr):
 
 @dataclass(frozen=True, repr=False)
 class EfferenceTable(ShortRepr):
-    """Motion of the base in an undisturbed gait, by speed and by the phase of the first leg.
+    """Motion of the base in an undisturbed gait, by speed and by phase of the first leg.
 
     Attributes:
-        speeds: m/s, rising, at most SPEEDS.
-        rows: by SIGNALS; of each a row for each speed, of BINS values, the means over parts of
-            the stride.
+        speeds: m/s, ascending, at most SPEEDS.
+        rows: signal of SIGNALS -> a row of BINS values for each speed, means over parts of the
+            stride.
 
     """
 
@@ -290,12 +288,12 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain],
                   stand: Mapping[str, float]) -> BodyGeometry:
     """Return the geometry of a body.
 
-    Of a leg with more joints than LEGS the others are held. Legs that are not LEGS are left out.
+    Further joints of a leg are held. Legs that match no pattern of LEGS are left out.
 
     Args:
         mass: of the robot, kg.
-        chains: its legs, by name.
-        stand: angles of their joints, rad, by name.
+        chains: leg -> chain.
+        stand: joint -> angle, rad.
 
     """
     legs = {}
@@ -333,7 +331,7 @@ def _leg_geometry(chain: LegChain) -> LegGeometry | None:
 
 
 def leg_axes(yaw: float | None, roll: float | None) -> np.ndarray:
-    """Return the axes of a leg's frame as columns: the base's, turned, or of a hip about z."""
+    """Return the axes of a leg's frame as columns, shape (3, 3)."""
     if yaw is None:
         return rotation((roll or 0.0, 0.0, 0.0))
     c, s = math.cos(yaw), math.sin(yaw)
@@ -342,7 +340,7 @@ def leg_axes(yaw: float | None, roll: float | None) -> np.ndarray:
 
 def read_geometry(reader: YamlReader, tree: Any,
                   legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
-    """Read the part ``geometry``; legs are those of the file with the names of their joints."""
+    """Read the part ``geometry``; ``legs`` are those of the file with their joint names."""
     def read_legs(value: Any, where: str) -> dict[str, LegGeometry]:
         return {leg: _leg(reader, entry, f'{where}.{leg}', set(legs[leg]))
                 for leg, entry in reader.keys(value, where, set(), set(legs)).items()}

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pose of a body above its feet, which keep their places on the ground.
+"""Pose of a body above its feet, which keep their places on the ground.
 
 A pose is the height above the stand, m, and roll, pitch and yaw, rad, about the base's origin:
-the yaw turns first, then the pitch (positive: nose down), then the roll (positive: to the right).
+first yaw, then pitch (positive nose down), then roll (positive to the right).
 """
 
 from collections.abc import Sequence
@@ -47,13 +47,13 @@ FASTEST, CONSTANT = 1.0 / math.e, 0.2
 
 
 class BodyPose:
-    """A robot's body on its way to a pose, and the angles of the stand in that pose.
+    """A robot's body on its way to a pose, and the joint angles of the stand in that pose.
 
     ``go_to`` may be called from another thread than the ticks.
 
     Attributes:
-        now: the present pose.
-        target: the pose that it goes to.
+        now: present pose.
+        target: pose to reach.
         address: of its struct in the core.
 
     """
@@ -62,7 +62,7 @@ class BodyPose:
         """Begin in the stand.
 
         Raises:
-            InputError: the robot file has no geometry of all legs, or the robot balances on soles.
+            InputError: the robot file lacks the geometry of a leg, or the robot balances on soles.
 
         """
         if robot.biped is not None:
@@ -108,7 +108,7 @@ class BodyPose:
 
     @property
     def seated(self) -> bool:
-        """Whether the body is where the robot sits, or on its way there."""
+        """Whether the robot sits, or is about to."""
         return bool(self.target[0] < 0.0 and (self.target == self.seat).all())
 
     def angles(self, pose: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -145,7 +145,7 @@ class BodyPose:
 
     @cached_property
     def seat(self) -> np.ndarray:
-        """The pose in which the robot sits: as low as its joints allow, down to SEATED."""
+        """Pose in which the robot sits: as low as its joints allow, down to SEATED."""
         stand = -float(self._feet(self._stand)[:, 2].mean())
         low, high = -(1.0 - SEATED) * stand, 0.0
         tried = low
@@ -159,7 +159,7 @@ class BodyPose:
         return np.array([high, 0.0, 0.0, 0.0])
 
     def go_to(self, pose: Sequence[float] | np.ndarray, time: float) -> None:
-        """Go to a pose in about a time in s, or as slowly as the joints' speed limits ask.
+        """Go to a pose in about a time in s, longer where joints' speed limits require it.
 
         Raises:
             InputError: as of ``angles``.
@@ -173,6 +173,6 @@ class BodyPose:
 
 
 def _text(pose: Sequence[float] | np.ndarray) -> str:
-    """Return the numbers of a pose that are not 0, as 'body.height -0.1 m, body.roll 0.2 rad'."""
+    """Return the nonzero numbers of a pose, such as 'body.height -0.1 m, body.roll 0.2 rad'."""
     return ', '.join(f'body.{name} {value:g} {unit}' for name, value, unit
                      in zip(POSE, pose, UNITS, strict=True) if value)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Description of a robot by a model file: joints, links and their frames; reader of URDF."""
+"""Description of a robot by a model file: joints, links and frames; reader of URDF."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -38,7 +38,7 @@ SLOW, FASTEST, SERVOS = 5.0, 100.0, 'hobby servos reach about 5 to 10 rad/s'
 
 
 class DescriptionError(CpgError):
-    """A description of a robot cannot be used; the message names the file and the reason."""
+    """A robot description cannot be used; the message names the file and the reason."""
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,14 @@ class JointDescription:
 
     Attributes:
         name: as in the file.
-        kind: as URDF has it: revolute, continuous, prismatic, fixed, ...
-        lower, upper: limits in rad (m of a prismatic joint), infinite where there are none.
-        velocity: limit in rad/s, infinite where the file gives none, 0 or more than FASTEST.
-        mimic: the joint that it follows, '' for none.
+        kind: as in URDF: revolute, continuous, prismatic, fixed, ...
+        lower, upper: limits, rad (m for a prismatic joint), infinite where there are none.
+        velocity: limit, rad/s, infinite where the file gives none, 0 or more than FASTEST.
+        mimic: joint that it follows, '' for none.
         parent, child: links.
-        xyz, rpy: where it is in its parent, m and rad.
-        axis: about which it turns, in its own frame.
-        passive: whether the file gives motors to other joints, but none to this one.
+        xyz, rpy: pose in the parent, m and rad.
+        axis: of rotation, in the joint's frame.
+        passive: whether other joints have a motor, but not this one.
 
     """
 
@@ -83,13 +83,13 @@ class JointDescription:
 
 @dataclass(frozen=True)
 class CollisionShape:
-    """A shape that collides: a box, a cylinder or a mesh.
+    """A collision shape: box, cylinder or mesh.
 
     Attributes:
-        xyz, rpy: where it is in its link, m and rad.
-        size: of a box along x, y and z, m; of a cylinder its two widths and its length; of a mesh
-            the factors on its vertices.
-        mesh: vertices, shape (n, 3), or the file that has them; None for the corners.
+        xyz, rpy: pose in the link, m and rad.
+        size: of a box along x, y and z, m; of a cylinder its two widths and its length, m; of a
+            mesh the scale.
+        mesh: vertices, shape (n, 3), or their file; None for the corners.
 
     """
 
@@ -99,9 +99,9 @@ class CollisionShape:
     mesh: Path | np.ndarray | None = None
 
     def points(self) -> np.ndarray:
-        """Return its corners or vertices in the link's frame, m, shape (points, 3).
+        """Return corners or vertices in the link's frame, m, shape (points, 3).
 
-        A mesh that cannot be read has none: who draws or simulates it reports that.
+        A mesh that cannot be read has none; drawing and simulation report it.
         """
         corners = (np.array(list(product((-0.5, 0.5), repeat=3))) if self.mesh is None
                    else self.mesh)
@@ -119,9 +119,9 @@ class LinkDescription:
 
     Attributes:
         mass: kg, 0 where the file gives none.
-        radius: of its sphere that collides, m, 0 if it has none.
+        radius: of the collision sphere, m, 0 for none.
         centre: of that sphere in the link's frame, m.
-        shapes: its other shapes that collide.
+        shapes: other collision shapes.
 
     """
 
@@ -161,7 +161,7 @@ class RobotDescription:
         return roots[0]
 
     def chain(self, name: str) -> list[JointDescription]:
-        """Return the joints from the root to one joint, which is the last.
+        """Return the joints from the root to a joint, which is the last.
 
         Raises:
             DescriptionError: the links form a loop.
@@ -176,10 +176,9 @@ class RobotDescription:
         return joints
 
     def frame(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return where a joint is in the frame of the root with all joints at 0.
+        """Return a joint's position, m, (3,), and axes as columns, (3, 3), in the root's frame.
 
-        Its place is in m, shape (3,); its frame's axes are columns, shape (3, 3). Errors as of
-        ``chain``.
+        All joints are at 0. Errors as of ``chain``.
         """
         position, axes = np.zeros(3), np.eye(3)
         for joint in self.chain(name):
@@ -187,7 +186,7 @@ class RobotDescription:
         return position, axes
 
     def direction(self, name: str) -> np.ndarray:
-        """Return the axis of a joint in the frame of the root with all joints at 0, a unit vector.
+        """Return a joint's axis in the root's frame with all joints at 0, a unit vector.
 
         Raises:
             DescriptionError: the axis is zero, or the links form a loop.
@@ -200,17 +199,17 @@ class RobotDescription:
         return axis / length
 
     def leg(self, names: Iterable[str]) -> 'LegChain':
-        """Return a leg by the names of its joints, in any order; errors as of ``direction``."""
+        """Return a leg from its joints' names, in any order; errors as of ``direction``."""
         joints = sorted(names, key=lambda name: len(self.chain(name)))
         return LegChain(tuple(joints), np.array([self.direction(name) for name in joints]),
                         np.array([self.frame(name)[0] for name in joints]),
                         *self.foot_below(joints[-1]))
 
     def foot_below(self, last: str) -> tuple[np.ndarray, float]:
-        """Return the middle of the foot below a leg's last joint, m, (3,), and its radius, m.
+        """Return middle, m, (3,), and radius, m, of the foot below a leg's last joint.
 
-        It is the furthest sphere of what that joint moves with all others at 0, or else the
-        middle of the end of shapes and frames, which has no radius.
+        The foot is the furthest sphere that the joint moves, or else the middle of the end of
+        shapes and frames, with radius 0. All joints are at 0.
         """
         begin = self.frame(last)[0]
         below = self._below(last)
@@ -233,7 +232,7 @@ class RobotDescription:
             for shape in link.shapes)])
 
     def _below(self, last: str) -> list[tuple[np.ndarray, np.ndarray, LinkDescription]]:
-        """Return place, axes and link of everything that a joint moves with all others at 0."""
+        """Return position, axes and link of everything below a joint, all joints at 0."""
         found = [(*self.frame(last), self.joints[last].child)]
         for place, turned, link in found:
             found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
@@ -244,13 +243,13 @@ class RobotDescription:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegChain(ShortRepr):
-    """A leg with all joints at 0, in the frame of the root.
+    """A leg at joint angles of 0, in the root's frame.
 
     Attributes:
-        joints: names, outwards.
-        axes: of the joints, unit vectors, shape (joints, 3).
-        anchors: points on them, m, the same.
-        foot: the middle of the foot, m, shape (3,).
+        joints: names, from the body outwards.
+        axes: unit vectors, shape (joints, 3).
+        anchors: points on the axes, m, shape (joints, 3).
+        foot: middle of the foot, m, shape (3,).
         radius: of the foot, m.
 
     """
@@ -263,16 +262,16 @@ class LegChain(ShortRepr):
 
     @property
     def lengths(self) -> np.ndarray:
-        """From each joint to the next, and to the foot, m, shape (joints,)."""
+        """Distance from each joint to the next, and to the foot, m, shape (joints,)."""
         return np.linalg.norm(np.diff([*self.anchors, self.foot], axis=0), axis=1)
 
     def posed(self, angles: Sequence[float] | np.ndarray
               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the leg with joints at angles, rad.
+        """Return the leg at joint angles, rad.
 
         Returns:
-            Axes, shape (joints, 3), anchors and the foot, m, shape (joints + 1, 3), and what
-            turns vectors of the last link as they are at 0, shape (3, 3).
+            Axes, shape (joints, 3); anchors and foot, m, shape (joints + 1, 3); rotation of the
+                last link from its pose at 0, shape (3, 3).
 
         """
         frame, axes, points = np.eye(3), np.empty_like(self.axes), [self.anchors[0]]
@@ -284,7 +283,7 @@ class LegChain(ShortRepr):
         return axes, np.array(points), frame
 
     def holding(self, angles: Mapping[str, float]) -> 'LegChain':
-        """Return the leg of its other joints where some are held at angles, rad."""
+        """Return the leg without some joints, which are held at angles, rad."""
         axes, points, _ = self.posed([angles.get(name, 0.0) for name in self.joints])
         rest = [k for k, name in enumerate(self.joints) if name not in angles]
         return LegChain(tuple(self.joints[k] for k in rest), axes[rest], points[rest],
@@ -294,10 +293,10 @@ class LegChain(ShortRepr):
 # URDF files: joints with their limits and places, links with their masses and feet.
 
 def read_tree(path: str | Path) -> Element:
-    """Read a URDF file as XML, tags without their prefixes.
+    """Read a URDF file as XML, tags without prefixes.
 
     Raises:
-        DescriptionError: the file cannot be read, is not XML, is xacro or is no URDF.
+        DescriptionError: the file cannot be read, is not XML, is xacro or no URDF.
 
     """
     return parse_tree(read_bytes(path, DescriptionError, 'URDF'), str(path))
@@ -331,8 +330,8 @@ def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescr
 
     Args:
         tree: as of ``read_tree``.
-        source: where it is from, for messages.
-        path: its file, from which meshes are found; None for a text without one.
+        source: name for messages.
+        path: of the file, from which meshes are found; None for a text.
 
     Raises:
         DescriptionError: it has no joints, or one is incomplete; the message names the source.
@@ -357,7 +356,7 @@ def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescr
 
 
 def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]:
-    """Return joints that turn without a motor, where most of the others have one."""
+    """Return joints without a motor, where most of the others have one."""
     turning = [name for name, joint in joints.items() if not joint.flaw]
     motors = {joint.get('name', '') for joint in tree.iterfind('transmission/joint')}
     motors |= {joint.get('name', '') for joint in tree.iterfind('ros2_control/joint')
@@ -373,7 +372,7 @@ def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]
 
 
 def _controlled(element: Element, joint: JointDescription) -> JointDescription:
-    """Narrow a joint's limits to the limits of its commands in the ros2_control part."""
+    """Narrow a joint's limits to those of its command interfaces in the ros2_control part."""
     limits = {'lower': joint.lower, 'upper': joint.upper, 'velocity': joint.velocity}
     for interface in element.iterfind('command_interface'):
         for param in interface.iterfind('param'):
@@ -390,16 +389,16 @@ def _controlled(element: Element, joint: JointDescription) -> JointDescription:
 
 
 def mesh_folder(tree: Element) -> str:
-    """Return the mesh folder that a URDF names (MuJoCo's extension), '' if it names none."""
+    """Return the mesh folder that a URDF names (MuJoCo's extension), or ''."""
     compiler = tree.find('mujoco/compiler')
     return '' if compiler is None else compiler.get('meshdir', '')
 
 
 def numbers(text: str, count: int, finite: bool = True) -> tuple[float, ...]:
-    """Return the numbers of an attribute, () where they are not as many as they should be.
+    """Return the numbers of an attribute, () if their count is wrong.
 
     Args:
-        text: numbers with spaces between them.
+        text: numbers separated by spaces.
         count: how many there should be.
         finite: whether infinite values count as missing.
 
@@ -490,10 +489,10 @@ ACROSS = 0.9
 
 
 def sprawls(axes: np.ndarray) -> bool:
-    """Tell whether a leg is of this kind.
+    """Tell whether a leg extends sideways: coxa about the vertical, femur about a level axis.
 
     Args:
-        axes: of its joints down the leg with all of them at 0, unit vectors, shape (joints, 3).
+        axes: of its joints down the leg with all joints at 0, unit vectors, shape (joints, 3).
 
     """
     if len(axes) < 3:
@@ -504,7 +503,7 @@ def sprawls(axes: np.ndarray) -> bool:
 
 
 def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Return the level direction in which a leg reaches, in the plane that its femur moves.
+    """Return the level direction in which a leg extends, in the plane in which its femur moves.
 
     Args:
         axis: of the femur, shape (3,).

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Meshes that descriptions of robots name: STL (binary or text), OBJ and Collada."""
+"""Meshes of robot descriptions: STL (binary or text), OBJ and Collada."""
 
 from collections.abc import Iterator
 import os
@@ -32,7 +32,7 @@ MOST, MOST_NUMBERS = 2_000_000, 6_000_000
 
 
 class MeshError(CpgError):
-    """A mesh cannot be found or read; the message names it and gives the reason."""
+    """A mesh cannot be found or read; the message names it and the reason."""
 
 
 class Mesh(NamedTuple):
@@ -46,8 +46,7 @@ def read_mesh(path: Path) -> Mesh:
     """Read a mesh.
 
     Raises:
-        MeshError: there is no such file, it is no regular file or too large, is damaged, or of no
-            kind that is read.
+        MeshError: the file is missing, not regular, too large, damaged, or of an unknown format.
 
     """
     data = read_bytes(path, MeshError)
@@ -70,7 +69,7 @@ def read_mesh(path: Path) -> Mesh:
 
 
 def merged(mesh: Mesh, grain: float) -> Mesh:
-    """Return a mesh in which vertices that lie close together, m, are one."""
+    """Return a mesh in which vertices closer than a grain, m, are one."""
     _, first, cells = np.unique(np.round(mesh.points / grain), axis=0, return_index=True,
                                 return_inverse=True)
     corners = cells.reshape(-1)[mesh.triangles]
@@ -174,14 +173,14 @@ def _numbers(text: str | None, kind: type) -> np.ndarray:
 
 def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[Mesh],
          left: list[int]) -> None:
-    """Collect the meshes of a node and all below it, in the frame of the scene.
+    """Collect the meshes of a node and its descendants, in the frame of the scene.
 
     Args:
         node: of the scene.
-        above: frame of the node above it.
+        above: frame of its parent.
         meshes: by name.
-        parts: to which they are added.
-        left: one number, how many points and triangles there may still be.
+        parts: list to extend.
+        left: one number, how many more points and triangles are allowed.
 
     """
     transform = above.copy()
@@ -224,18 +223,17 @@ _PACKAGE = re.compile(r'(?:package|model):/+([^/]+)/+(.*)', re.DOTALL)
 def find_mesh(reference: str, urdf: Path | None, folder: str = '') -> Path:
     """Return the path of a mesh that a URDF names.
 
-    ``package://NAME/...`` is looked for where ament and ROS_PACKAGE_PATH have packages, then in
-    the folders above the URDF: one called NAME, one with a package.xml of that name, at last
-    any.
+    ``package://NAME/...`` is searched in the packages of ament and ROS_PACKAGE_PATH, then in the
+    folders above the URDF: a folder NAME, one whose package.xml has that name, and finally any.
 
     Args:
         reference: the attribute ``filename``.
-        urdf: the user's file that it is in; None for a text on the graph, which may name files of
-            installed packages only.
-        folder: where the file says that meshes are.
+        urdf: the user's file; None for a text from the graph, which may name files of installed
+            packages only.
+        folder: mesh folder that the file states.
 
     Raises:
-        MeshError: there is none, or none that may be named.
+        MeshError: there is none, or the text may not name it.
 
     """
     package, rest = '', unquote(reference.removeprefix('file://'))
@@ -273,7 +271,7 @@ def _packaged(package: str, rest: str, urdf: Path) -> Iterator[Path]:
 
 
 def _installed(reference: str, package: str, rest: str) -> Path:
-    """Return a file of an installed package, or of its sources where these are linked to."""
+    """Return a file of an installed package, or of its sources if it links there."""
     try:
         for prefix in _folders('AMENT_PREFIX_PATH'):
             shared = Path(os.path.normpath(prefix / 'share'))
@@ -301,7 +299,7 @@ def _is_source(path: Path, package: str) -> bool:
 
 
 def _package_name(folder: Path) -> str:
-    """Return the name that a folder's package.xml gives it, '' without one."""
+    """Return the name in a folder's package.xml, or ''."""
     manifest = folder / 'package.xml'
     if not manifest.is_file():
         return ''

@@ -37,8 +37,8 @@ __all__ = ['HOLD', 'SUBSTEP', 'GaitRunner', 'Pattern']
 
 #: SETTLING: strides in which the network has to find its new gait after a transition of 0 s.
 SETTLING = 40.0
-#: KICK: least amplitude of the new gait in the state when such a transition starts, as a fraction
-#: of the full gait's.
+#: KICK: least amplitude of the new gait in the state when such a transition starts, as a share of
+#: the full gait's.
 KICK = 0.05
 
 
@@ -105,7 +105,7 @@ class GaitRunner:
     Attributes:
         legs: phase of each leg, cycles.
         phase: of the first leg by the clock, cycles.
-        progress: fraction of its transition that is over, 0 to 1.
+        progress: share of its transition that is over, 0 to 1.
         settling: strides that are left to find the gait.
         address: of its struct in the core.
 
@@ -298,11 +298,11 @@ class Pattern:
         self._struct.absorbed, self._struct.jumped = 0.0, 0
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
-        """Begin at these angles, rad, (joints,), and bring the joints to the stand in s or more.
+        """Begin at these angles, rad, (joints,), and lead the joints to the stand in s or more.
 
         To be called before the first advance. No joint takes more than half of its speed limit.
         """
-        # The joints' offsets from the stand, and the ramp that brings these to 0.
+        # The joints' offsets from the stand, and the ramp that leads these to 0.
         self._found[:] = angles - self._offset
         self._approach.level, self._approach.rate, self._approach.parts = 1.0, 0.0, 0
         self.position[:] = np.clip(angles, *self._limits[:2])
@@ -364,7 +364,7 @@ class Pattern:
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
-        """The plan that fades out, the newest plan in force, and the fraction of the newest."""
+        """The plan that fades out, the newest plan in force, and the share of the newest."""
         older, newest = (tracks := self._tracks)[-2:][0], tracks[-1]
         if older is newest:
             return newest.plan, newest.plan, 0.0
@@ -423,8 +423,8 @@ class Pattern:
         """Fill the inputs of a correction.
 
         Args:
-            numbers: level, phase of the first leg, fraction of the gait that is entered, strides
-                per second (Hz), whether the gait changes, roll, pitch and yaw of the body (rad),
+            numbers: level, phase of the first leg, share of the gait that is entered, strides per
+                second (Hz), whether the gait changes, roll, pitch and yaw of the body (rad),
                 shape (8,).
             gaits: addresses of GaitPlan.core of the gait left and of the entered one, (2,).
 

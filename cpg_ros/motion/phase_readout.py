@@ -12,16 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From cells to joints by the cells' phase: for relaxation oscillators.
+"""Readout of joints from the phase of cells, for relaxation oscillators.
 
 The potential of a Morris-Lecar cell jumps, and no joint can follow it. A phase and an amplitude
 follow the cell as a lock-in amplifier follows a signal: the difference between the cell's two
-variables and the gait's orbit at that phase pulls them, along the first harmonic of the orbit and
-across it. The mean pull over a stride is the sine of the phase error.
+variables and the gait's orbit at that phase pulls the phase along the first harmonic of the orbit,
+and the amplitude across it. The mean pull over a stride is the sine of the phase error.
 
-A joint is a smooth function of that phase: x is the cell's waveform up to a few harmonics, y the
-derivative of x by phase in radians, both scaled by ``1 - (1 - a^2)^3`` with the amplitude a, at
-most 1. Phase and amplitude have continuous rates, of which the joints' velocities are made.
+A joint is a smooth function of that phase: x is a few harmonics of the cell's waveform, y its
+derivative by phase in radians, both scaled by ``1 - (1 - a^2)^3`` with the amplitude a, at most 1.
+Phase and amplitude have continuous rates, from which the joints' velocities follow.
 """
 
 from functools import lru_cache
@@ -39,14 +39,14 @@ LEAST_SHARE = 0.1
 
 
 class PhaseMap(NamedTuple):
-    """An orbit as its cells' clocks see it, and the smooth waveform that joints follow.
+    """An orbit as a function of phase, and the smooth waveform that joints follow.
 
     Attributes:
         shape: mean and half range of both variables of each wave, shape (waves, 4).
-        circles: cosine and sine term of both variables' first harmonic over its mean square,
-            shape (waves, 4).
-        tables: both variables from their mean over their half range, and their slopes from row
-            to row, over the phase, shape (waves, POINTS, 4).
+        circles: cosine and sine term of both variables' first harmonic over its mean square, shape
+            (waves, 4).
+        tables: both variables less their mean over their half range, and slopes per row, over the
+            phase, shape (waves, POINTS, 4).
         terms: cosine and sine terms of x, shape (waves, 1 + H, 2).
         crests: phase at which x peaks, shape (waves,).
 
@@ -63,9 +63,9 @@ class GaitCells(NamedTuple):
     """The cells of a gait.
 
     Attributes:
-        waves: number of each cell's waveform, shape (size,).
-        phases: phase of each cell in the gait, cycles, shape (size,).
-        maps: what the duty factor makes of each cell's phase, shape (size, 3), see motion.duty.
+        waves: waveform of each cell, from 0, shape (size,).
+        phases: of each cell in the gait, cycles, shape (size,).
+        maps: map of each cell's phase by the duty factor, shape (size, 3), see motion.duty.
         known: the waveforms.
 
     """
@@ -77,16 +77,16 @@ class GaitCells(NamedTuple):
 
 
 def smooth_terms(values: np.ndarray, harmonics: int) -> np.ndarray:
-    """Cosine and sine terms of a waveform's first harmonics, running from -1 to 1.
+    """Return cosine and sine terms of a waveform's first harmonics, scaled to -1 to 1.
 
-    Lanczos' factors sinc(k / (H + 1)) keep the sum from ringing.
+    Lanczos' factors sinc(k / (H + 1)) avoid ringing.
 
     Args:
         values: on even points of a cycle, shape (m,).
         harmonics: H.
 
     Returns:
-        An array of shape (1 + H, 2); row 0 is the constant.
+        Terms of shape (1 + H, 2); row 0 is the constant.
 
     """
     terms = np.fft.rfft(values)[:harmonics + 1] * np.sinc(np.arange(harmonics + 1)
@@ -99,7 +99,7 @@ def smooth_terms(values: np.ndarray, harmonics: int) -> np.ndarray:
 
 
 def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray:
-    """x, or its derivative by phase in radians of order 1 or 2, at phases in cycles."""
+    """Return x, or its derivative by phase in radians of order 1 or 2, at phases in cycles."""
     k = np.arange(terms.shape[0])
     complex_terms = (terms[:, 0] - 1j * terms[:, 1]) * (1j * k)**order
     return (np.exp(TURN * 1j * np.multiply.outer(theta, k)) @ complex_terms).real
@@ -107,10 +107,10 @@ def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray
 
 @lru_cache(maxsize=64)
 def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
-    """Return an orbit's phase map, made once.
+    """Return an orbit's phase map, computed once.
 
     Raises:
-        NoPhase: a waveform has hardly any first harmonic.
+        NoPhase: a waveform has almost no first harmonic.
 
     """
     count, theta = int(orbit.waves.max()) + 1, np.arange(POINTS) / POINTS
@@ -136,24 +136,24 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
 
 
 class PhaseReadout:
-    """Joints driven by the phase of cells, which follows from their first two variables.
+    """Joints that follow the phase of cells, computed from their first two variables.
 
     Attributes:
         start: phase of the first leg at the orbit's phase 0, cycles.
-        gait: the cells of the gait.
-        joints: the cells behind joints and legs.
+        gait: cells of the gait.
+        joints: cells of joints and legs.
         angles, rises: of the joints over a cycle, rad and rad per cycle, shape (joints, m).
 
     """
 
     def __init__(self, orbit: Orbit, cells: np.ndarray, weights: np.ndarray,
                  leg_cells: np.ndarray, harmonics: int, maps: np.ndarray | None = None) -> None:
-        """Prepare for an orbit; arguments as in WaveReadout, and how many harmonics x has.
+        """Prepare for an orbit; arguments as of WaveReadout, and the number of harmonics of x.
 
-        Maps are of the joints, as there; those of a cell have one.
+        All joints of a cell have the same map.
 
         Raises:
-            NoPhase: a waveform has hardly any first harmonic.
+            NoPhase: a waveform has almost no first harmonic.
 
         """
         gait_maps = phase_map(orbit, harmonics)
@@ -203,14 +203,14 @@ def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cell
 
     Args:
         orbit: the gait.
-        cells: the cell behind each joint, from 0, shape (joints,).
-        weights: in rad, shape (joints, 6).
-        leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
-        harmonics: of a waveform that joints follow by its phase.
-        maps: what the duty factor makes of the phase of each joint's cell, shape (joints, 3).
+        cells: cell of each joint, from 0, shape (joints,).
+        weights: rad, shape (joints, 6).
+        leg_cells: cell that gives each leg's phase, from 0, shape (legs,).
+        harmonics: number of harmonics of a waveform that joints follow by its phase.
+        maps: map of the phase of each joint's cell by the duty factor, shape (joints, 3).
 
     Raises:
-        NoPhase: the phase does not follow from a waveform.
+        NoPhase: a waveform does not determine the phase.
 
     """
     if orbit.network.readout == 'waveform':
@@ -220,10 +220,9 @@ def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cell
 
 def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
              ) -> tuple[np.ndarray, np.ndarray]:
-    """Return when each leg begins to stand by itself, and for which fraction of the stride.
+    """Return each leg's own touchdown and duty factor, shape (legs,) each.
 
-    A leg stands while the signal of its cell falls. Phases are those of the cell, cycles; two
-    arrays of shape (legs,).
+    A leg stands while the signal of its cell falls. The touchdown is a phase of the cell, cycles.
     """
     begin, fraction = np.empty((2, len(leg_cells)))
     for leg, cell in enumerate(leg_cells):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Plan a gait on a robot: everything is computed and checked before anything moves."""
+"""Plan a gait on a robot: compute and check everything before anything moves."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -43,8 +43,8 @@ class Obstacle:
     """Why the generator cannot run a gait.
 
     Attributes:
-        message: of a gait that is named, such as 'has a period of ...'.
-        aside: the same of one that has been named, in fewer words, such as 'its period of ...'.
+        message: predicate for a gait that is named, such as 'has a period of ...'.
+        aside: shorter form for a gait that has been named, such as 'its period of ...'.
 
     """
 
@@ -56,9 +56,9 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
     """Find why the generator cannot run a gait: its period, its stability, or its waveform.
 
     Args:
-        orbit: the gait's.
+        orbit: of the gait.
         judged: its stability.
-        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
 
     """
     shortest = STEPS_A_PERIOD * orbit.network.step
@@ -88,18 +88,18 @@ SAME = 1e-6
 
 
 class PlanError(CpgError):
-    """The gait cannot be run; the message gives the reason and the figures."""
+    """The gait cannot run; the message gives the reason and the figures."""
 
     exit_code = 1
 
 
 class OutOfLimits(PlanError):
-    """A joint would leave its limits.
+    """A joint would exceed its limits.
 
     Attributes:
-        message: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
-        excess: how far beyond, in rad, or as a fraction of the limit of speed.
-        key: which limit it is, as robot files call it: lower, upper or velocity.
+        message: joint and figure, such as 'knee at 11.46 rad/s, above its limit 10'.
+        excess: how far beyond the limit, rad, or as a fraction of a speed limit.
+        key: limit as in robot files: lower, upper or velocity.
 
     """
 
@@ -113,21 +113,21 @@ class GaitPlan(ShortRepr):
     """One gait on one robot, ready to run.
 
     Attributes:
-        name: the preset's or gait's name.
-        robot: that it is for.
+        name: of the preset or gait.
+        robot: legs, joints and limits.
         gait: one of the network's gaits.
-        orbit: the gait's orbit.
-        stability: whether it attracts, and with what symmetry gain.
-        gain: symmetry lock in 1/model time.
+        orbit: of the gait.
+        stability: whether the gait attracts, and with which symmetry gain.
+        gain: of the symmetry lock, 1/model time.
         frequency: strides per second (Hz).
-        motion: what the gait makes of the robot.
-        shift: of each joint from the stand to where the gait swings about, rad, (joints,).
-        readout: reads joints and legs off the network's state.
-        in_place: the same for legs that take strides of length 0.
+        motion: the robot's settings in this gait.
+        shift: of each joint from the stand to the mean of the gait, rad, (joints,).
+        readout: from the network's state to joints and legs.
+        in_place: the same for strides of length 0.
         span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
         speed: largest speed of each joint, rad/s, shape (joints,).
         duty: fraction of the stride that each leg stands, shape (legs,).
-        step: model time per step; the network's own if None.
+        step: integration step, model time; None for the network's own.
 
     """
 
@@ -153,7 +153,7 @@ class GaitPlan(ShortRepr):
 
     @cached_property
     def seed(self) -> Stepper:
-        """A stepper on the orbit at phase 0; copy it, do not advance it."""
+        """Stepper on the orbit at phase 0; copy it, do not advance it."""
         network = self.orbit.network
         return Stepper(network, self.orbit, self.step, gain=self.gain,
                        symmetry=self.orbit.symmetry)
@@ -179,12 +179,12 @@ class GaitPlan(ShortRepr):
 
     @property
     def balanced(self) -> bool:
-        """Whether it is a gait of a biped whose feedback places the feet, and so steers it."""
+        """Whether it is a biped's gait, whose feedback places the feet and so steers it."""
         return self.robot.biped is not None and self.gait in GAIT_SPEEDS
 
     @cached_property
     def own_speed(self) -> float:
-        """Speed forward at full strides as far as it has been measured, m/s, or else 0."""
+        """Measured forward speed at full strides, m/s, 0 if unknown."""
         steering = self.motion.steering
         if steering is None:
             return 0.0
@@ -215,7 +215,7 @@ class GaitPlan(ShortRepr):
 
     @cached_property
     def most_pace(self) -> float:
-        """Factor of the frequency at which the first joint moves as fast as its limit allows."""
+        """Largest factor of the frequency within the joints' speed limits."""
         return float((self.robot.column('velocity') / np.maximum(self.speed, 1e-9)).min())
 
     @property
@@ -227,7 +227,7 @@ class GaitPlan(ShortRepr):
 
     @property
     def character(self) -> str:
-        """Walk-like, run-like or neither: how the two cells of each leg go together."""
+        """Walk-like, run-like or neither, see Network.character."""
         return self.orbit.network.character(self.gait, self.robot.assignment)
 
     @cached_property
@@ -242,10 +242,10 @@ class GaitPlan(ShortRepr):
 
 @lru_cache(maxsize=32)
 def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
-    """Solve for a preset's gait with parameters of its own, and judge its stability.
+    """Solve for a preset's gait at other parameters, and compute its stability.
 
-    Of several orbits it takes one that attracts within the gait's class, if any does; of those,
-    the one reached from the preset, or else that of the period nearest to the preset's.
+    Of several orbits, those that attract within the gait's class come first, then the one reached
+    by continuation from the preset, then the one with the period nearest to the preset's.
 
     Raises:
         CpgError: bad parameters, or no such orbit (NoOrbit).
@@ -263,12 +263,12 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
 
 
 def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
-    """Return why the generator would reject a gait, whatever the robot, or ''.
+    """Return why the generator would reject a gait on any robot, or ''.
 
     Args:
-        orbit: the gait's.
+        orbit: of the gait.
         gait: its name.
-        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
 
     """
     try:
@@ -284,21 +284,22 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
 
 def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,
          amplitude: float = 1.0, gain: float = -1.0, duty: float = 0.0) -> GaitPlan:
-    """Work out a gait on a robot and check it against the robot's limits.
+    """Compute a gait on a robot and check it against the robot's limits.
 
     Args:
         robot: legs, joints and limits.
-        name: what to call it, the preset's name or the gait's.
-        preset: the gait and parameters near which it is known.
-        network: its parameters.
+        name: of the plan, the preset's or gait's.
+        preset: the gait, and parameters near which its orbit is known.
+        network: parameters.
         frequency: strides per second (Hz); 0 takes one model time unit as a second.
-        amplitude: factor on every joint's readout weights.
-        gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.
-        duty: fraction of the stride that legs stand; 0 for the gait's own, from the robot file or
-            else from the network.
+        amplitude: factor of every joint's readout weights.
+        gain: of the symmetry lock, 1/model time; a negative value selects one that makes the gait
+            attract.
+        duty: fraction of the stride that legs stand; 0 for the robot file's, or else the
+            network's.
 
     Raises:
-        PlanError: there is no such orbit, it does not attract, or a joint would leave its limits.
+        PlanError: there is no such orbit, it does not attract, or a joint would exceed its limits.
 
     """
     gait = preset.gait
@@ -345,9 +346,9 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
 
 def plan_gait(robot: Robot, name: str, frequency: float | None = None, amplitude: float = 1.0,
               network: str = '') -> GaitPlan:
-    """Plan a gait with a preset's own parameters, on a robot's first network unless one is given.
+    """Plan a gait with a preset's parameters, by default on the robot's first network.
 
-    Without a frequency, the robot file's is used. Other arguments and errors as of plan.
+    The default frequency is the robot file's. Other arguments and errors as of plan.
     """
     preset = NETWORKS[network or robot.networks[0]].presets()[name]
     if frequency is None:
@@ -369,20 +370,20 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
 
 
 def beyond_limits(joint: Joint, low: float, high: float) -> str:
-    """Return how a joint leaves its limits that moves from low to high, rad, '' if it does not."""
+    """Return how a joint that moves from low to high, rad, exceeds its limits, or ''."""
     return next((message for excess, _, message in _beyond(
         joint, low - joint.offset, high - joint.offset, 0.0) if excess > 1e-9), '')
 
 
 def _beyond(joint: Joint, low: float, high: float, fastest: float
             ) -> Iterator[tuple[float, str, str]]:
-    """Yield for each limit how far a joint is beyond it, its name and the figure.
+    """Yield the excess, the name and the figure for each limit.
 
     Args:
-        joint: which.
-        low: its smallest deviation from its offset, rad.
-        high: its largest one, rad.
-        fastest: its largest speed, rad/s.
+        joint: the joint.
+        low: smallest deviation from its offset, rad.
+        high: largest deviation, rad.
+        fastest: largest speed, rad/s.
 
     """
     low, high = joint.offset + low, joint.offset + high

@@ -14,8 +14,8 @@
 
 """Readout from cells to joints: duty factors, polynomials, retiming and waveform readouts.
 
-It is for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
-the gait's peak, y its derivative by phase. See phase_readout for those whose phase does.
+The waveform readout is for smooth cells (the delayed network): x is the cell over the gait's peak,
+y its derivative by phase. For relaxation oscillators see phase_readout.
 """
 
 from collections.abc import Callable
@@ -34,9 +34,9 @@ LEAST, MOST = 0.3, 0.9
 
 
 def retimed_phase(phase, k, centre, own):
-    """Return the phase at which joints are read, and its first and second derivative by the phase.
+    """Return the phase at which joints are read, and its first and second derivative by phase.
 
-    All in cycles; with k = 1 nothing changes.
+    All are in cycles; k = 1 is the identity.
     """
     angle = math.pi * (phase - centre)
     s, c = math.sin(angle), math.cos(angle)
@@ -46,7 +46,7 @@ def retimed_phase(phase, k, centre, own):
 
 
 def at_even_phases(wave: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the image of even phases of a cycle under a map (k, centre, own), and its slope."""
+    """Return a map (k, centre, own) at even phases of a cycle, and its slope."""
     rows = [retimed_phase(n / points, *wave)[:2] for n in range(points)]
     phase, steep = np.array(rows).T
     return phase, steep
@@ -68,7 +68,7 @@ def stance(values: np.ndarray, crest: float) -> float:
 
 
 class Duty:
-    """The duty factors of legs, and the maps of phase that bring them about.
+    """Duty factors of legs, and the maps of phase that produce them.
 
     Attributes:
         fractions: of the stride that each leg stands, shape (legs,).
@@ -77,17 +77,17 @@ class Duty:
 
     def __init__(self, orbit: Orbit, leg_cells: np.ndarray, begin: np.ndarray, own: np.ndarray,
                  fractions: np.ndarray) -> None:
-        """Work out the map of each leg.
+        """Compute the map of each leg.
 
         Args:
             orbit: the gait.
-            leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
-            begin: phase of that cell at which each leg begins to stand, cycles, shape (legs,).
-            own: fractions that legs stand by themselves, shape (legs,).
-            fractions: wanted, shape (legs,).
+            leg_cells: cell that gives each leg's phase, from 0, shape (legs,).
+            begin: phase of that cell at the leg's touchdown, cycles, shape (legs,).
+            own: duty factors of the cells, shape (legs,).
+            fractions: wanted duty factors, shape (legs,).
 
         Raises:
-            InputError: a fraction is not from LEAST to MOST, or not one of a cycle.
+            InputError: a fraction is not from LEAST to MOST.
 
         """
         for fraction in fractions[fractions != own]:
@@ -103,7 +103,7 @@ class Duty:
         """Return k, centre and own for cells by their own phases, shape (n, 3).
 
         Args:
-            legs: index of the leg that each cell drives, shape (n,).
+            legs: leg of each cell, shape (n,).
             cells: from 0, shape (n,).
 
         """
@@ -118,12 +118,12 @@ TURN = 2.0 * math.pi
 
 
 class DrivenJoints(NamedTuple):
-    """The cells behind joints and legs.
+    """Cells of joints and legs.
 
     Attributes:
-        cells: the cell behind each joint, from 0, shape (joints,).
+        cells: cell of each joint, from 0, shape (joints,).
         weights: readout weights of each joint, rad, shape (joints, 6).
-        leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
+        leg_cells: cell that gives each leg's phase, from 0, shape (legs,).
 
     """
 
@@ -132,7 +132,7 @@ class DrivenJoints(NamedTuple):
     leg_cells: np.ndarray
 
     def fields(self) -> dict[str, Any]:
-        """Return them as the core takes them, see core.CGait."""
+        """Return the fields of the core, see core.CGait."""
         return {'joints': self.cells.size, 'joint_cell': self.cells, 'weights': self.weights,
                 'legs': self.leg_cells.size, 'leg_cell': self.leg_cells}
 
@@ -142,8 +142,8 @@ def monomials(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, 
 
     Args:
         x: readout signal, any shape.
-        y: its derivative by phase in radians.
-        z: its second derivative.
+        y: derivative by phase in radians.
+        z: second derivative.
 
     Returns:
         Two arrays of shape (6, ...).
@@ -161,13 +161,13 @@ def over_cycle(weights: np.ndarray, signals: Callable[[int, np.ndarray], tuple[n
 
     Args:
         weights: of the readouts, rad, shape (joints, 6).
-        signals: joint and phases of its cell, cycles, (m,) -> x, y and the derivative of y.
-        maps: what the duty factor makes of the phase of each joint's cell, shape (joints, 3), see
-            motion.duty; None for nothing.
-        points: m, even over the cycle.
+        signals: (joint, phases of its cell in cycles, (m,)) -> x, y and the derivative of y.
+        maps: map of the phase of each joint's cell by the duty factor, shape (joints, 3), see
+            motion.duty, or None.
+        points: m, number of even points.
 
     Returns:
-        Angles, rad, and their derivatives by phase, rad per cycle, shape (joints, m).
+        Angles, rad, and derivatives by phase, rad per cycle, shape (joints, m).
 
     """
     angles, rises = np.empty((2, len(weights), points))
@@ -187,14 +187,14 @@ POINTS = 512
 
 
 class Waveform(NamedTuple):
-    """The waveform of a gait's cells.
+    """Waveform of a gait's cells.
 
     Attributes:
         peak: largest value of a cell on the orbit.
         period: of the orbit, model time.
-        phases: phase of each cell in the gait, cycles, shape (cells,).
-        values: over the peak, on even phases of a cycle, shape (m,).
-        phase_offset: phase minus angle, both in cycles, on even angles, shape (m,).
+        phases: of each cell in the gait, cycles, shape (cells,).
+        values: over the peak, at even phases, shape (m,).
+        phase_offset: phase minus angle, both in cycles, at even angles, shape (m,).
 
     """
 
@@ -206,13 +206,12 @@ class Waveform(NamedTuple):
 
 
 class Retiming(NamedTuple):
-    """Tables by which joints follow a waveform at another phase than their cells'.
+    """Tables by which joints follow a waveform at another phase than that of their cells.
 
     Attributes:
-        phase_offset: of the orbit on even angles: phase minus angle, cycles, and its slope per
-            entry, shape (m, 2).
-        cycle: of the orbit on even phases: x and its slope per entry, y and its slope, shape
-            (m, 4).
+        phase_offset: phase minus angle of the orbit at even angles, cycles, and slope per entry,
+            shape (m, 2).
+        cycle: x and y of the orbit at even phases, each with its slope per entry, shape (m, 4).
         maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
 
     """
@@ -246,19 +245,18 @@ def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
 
 
 class NoPhase(CpgError):
-    """A waveform does not determine its phase and so cannot drive joints; the message says why."""
+    """A waveform does not determine its phase, so it cannot drive joints."""
 
 
-def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Tabulate phase minus angle over the angle, from a closed curve sampled evenly in phase.
+def phase_offsets(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Tabulate phase minus angle over the angle, for a closed curve sampled evenly in phase.
 
     Args:
         x: normalised state, shape (m,), from phase 0 where it peaks.
-        y: its derivative by phase in radians, shape (m,). The angle is atan2(-y, x).
+        y: derivative by phase in radians, shape (m,). The angle is atan2(-y, x).
 
     Raises:
-        NoPhase: the curve does not turn steadily about the origin, so that its angle does
-            not determine the phase.
+        NoPhase: the angle is not monotonic, so that it does not determine the phase.
 
     """
     phase = np.arange(x.size + 1) / x.size
@@ -271,14 +269,14 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 class WaveReadout:
-    """Joints driven by the cells' waveform.
+    """Joints that follow the cells' waveform.
 
     Attributes:
         start: phase of the first leg at the orbit's phase 0, cycles.
         angles, rises: of the joints over a cycle, rad and rad per cycle, shape (joints, m).
-        wave: the gait's waveform.
-        joints: the cells behind joints and legs.
-        retiming: what the duty factor makes of it, None for nothing.
+        wave: of the gait.
+        joints: cells of joints and legs.
+        retiming: by the duty factor, or None.
 
     """
 
@@ -288,11 +286,11 @@ class WaveReadout:
 
         Args:
             orbit: the gait.
-            cells: the cell behind each joint, from 0, shape (joints,).
-            weights: in rad, shape (joints, 6).
-            leg_cells: the cell that gives each leg's phase, shape (legs,).
-            maps: what the duty factor makes of the phase of each joint's cell, shape (joints,
-                3), see motion.duty; None for nothing.
+            cells: cell of each joint, from 0, shape (joints,).
+            weights: rad, shape (joints, 6).
+            leg_cells: cell that gives each leg's phase, shape (legs,).
+            maps: map of the phase of each joint's cell by the duty factor, shape (joints, 3), see
+                motion.duty, or None.
 
         Raises:
             NoPhase: the waveform does not determine the phase.
@@ -302,7 +300,7 @@ class WaveReadout:
         x = orbit.waveform(theta) / orbit.peak
         y = orbit.waveform(theta, 1) / (TURN * orbit.peak)
         z = orbit.waveform(theta, 2) / (TURN**2 * orbit.peak)
-        self.wave = Waveform(orbit.peak, orbit.period, orbit.phases, x, lead_table(x, y))
+        self.wave = Waveform(orbit.peak, orbit.period, orbit.phases, x, phase_offsets(x, y))
         self.joints = DrivenJoints(cells, weights, leg_cells)
         self.start = float(orbit.phases[leg_cells[0]])
         self.retiming = None
@@ -325,7 +323,7 @@ class WaveReadout:
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return minimum and maximum of each row, periodic on even points, by parabolas."""
+    """Return minimum and maximum of each periodic row on even points, by parabolas."""
     return -_highest(-values), _highest(values)
 
 

@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot as the generator sees it: legs, joints, which cell drives each joint and how, limits.
+"""A robot as the generator sees it: legs, joints, cells that drive them, limits.
 
-A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
-Morris-Lecar cell: the first harmonics of it), from -1 to 1, y the derivative of that by phase (in
-radians), psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout), and weights are in
-rad. A gait's motion can replace offsets and weights. Strides from -1 to 1 make the weights
-``in_place + stride (w - in_place)``.
+A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (for a
+Morris-Lecar cell its first harmonics), from -1 to 1, y the derivative of x by phase (in radians),
+psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout), and weights are in rad. A
+gait's motion can replace offsets and weights. Strides from -1 to 1 make the weights ``in_place +
+stride (w - in_place)``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +43,8 @@ WEIGHTS = (1, 2, 4, 6)
 class Joint:
     """One joint: name, leg, cell from 1; offset, weights, lower, upper in rad; velocity rad/s.
 
-    What is ``invented`` (of lower, upper and velocity) is a guess, as the URDF has no limit there.
+    ``invented`` names those of lower, upper and velocity that are guesses, as the URDF has no
+    limit.
     """
 
     name: str
@@ -59,15 +60,13 @@ class Joint:
 
 @dataclass(frozen=True)
 class SteeringTable:
-    """Measured speed and yaw rate of a robot by stride: the strides for a commanded speed.
-
-    Rows are by rising speed.
+    """Measured speed and yaw rate of a robot by stride, by ascending speed.
 
     Attributes:
         speed: forward, m/s.
         stride: factor of all legs' strides, -1 to 1.
         frequency: of the strides, Hz.
-        turn: rad/s of yaw for each unit by which the right legs' stride exceeds the left ones'.
+        turn: yaw rate, rad/s, for each unit by which the right stride exceeds the left one.
 
     """
 
@@ -80,9 +79,9 @@ class SteeringTable:
         """Return the strides of the left and right legs, and the frequency in Hz.
 
         Args:
-            speed: wanted, forward, m/s; taken to the nearest that the table has.
-            turn: wanted yaw rate, rad/s, positive to the left; where a leg would need a longer
-                stride than 1, turning comes before speed.
+            speed: wanted, forward, m/s; limited to the table's range.
+            turn: wanted yaw rate, rad/s, positive to the left; it takes precedence over speed
+                where a stride would exceed 1.
 
         """
         stride, frequency, rate = (float(np.interp(speed, self.speed, column))
@@ -103,17 +102,17 @@ class JointMotion:
 
 @dataclass(frozen=True, repr=False)
 class Motion(ShortRepr):
-    """A robot in one gait, where that differs from the robot's joints.
+    """A robot in one gait, where it differs from the robot's joints.
 
     Attributes:
-        frequency: strides per second that it was made for, Hz; None if it does not matter.
+        frequency: for which it was made, strides per second (Hz); None for any.
         joints: by name.
-        steering: None if it has not been measured.
-        duty: fraction of the stride that legs are to stand, None for what they do by themselves.
+        steering: None if not measured.
+        duty: wanted fraction of the stride that legs stand, None for that of the cells.
         verdict: of a trial in simulation, which begins with good or poor; '' if there was none.
-        stance: phase of a leg's cell at which it begins to stand by the weights there are, and
-            for which fraction of the stride, cycles; None if it stands while its cell falls.
-        efference: what the base does by itself, None if it has not been measured.
+        stance: touchdown as a phase of the leg's cell, and duty factor, of the weights, cycles;
+            None if a leg stands while its cell falls.
+        efference: the base's own motion, None if not measured.
 
     """
 
@@ -131,18 +130,18 @@ class Robot(ShortRepr):
     """Legs and joints of a robot, joints grouped by leg in the order of the file.
 
     Attributes:
-        name: the file's stem.
-        networks: names of the networks whose cells can drive it; all have the same legs.
-        assignment: which of their cells drive which leg.
-        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        name: stem of the file.
+        networks: names of the networks that can drive it; all have the same legs.
+        assignment: of cells to legs, see NetworkDefinition.legs.
+        harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
         legs: leg -> its joints.
-        order: all joints' names in the order in which controllers take them.
-        motions: gait or preset -> its motion.
-        sides: leg -> left or right, as the file or else a network says.
-        girdles: leg -> fore or hind, the same.
-        geometry: of its legs, None if the file does not have it.
-        biped: links, soles and servos of a biped that stands on soles, or None.
-        feedback: what its feedback has of its own, None if everything is the usual.
+        order: names of all joints in the order of controllers.
+        motions: gait or preset -> motion.
+        sides: leg -> left or right, from the file or the network.
+        girdles: leg -> fore or hind, likewise.
+        geometry: of its legs, None if the file has none.
+        biped: links, soles and servos of a biped with soles, or None.
+        feedback: settings that differ from the defaults, or None.
 
     """
 
@@ -174,7 +173,7 @@ class Robot(ShortRepr):
         """Whether each leg is on the left, shape (legs,).
 
         Raises:
-            ValueError: neither the network nor the robot file says of each leg on which side.
+            ValueError: neither network nor robot file states the side of each leg.
 
         """
         for leg in self.legs:
@@ -190,7 +189,7 @@ class Robot(ShortRepr):
 
     @property
     def held(self) -> dict[str, float]:
-        """Joints that are no leg's but are held, and where, rad."""
+        """Held joint that belongs to no leg -> angle, rad."""
         return {} if self.biped is None else self.biped.held
 
     @property
@@ -201,7 +200,7 @@ class Robot(ShortRepr):
 
     @property
     def cells(self) -> np.ndarray:
-        """Index from 0 of the cell behind each joint, shape (joints,)."""
+        """Cell of each joint, from 0, shape (joints,)."""
         return np.array([joint.cell - 1 for joint in self.joints])
 
     def motion(self, preset: str, gait: str) -> Motion:
@@ -209,20 +208,20 @@ class Robot(ShortRepr):
         return self.motions.get(preset) or self.motions.get(gait) or Motion()
 
     def networks_with(self, gait: str) -> tuple[str, ...]:
-        """Return the names of those of its networks that have a gait or preset."""
+        """Return the names of the robot's networks that have a gait or preset."""
         return tuple(name for name in self.networks if gait in NETWORKS[name].presets())
 
     def shift(self, motion: Motion) -> np.ndarray:
-        """Difference between a motion's offsets and those of the stand, rad, shape (joints,)."""
+        """Return a motion's offsets less those of the stand, rad, shape (joints,)."""
         return np.array([motion.joints[joint.name].offset - joint.offset
                          if joint.name in motion.joints else 0.0 for joint in self.joints])
 
     def weights(self, motion: Motion | None = None, in_place: bool = False) -> np.ndarray:
-        """Readout weights in rad, shape (joints, 6), zero above a joint's own order.
+        """Return readout weights, rad, shape (joints, 6), zero above a joint's own order.
 
         Args:
-            motion: whose; without one, those of the joints themselves.
-            in_place: those at a stride of 0.
+            motion: of a gait; by default the joints' own weights.
+            in_place: return the weights at a stride of 0.
 
         """
         table = np.zeros((len(self.joints), WEIGHTS[-1]))
@@ -234,18 +233,18 @@ class Robot(ShortRepr):
         return table
 
     def column(self, key: str) -> np.ndarray:
-        """One number of every joint (offset, lower, upper or velocity), shape (joints,)."""
+        """Return a number of every joint (offset, lower, upper or velocity), shape (joints,)."""
         return np.array([getattr(joint, key) for joint in self.joints], dtype=float)
 
     @property
     def leg_cells(self) -> np.ndarray:
-        """Index from 0 of the cell that gives each leg's phase, shape (legs,)."""
+        """Cell that gives each leg's phase, from 0, shape (legs,)."""
         cells = NETWORKS[self.networks[0]].legs[self.assignment]
         return np.array([cells[leg][0] - 1 for leg in self.legs])
 
     @property
     def leg_of_joint(self) -> np.ndarray:
-        """Index from 0 of each joint's leg, shape (joints,)."""
+        """Leg of each joint, from 0, shape (joints,)."""
         return np.repeat(np.arange(len(self.legs)), [len(leg) for leg in self.legs.values()])
 
 
@@ -266,18 +265,18 @@ def gait_readouts(robot: Robot, motion: Motion) -> dict[str, tuple[float, ...]]:
 
 def with_readouts(robot: Robot, preset: str, gait: str,
                   readouts: Mapping[str, Sequence[float]]) -> Robot:
-    """Return a robot whose joints are read off a gait in another way.
+    """Return a robot with other readouts in a gait.
 
     Weights at a stride of 0, steering and duty stay those of the file.
 
     Args:
-        robot: it is returned as it is if that is how it moves already.
-        preset: whose motion is changed, or that of its gait if it has none of its own.
+        robot: returned itself if nothing changes.
+        preset: whose motion is changed, or that of its gait if it has none.
         gait: of the preset.
-        readouts: of every joint its offset, then 1, 2, 4 or 6 weights, rad.
+        readouts: joint -> offset, then 1, 2, 4 or 6 weights, rad.
 
     Raises:
-        InputError: of a joint there are fewer or more numbers, or one is not finite.
+        InputError: a joint has another number of values, or one is not finite.
 
     """
     motion = robot.motion(preset, gait)

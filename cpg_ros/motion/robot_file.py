@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Robot files: reading YAML with every mistake named, and writing it.
+"""Robot files: read YAML and name every mistake, and write it.
 
-The first part gives the cell that drives each joint, its weights and its limits; the optional
-part ``gaits`` gives what differs in a gait, and how to steer it.
+The first part gives the cell that drives each joint, its weights and its limits; the optional part
+``gaits`` gives what differs in a gait, and how to steer it.
 """
 
 from collections.abc import Mapping
@@ -59,7 +59,7 @@ class RobotError(CpgError):
 
 
 class _Reader(YamlReader):
-    """Reads networks and joints, too."""
+    """Reader that knows networks and joints."""
 
     def networks(self, value: Any) -> tuple[str, ...]:
         names, networks = value if isinstance(value, list) else [value], []
@@ -166,8 +166,7 @@ def read_robot(path: str | Path) -> Robot:
     """Read and check a robot file.
 
     Raises:
-        RobotError: the file cannot be read or a value in it cannot be used; one line with the
-            file, the key and the reason.
+        RobotError: the file cannot be read, or a value cannot be used.
 
     """
     path = Path(path)
@@ -241,7 +240,7 @@ def read_robot(path: str | Path) -> Robot:
 
 
 def _alike(cells: Mapping[str, tuple[int, ...]], others: Mapping[str, tuple[int, ...]]) -> bool:
-    """Return whether two networks have the same legs, led by the same cells; others may differ."""
+    """Tell whether two networks have the same legs with the same first cells."""
     return set(cells) == set(others) and all(cells[leg][0] == others[leg][0] for leg in cells)
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Steering a gait: how long each leg's stride is, and how fast strides follow one another."""
+"""Steering of a gait: length and frequency of the strides."""
 
 import ctypes
 from typing import TypeVar
@@ -31,12 +31,12 @@ def smoothstep(s: Real) -> Real:
 class StrideCommand:
     """Strides of the legs and their pace, on the way to their targets.
 
-    Each approaches its target as a critically damped oscillator does, so that a change of
-    target changes neither value nor rate at once.
+    Each approaches its target as a critically damped oscillator, so that a new target changes
+    neither value nor rate at once.
 
     Attributes:
-        stride: factor of each leg's stride, shape (legs,); 1 is the gait as it is.
-        rate: its derivative, 1/s.
+        stride: factor of each leg's stride, shape (legs,); 1 is the gait's own.
+        rate: derivative of the strides, 1/s.
         pace: factor of the stride frequency.
 
     """
@@ -58,7 +58,7 @@ class StrideCommand:
 
     @property
     def trim(self) -> np.ndarray | None:
-        """Added to the targets of the strides, shape (legs,), such as by feedback, or None."""
+        """Offsets of the strides' targets, shape (legs,), such as from feedback, or None."""
         return self._trim
 
     @trim.setter
@@ -70,7 +70,7 @@ class StrideCommand:
     def set_target(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
         """Set the targets, to be reached at once where nothing moves yet.
 
-        May be called from another thread than advance.
+        It may be called from another thread than advance.
         """
         # A tick in between must not reach a part of them at once.
         self._struct.at_once = 0

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The definition of a network: parameters, cells, equations, legs and gaits.
+"""Definition of a network: parameters, cells, equations, legs and gaits.
 
-States are vectors of ``components`` numbers, variable by variable: first that of every cell
-which the legs read (x or v), then the second one (w or u). All networks have the form
-``dx/dt = f(x(t), x(t - delay); p)``; networks without delay ignore the second argument.
+A state is a vector of ``components`` numbers, variable by variable: first the variable that legs
+read (x or v) of every cell, then the next (w or u). All networks have the form ``dx/dt = f(x(t),
+x(t - delay); p)``; networks without delay ignore the second argument.
 """
 
 from abc import ABC, abstractmethod
@@ -33,13 +33,13 @@ Number = Union['Term', float]
 
 def _operators(sign: str) -> tuple[Callable[['Term', Number], 'Term'],
                                    Callable[['Term', Number], 'Term']]:
-    """Return a binary operator of terms, and the same with exchanged operands."""
+    """Return a binary operator of terms, and the same operator with exchanged operands."""
     return (lambda term, other: Term(f'({term.text} {sign} {_text(other)})'),
             lambda term, other: Term(f'({_text(other)} {sign} {term.text})'))
 
 
 class Term:
-    """A part of an equation, as text that sympy reads."""
+    """Part of an equation, as text that sympy reads."""
 
     __add__, __radd__ = _operators('+')
     __sub__, __rsub__ = _operators('-')
@@ -72,7 +72,7 @@ tanh, cosh, exp, log, sin, cos, sqrt = map(
 
 
 def positive(x: Number) -> Term:
-    """max(0, x): differentiable except at 0, where the network has a kink."""
+    """Return max(0, x), which has a kink at 0."""
     return Term(f'(({_text(x)} + Abs({_text(x)})) / 2)')
 
 
@@ -86,12 +86,12 @@ Inputs = Source | Callable[[int], int]
 
 @dataclass(frozen=True)
 class Argument:
-    """A state variable as it stands in the equations of a cell.
+    """A state variable in the equations of a cell.
 
     Attributes:
-        variable: of the cell that is the input, from 0.
-        source: the cell that each cell receives input from; None for itself.
-        delayed: whether its value a delay ago counts.
+        variable: index of the variable, from 0.
+        source: input cell of each cell; None for the cell itself.
+        delayed: whether the value is the one a delay ago.
 
     """
 
@@ -101,7 +101,7 @@ class Argument:
 
 
 class Cell:
-    """Any cell of a network, as its equations see it."""
+    """A cell in the equations of its network."""
 
     def __init__(self, variables: int, cells: int) -> None:
         """Record the inputs that the equations read."""
@@ -113,7 +113,7 @@ class Cell:
         return self._input(source, False)
 
     def past(self, source: Inputs | None = None) -> tuple[Term, ...]:
-        """Return the same as they were a delay ago."""
+        """Return the same variables a delay ago."""
         return self._input(source, True)
 
     def _input(self, source: Inputs | None, delayed: bool) -> tuple[Term, ...]:
@@ -129,10 +129,10 @@ class Cell:
 
 
 class Parameters:
-    """A network's parameters, as its equations see them: one number, or one for each cell."""
+    """Parameters in a network's equations: one number each, or one for each cell."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        """Offer the parameters by name, and groups that have one for each cell."""
+        """Define the parameters, and the groups with one parameter for each cell."""
         self._known = set(names)
 
     def __getattr__(self, name: str) -> Term:
@@ -146,12 +146,12 @@ AnyDefinition = TypeVar('AnyDefinition', bound='NetworkDefinition')
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter's range and meaning.
+    """Range and meaning of a parameter.
 
     Attributes:
-        low: least value that may be set, in the parameter's own unit.
-        high: greatest value, in the same unit.
-        text: what it is, with its unit in brackets if it has one.
+        low: smallest value, in the parameter's own unit.
+        high: largest value, in the same unit.
+        text: description, with the unit in brackets if there is one.
 
     """
 
@@ -164,41 +164,42 @@ class NetworkDefinition(ABC):
     """Parameters, cells and equations of a network, as a frozen dataclass of floats.
 
     Attributes:
-        name: by which it is chosen.
+        name: on the command line and in files.
         cells: number of cells.
-        states: names of each cell's variables; legs read the first.
-        variables: number of these.
-        readout: signal that joints follow: the waveform of cells that are as smooth as joints, or
-            the phase, from two variables of a cell, of cells that jump.
+        states: names of a cell's variables; legs read the first.
+        variables: number of states of a cell.
+        readout: signal that joints follow: the waveform of smooth cells, or the phase of
+            relaxation oscillators, computed from two variables.
         delay_parameter: name of the delay, '' for an ordinary differential equation.
-        longest_delay: largest value of the delay at run time, model time.
-        needed: parameter that must not be 0 -> the consequence of 0.
-        step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
-        ranges: parameter -> range in which it may be set at run time.
-        legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
-            gives the leg's phase; the first assignment is the usual one.
-        family: network from which one for another number of legs is made.
-        sides: leg -> left or right; robot files may give it instead.
-        girdles: leg -> fore, middle or hind; robot files may give it instead.
-        muscles: name -> cell from 1, where cells drive muscles, for reports and diagrams; these
-            are of legs otherwise, which stand while their first cell falls.
-        groups: name -> parameters that are set together under it.
-        own_of_cells: name in the equations -> the parameter of each cell, where these are not set
-            together as a group.
-        kinks: variables at whose zeros the rates have a kink.
+        longest_delay: largest delay at run time, model time.
+        needed: parameter that must not be 0 -> consequence of 0.
+        step: integration step in real time, model time; the error on an orbit is about 1e-9 a
+            cycle.
+        ranges: parameter -> range at run time.
+        legs: assignment -> leg -> cells from 1; the first cell gives the leg's phase. The first
+            assignment is the default.
+        family: network from which this one was derived for another number of legs.
+        sides: leg -> left or right; a robot file may state it instead.
+        girdles: leg -> fore, middle or hind; a robot file may state it instead.
+        muscles: muscle -> cell from 1, for reports and diagrams; empty where a cell drives a leg,
+            which is in stance while the cell's signal falls.
+        groups: name -> parameters that it sets together.
+        own_of_cells: name in the equations -> parameter of each cell, where no group sets them
+            together.
+        kinks: variables at whose zeros the rates are not differentiable.
         couplings: parameters without which the cells are uncoupled.
-        offsets: leg -> parameter with its lead in cycles, where any phases are a gait.
-        unnamed: name of a gait of such a network whose phases have no name.
-        rests: whether a cell without input has an equilibrium, from which gaits emerge.
-        usual_gait: default gait; its default preset has the same name.
-        usual_robot: default robot, a file or the name of a shipped one.
-        free: parameters or groups that are fitted to a recording by default.
-        line: default line of parameters for Hopf points and branches, as ParameterLine reads it.
-        span: range of values on it, or None for multiples of the delay.
-        searched: parameter or group -> bounds of a search for weights; equal bounds fix it. Empty:
-            no search.
-        typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
-            the search starts.
+        offsets: leg -> parameter with its phase lead in cycles, where any phases are a gait.
+        unnamed: gait name of such a network for phases without a name.
+        rests: whether a cell without input has an equilibrium, at which gaits bifurcate.
+        usual_gait: default gait, and name of the default preset.
+        usual_robot: default robot, a file or a shipped name.
+        free: parameters or groups that a fit to a recording varies by default.
+        line: default line in parameter space for Hopf points and branches, see ParameterLine.
+        span: range of values on the line, or None for multiples of the delay.
+        searched: parameter or group -> bounds of a search for weights; equal bounds fix it. Empty
+            for no search.
+        typical_cycle: middle, half range and lag in cycles of each variable on the cycle from
+            which the search starts.
 
     """
 
@@ -241,9 +242,9 @@ class NetworkDefinition(ABC):
     def fitted(cls, legs: int) -> dict[str, Any]:
         """Return the class attributes of this network for another number of legs: name -> value.
 
-        A network that takes any even number derives cells, legs, sides, girdles and all that
-        depends on them by a rule; its ``equations`` state the inputs by rules, too. The key
-        ``fields``, if there is one, names the parameters of the legs, instead of this network's.
+        A network for any even number derives cells, legs, sides, girdles and everything that
+        depends on them by a rule; its ``equations`` state inputs by rules, too. The optional key
+        ``fields`` names the parameters of the legs.
 
         Raises:
             InputError: the network does not take this number of legs.
@@ -252,20 +253,20 @@ class NetworkDefinition(ABC):
         raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')
 
     def as_dict(self) -> dict[str, float]:
-        """Return the parameters by name, in their own order."""
+        """Return the parameters by name, in their order of declaration."""
         return {name: getattr(self, name) for name in self.parameters()}
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
-        """Return the names of the parameters, in their own order."""
+        """Return the names of the parameters, in their order of declaration."""
         return _names(cls)
 
     @classmethod
     def members(cls, name: str) -> tuple[str, ...]:
-        """Return the parameters of a group, or the parameter of this name alone.
+        """Return the parameters of a group, or the parameter of this name.
 
         Raises:
-            InputError: a name that is neither a parameter nor a group of the network.
+            InputError: the name is neither a parameter nor a group of the network.
 
         """
         members = cls.groups.get(name, (name,))
@@ -287,30 +288,30 @@ class NetworkDefinition(ABC):
     @staticmethod
     @abstractmethod
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
-        """Return the rate of each variable of a cell, written once for all cells.
+        """Return the rate of each variable of a cell; the same equations hold for all cells.
 
         Args:
-            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of
-                its input, ``cell.past(source)`` the same a delay ago. The source is a cell for
-                each cell, or a function that gives it, modulo the number of cells.
-            p: the parameters, and groups of them that have one for each cell, by name.
+            cell: gives variables: ``cell.now()`` those of the cell, ``cell.now(source)`` those of
+                its input, ``cell.past(source)`` the same a delay ago. A source is a tuple of
+                cells, or a function of a cell, modulo the number of cells.
+            p: parameters by name, and groups with one parameter for each cell.
 
         """
 
     @classmethod
     @abstractmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Return the names of the gaits it knows."""
+        """Return the names of the gaits."""
 
     @classmethod
     def by_cell(cls) -> dict[str, tuple[str, ...]]:
-        """Return name in the equations -> the parameters of the cells for which it stands."""
+        """Return name in the equations -> parameters of the cells."""
         return {**{name: members for name, members in cls.groups.items()
                    if len(members) == cls.cells}, **cls.own_of_cells}
 
 
 def leg_count(network: type[NetworkDefinition]) -> int:
-    """Return how many legs a network has."""
+    """Return the number of legs of a network."""
     return len(next(iter(network.legs.values())))
 
 

@@ -24,7 +24,7 @@ from sympy.printing.numpy import NumPyPrinter
 
 
 class EquationTexts(Protocol):
-    """The texts of the equations; the functions of Equations are generated from them."""
+    """Texts of the equations, from which the functions of Equations are generated."""
 
     texts: tuple[str, ...]
     arguments: tuple[Argument, ...]
@@ -32,16 +32,16 @@ class EquationTexts(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The symbols in the texts: arguments, then parameters."""
+        """Symbols in the texts: arguments, then parameters."""
 
 
 def print_float(printer: Any, value: Any) -> str:
-    """Print a number to the last digit; sympy omits two of them."""
+    """Print a number with all digits; sympy omits two."""
     return repr(float(value))
 
 
 class _Printer(NumPyPrinter):  # type: ignore[misc]
-    """Numpy, numbers to the last digit."""
+    """Printer of numpy code, with all digits of numbers."""
 
     _print_Float = print_float
 
@@ -84,7 +84,7 @@ def _source(*parts: str) -> str:
 
 
 def first(equations: EquationTexts) -> str:
-    """Write rates, and their derivatives by the arguments and by the parameters."""
+    """Write the rates, and their derivatives by the arguments and the parameters."""
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
     slopes, entries = _nonzero(((v, k), sympy.diff(rate, symbols[k])) for (v, rate), k
@@ -98,12 +98,12 @@ def first(equations: EquationTexts) -> str:
 
 
 def _smooth(part: Any) -> Any:
-    """Leave out delta functions at kinks: derivatives are those beside the kink."""
+    """Drop delta functions at kinks, so that derivatives are one-sided."""
     return part.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
 
 
 def higher(equations: EquationTexts) -> str:
-    """Write second and third derivatives by the arguments, and those by a parameter as well."""
+    """Write second and third derivatives by the arguments, and mixed ones by a parameter."""
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
     texts, tables = [], []

@@ -14,9 +14,9 @@
 
 """A network's equations, and functions on arrays from them.
 
-Every cell obeys the same equations, in which other cells are inputs, now or a delay ago. They are
-written once for a cell (``Network.equations``). This module reads them as texts; sympy derives the
-exact rates and derivatives as numpy code, which is kept on disk.
+All cells obey the same equations, in which other cells are inputs, now or a delay ago
+(``Network.equations``). sympy derives the exact rates and derivatives from their text as numpy
+code, which is cached on disk.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -43,16 +43,16 @@ _COMPILED = ('networks', 'dynamics', 'motion', 'feedback')
 
 
 def folder(key: str = 'package') -> Path | None:
-    """Return the folder of compiled code: of the package, or of a network's equations.
+    """Return the cache folder of compiled code, of the package or of a network's equations.
 
-    Its name has a digest of the sources, so any edit leads to another folder. numba's own cache
-    watches only the file of a kernel, not those of the functions it calls.
+    The folder's name contains a digest of the sources, so that any edit leads to another folder;
+    numba's own cache watches the file of a kernel only, not those of the functions that it calls.
 
     Args:
         key: of the equations, see Equations.key.
 
     Returns:
-        The folder, None if nothing can be written.
+        The folder, None if none can be written.
 
     """
     return cache_folder(f'{key}-{_sources_digest()}')
@@ -60,7 +60,7 @@ def folder(key: str = 'package') -> Path | None:
 
 @cache
 def _sources_digest() -> str:
-    """Return a word that changes whenever a file with compiled code does."""
+    """Return a digest of all files with compiled code."""
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
     for room in _COMPILED:
@@ -70,12 +70,12 @@ def _sources_digest() -> str:
 
 
 def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
-    """Return a generated module, written first where it is not on disk yet.
+    """Return a generated module; write it first if it is not on disk.
 
     Args:
-        key: of the equations that it follows from.
+        key: of the equations from which it follows.
         name: of the module.
-        write: makes the text.
+        write: returns the text.
 
     """
     module_name = f'cpg_ros_generated_{key}_{name}'
@@ -107,11 +107,11 @@ class Equations:
     Arrays of a variable, an argument or a parameter have one shape, or shapes that broadcast.
 
     Attributes:
-        arguments: that stand in them, in order.
-        rows: names of the parameters, or groups of them, that stand in them.
-        by_cell: name that has a parameter for each cell -> these.
-        texts: the rate of each variable, in x0, x1 ... for the arguments and p_NAME.
-        key: digest of all that follows from them.
+        arguments: of the equations, in order.
+        rows: parameters, or groups of them, in the equations.
+        by_cell: name with a parameter for each cell -> these parameters.
+        texts: rate of each variable, with x0, x1 ... for arguments and p_NAME for parameters.
+        key: digest of everything that follows from them.
 
     """
 
@@ -119,7 +119,7 @@ class Equations:
         """Read a network's equations.
 
         Raises:
-            TypeError: they are not as many as the cell has variables.
+            TypeError: the number of equations is not that of a cell's variables.
 
         """
         cell = Cell(network.variables, network.cells)
@@ -140,7 +140,7 @@ class Equations:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The symbols in the texts: arguments, then parameters."""
+        """Symbols in the texts: arguments, then parameters."""
         return (*(f'x{k}' for k in self._numbers), *(f'p_{row}' for row in self.rows))
 
     @cached_property
@@ -163,29 +163,29 @@ class Equations:
 
     def slopes(self, x: Sequence[Any], p: Sequence[Any]
                ) -> tuple[list[Any], dict[tuple[int, int], Any]]:
-        """Return the rates, and (variable, argument) -> derivative, those not identically 0."""
+        """Return the rates, and (variable, argument) -> derivative, without those that vanish."""
         rates, slopes = self._first.slopes(*x, *p)
         return list(rates), dict(zip(self._first.SLOPES, slopes, strict=True))
 
     def by_parameter(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int], Any]:
-        """Return (variable, row) -> derivative of the rate, those not identically 0."""
+        """Return (variable, row) -> derivative of the rate, without those that vanish."""
         return dict(zip(self._first.BY_PARAMETER, self._first.by_parameter(*x, *p), strict=True))
 
     def by_parameter_and_argument(self, x: Sequence[Any], p: Sequence[Any]
                                   ) -> dict[tuple[int, int, int], Any]:
-        """Return (variable, row, argument) -> mixed second derivative, those not 0."""
+        """Return (variable, row, argument) -> mixed second derivative, without vanishing ones."""
         return dict(zip(self._higher.MIXED, self._higher.mixed(*x, *p), strict=True))
 
     def higher(self, order: int, x: Sequence[Any], p: Sequence[Any]
                ) -> dict[tuple[int, ...], Any]:
-        """Return (variable, arguments) -> derivative of order 2 or 3, arguments rising."""
+        """Return (variable, arguments) -> derivative of order 2 or 3; arguments ascend."""
         indices, derive = ((self._higher.SECOND, self._higher.second) if order == 2 else
                            (self._higher.THIRD, self._higher.third))
         return dict(zip(indices, derive(*x, *p), strict=True))
 
 
 def multilinear(derivatives: Mapping[Any, Any], sets: Sequence[Any]) -> dict[int, Any]:
-    """Return variable -> second or third derivative of its rate at two or three disturbances.
+    """Return variable -> second or third derivative of its rate along two or three disturbances.
 
     Args:
         derivatives: as ``Equations.higher`` returns them.
@@ -213,7 +213,7 @@ def equations_of(network: type[NetworkDefinition]) -> Equations:
 
 
 def values_of(network: NetworkDefinition) -> list[np.ndarray]:
-    """Return the parameters of the equations' rows, each one number or one for each cell."""
+    """Return the parameters of the equations' rows, one number each or one for each cell."""
     equations = equations_of(type(network))
     return [np.array([getattr(network, name) for name in equations.by_cell[row]])
             if row in equations.by_cell else np.array(getattr(network, row))
@@ -230,8 +230,8 @@ class Field(Generic[AnyDefinition]):
     """``dx/dt = f(x(t), x(t - tau); p)`` of a network, or of one cell of each class.
 
     Attributes:
-        size: cells that are left.
-        kept: components of the network that stand for all, shape (d,).
+        size: number of cells that are kept.
+        kept: indices of the components that represent all, shape (d,).
         columns: index among these of each component of the network, shape (components,).
 
     """
@@ -241,8 +241,7 @@ class Field(Generic[AnyDefinition]):
 
         Args:
             network: parameters.
-            classes: number of each cell's class, from 0, shape (cells,); each cell is its own
-                by default.
+            classes: class of each cell, from 0, shape (cells,); by default each cell is its own.
 
         """
         cells, variables = network.cells, network.variables
@@ -276,20 +275,20 @@ class Field(Generic[AnyDefinition]):
         return out
 
     def rates(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Return the right-hand side at states, shape (..., d).
+        """Return the right-hand side, shape (..., d).
 
         Args:
             now: states, shape (..., d).
-            past: the states a delay ago; those of now by default, as at rest.
+            past: states a delay ago, by default those of now.
 
         """
         return self._filled(self._equations.rates(self._arguments(now, past), self._p), now.shape)
 
     def linearised(self, now: np.ndarray, past: np.ndarray | None = None
                    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rates, shape (..., d), and Jacobians by now and by past, shape (..., d, d).
+        """Return rates, shape (..., d), and Jacobians by now and by past, shape (..., d, d).
 
-        Without a delay the last one is empty: its last two axes have the length 0.
+        Without a delay the last two axes of the last one have length 0.
         """
         rates, slopes = self._equations.slopes(self._arguments(now, past), self._p)
         delays = any(argument.delayed for argument in self._equations.arguments)
@@ -306,8 +305,8 @@ class Field(Generic[AnyDefinition]):
         """Return the second or third derivative of the rates, B(a, b) or C(a, b, c), (..., d).
 
         Args:
-            at: the states.
-            sets: two or three disturbances of them, which may be complex.
+            at: states.
+            sets: two or three disturbances, which may be complex.
 
         """
         out = np.zeros(sets[0][0].shape, dtype=complex)
@@ -318,7 +317,7 @@ class Field(Generic[AnyDefinition]):
         return out
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Return the rates' derivative by the network's parameters, shape (..., d, parameters).
+        """Return the derivative of the rates by the parameters, shape (..., d, parameters).
 
         It excludes the effect of the delay, which depends on the slope of the past.
         """

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The base class of networks: rates, presets, symmetries of gaits, and their defaults.
+"""Base class of networks: rates, presets, symmetries of gaits, and defaults.
 
-The definition of parameters, cells and equations is in ``networks.definition``. A network
-of amplitude-controlled phase oscillators has no symmetry that tells its gaits apart: the phases of
-its legs are parameters, and make the named gait whose phases are nearest.
+``networks.definition`` defines parameters, cells and equations. In a network of
+amplitude-controlled phase oscillators, parameters state the phases of the legs; the gait is the
+named one with the nearest phases.
 """
 
 from abc import abstractmethod
@@ -42,7 +42,7 @@ Preset: TypeAlias = preset_files.Preset['Network']
 
 
 class LeastCoupling(NamedTuple):
-    """A coupling, such as '|c|', its value, and how much is needed."""
+    """A coupling, such as '|c|', its value, and the value that is needed."""
 
     text: str
     value: float
@@ -50,7 +50,7 @@ class LeastCoupling(NamedTuple):
 
 
 class Network(NetworkDefinition):
-    """Parameters of a network, as a frozen dataclass of floats; see also NetworkDefinition."""
+    """Parameters of a network, as a frozen dataclass of floats; see NetworkDefinition."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -63,22 +63,22 @@ class Network(NetworkDefinition):
         return unpickle, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
 
     def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Return the right-hand side at states now and a delay ago, by default the same."""
+        """Return the right-hand side at a state now and a delay ago, by default the same state."""
         return Field(self).rates(x, past)
 
     def jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Return the rates' derivative by the state now, (..., components, components)."""
+        """Return the derivative of the rates by the state now, (..., components, components)."""
         return Field(self).linearised(x, past)[1]
 
     def by_parameter(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Return the rates' derivative by the parameters, (..., components, parameters)."""
+        """Return the derivative of the rates by the parameters, (..., components, parameters)."""
         return Field(self).by_parameter(x, past)
 
     def replace(self: AnyNetwork, **values: float) -> AnyNetwork:
-        """Return the network with other values of some parameters, or groups of them, by name.
+        """Return the network with other values of parameters or groups, by name.
 
         Raises:
-            InputError: a name that is neither a parameter nor a group of the network.
+            InputError: a name is neither a parameter nor a group of the network.
 
         """
         changes: dict[str, float] = {}
@@ -88,13 +88,13 @@ class Network(NetworkDefinition):
 
     @property
     def coefficients(self) -> np.ndarray:
-        """The parameters as the kernel takes them, a value for each cell, shape (rows, cells)."""
+        """Parameters as the kernel takes them, one value for each cell, shape (rows, cells)."""
         return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)],
                         dtype=float)
 
     @classmethod
     def presets(cls) -> dict[str, Preset]:
-        """Return the named parameter sets: of the file beside its module, or the shipped one.
+        """Return the presets, from the file beside the network's module or the shipped one.
 
         Raises:
             PresetError: there is no such file, or it cannot be used.
@@ -104,16 +104,16 @@ class Network(NetworkDefinition):
 
     @abstractmethod
     def symmetry(self, gait: str) -> Symmetry:
-        """Return the gait's symmetry in this network: phases and waves of cells, lock's basis.
+        """Return the gait's symmetry: phases and waves of the cells, basis of the symmetry lock.
 
         Raises:
-            ValueError: it has no gait of this name.
+            ValueError: the network has no gait of this name.
 
         """
 
     @property
     def leads(self) -> tuple[float, ...]:
-        """Phase of each cell against cell 1 in cycles, where parameters state it; or else ()."""
+        """Phase of each cell relative to cell 1, cycles, where parameters state it; else ()."""
         if not self.offsets:
             return ()
         by_cell = [0.0] * self.cells
@@ -123,48 +123,49 @@ class Network(NetworkDefinition):
         return tuple((lead - by_cell[0]) % 1.0 for lead in by_cell)
 
     def with_phases(self: AnyNetwork, phases: Mapping[str, float]) -> AnyNetwork:
-        """Return the network with the phases of these legs, cycles; itself if it states none."""
+        """Return the network with these phases of its legs, cycles; itself if it states none."""
         offsets = {self.offsets[leg]: float((phase + 0.5) % 1.0 - 0.5)
                    for leg, phase in phases.items() if leg in self.offsets}
         return self.replace(**offsets) if offsets else self
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
-        """Return a state near the gait's orbit and its period, where they are known beforehand.
+        """Return a state near the gait's orbit and its period, where both are known in advance.
 
-        The state is of shape (components,), where cell 1 peaks; the period is in model time.
+        The state has shape (components,), with cell 1 at its peak; the period is in model time.
         """
         return None
 
     def at_rest(self) -> np.ndarray | None:
-        """Return the state of every cell at rest, (variables,), where it is known beforehand."""
+        """Return the equilibrium of every cell, (variables,), where it is known in advance."""
         return None
 
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
-        """Parameters that a gait's symmetry makes equal."""
+        """Return the sets of parameters that a gait's symmetry makes equal."""
         return tuple((name,) for name in cls.parameters())
 
     def sufficient_gain(self, rate: float) -> float | None:
-        """Return a symmetry gain with which every gait attracts in any state, 1/model time.
+        """Return a symmetry gain at which every gait is attracting in any state, 1/model time.
 
-        None where no such bound is known; the gain then comes from the gait's multipliers.
+        Return None where no such bound is known; the gain then follows from the gait's
+        multipliers.
 
         Args:
-            rate: at which disturbances outside the gait's class are to decay, 1/model time.
+            rate: decay of disturbances transverse to the gait's class, 1/model time.
 
         """
         return None
 
     def least_coupling(self, gait: str) -> LeastCoupling | None:
-        """Return how strong a coupling must be for a gait to be born at some delay, if known."""
+        """Return the coupling above which a gait bifurcates at some delay, if it is known."""
         return None
 
     def obstacle(self, gait: str) -> str:
-        """Return why the parameters rule a gait out, if that is known beforehand, or ''."""
+        """Return why the parameters rule a gait out, if it is known in advance, or ''."""
         return ''
 
     def broken(self, symmetry: Symmetry) -> str:
-        """Name parameters that would have to be equal for the symmetry, or '' if all are."""
+        """Name parameters that the symmetry requires to be equal and that differ, or ''."""
         values = self.as_dict()
         return next((', '.join(family) for family in self.families(symmetry)
                      if len({values[name] for name in family}) > 1), '')
@@ -172,11 +173,12 @@ class Network(NetworkDefinition):
     def character(self, gait: str, assignment: str) -> str:
         """Tell whether a gait is walk-like or run-like (Buono & Golubitsky 2001, section 7).
 
-        Walk-like: the two cells of every leg, its flexors and extensors, are half a cycle
-        apart; run-like: in phase; neither otherwise, and where a leg has not two cells.
+        Walk-like: the two cells of every leg, flexor and extensor, are half a cycle apart;
+        run-like: they are in phase. Otherwise, and where a leg does not have two cells, it is
+        neither.
 
         Raises:
-            ValueError: an unknown gait, or an assignment that is not one of ``legs``.
+            ValueError: an unknown gait, or an assignment that is not in ``legs``.
 
         """
         if assignment not in self.legs:
@@ -193,7 +195,7 @@ class Network(NetworkDefinition):
 
 
 def _of_cell(symmetry: Callable[[Any, str], Symmetry]) -> Callable[[Any, str], Symmetry]:
-    """Give symmetries as many variables as the network's cells have: its states tell."""
+    """Give symmetries the number of variables of the network's cells."""
     @wraps(symmetry)
     def sized(network: Any, gait: str) -> Symmetry:
         return symmetry(network, gait).with_variables(type(network).variables)
@@ -215,7 +217,7 @@ def known(gait: str, gaits: tuple[str, ...]) -> str:
 
 @dataclass(frozen=True)
 class ParameterLine:
-    """Parameters that are set to plus or minus one value; written ``alpha=-beta``.
+    """Parameters that are plus or minus one value; written ``alpha=-beta``.
 
     Attributes:
         names: of the parameters.
@@ -228,10 +230,10 @@ class ParameterLine:
 
     @classmethod
     def parse(cls, text: str, network: type[Network]) -> 'ParameterLine':
-        """Read ``tau``, ``alpha=beta``, ``alpha=-beta`` or a group of the network, ``w_a``.
+        """Read ``tau``, ``alpha=beta``, ``alpha=-beta`` or a group of the network (``w_a``).
 
         Raises:
-            InputError: a name that is not a parameter of the network, or given twice.
+            InputError: a name is not a parameter of the network, or occurs twice.
 
         """
         names: list[str] = []
@@ -251,7 +253,7 @@ class ParameterLine:
 
     @classmethod
     def of(cls, line: 'ParameterLine | str', network: type[Network]) -> 'ParameterLine':
-        """Return the line itself, or the one that a text such as ``tau`` names; see parse."""
+        """Return the line itself, or the line that a text names; see parse."""
         return cls.parse(line, network) if isinstance(line, str) else line
 
     def __str__(self) -> str:
@@ -259,11 +261,11 @@ class ParameterLine:
                         for name, sign in zip(self.names, self.signs, strict=True))
 
     def value(self, network: Network) -> float:
-        """Return the network's value on the line, which is its first parameter's."""
+        """Return the network's value on the line: its first parameter."""
         return network.as_dict()[self.names[0]]
 
     def direction(self, network: Network) -> np.ndarray:
-        """Return the parameters' derivative by the value on the line, (parameters,)."""
+        """Return the derivative of the parameters by the value on the line, (parameters,)."""
         signs = dict(zip(self.names, self.signs, strict=True))
         return np.array([signs.get(name, 0.0) for name in network.parameters()])
 
@@ -279,16 +281,16 @@ GAIT_TOLERANCE = 0.06
 
 
 def stated_gait(network: Network) -> str:
-    """Return the gait that the offsets of a network make.
+    """Return the gait that a network's offsets state.
 
-    It is the nearest named one within GAIT_TOLERANCE, or else the ``unnamed`` one; '' where the
-    network has no offsets.
+    It is the nearest named one within GAIT_TOLERANCE, otherwise the ``unnamed`` one; '' for a
+    network without offsets.
     """
     return _nearest(type(network), network.leads) if network.offsets else ''
 
 
 def other_gait(network: Network, gait: str) -> str:
-    """Return the gait that a network's offsets make instead of another one, or ''."""
+    """Return the gait that a network's offsets state instead of another one, or ''."""
     stated = stated_gait(network)
     if stated in ('', gait):
         return ''
@@ -311,20 +313,20 @@ def _nearest(network: type[Network], leads: tuple[float, ...]) -> str:
 
 def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]
                  ) -> tuple[str, float, str | None, float]:
-    """Find the gait whose leg phases are nearest.
+    """Find the gait with the nearest leg phases.
 
     Args:
-        phases: of the legs in cycles, shape (legs,).
-        table: name -> phases of the same legs. A wave run backwards is a gait of its own.
+        phases: of the legs, cycles, shape (legs,).
+        table: name -> phases of the same legs; a reversed wave is a gait of its own.
 
     Returns:
-        Name and distance of the nearest, the second nearest (None if there is no other), and
-        how much further that is. Distances are RMS over the legs, in cycles around the circle,
-        after the best common shift.
+        Name and distance of the nearest gait, the second nearest (None if there is no other), and
+            the difference of their distances. Distances are RMS over the legs, in cycles, after
+            the best common shift.
 
     Raises:
         InputError: a phase is not finite.
-        ValueError: table is empty, or shapes do not fit.
+        ValueError: the table is empty, or shapes do not fit.
 
     """
     phases = np.asarray(phases, dtype=float)

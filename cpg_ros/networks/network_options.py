@@ -32,7 +32,7 @@ DEFAULT = 'delayed'
 
 
 def add_network_options(parser: ArgumentParser) -> None:
-    """Add the options to a tool's."""
+    """Add the options to a parser."""
     parser.add_argument('--network', metavar='NAME',
                         help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
                         f'one (default: {DEFAULT}, or that of --presets)')
@@ -83,15 +83,15 @@ def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Pre
 
 
 def network_from(args: Namespace) -> Network:
-    """Return the network that the options choose; errors as of preset_from."""
+    """Return the network that the options select; errors as of preset_from."""
     return preset_from(args)[1]
 
 
 def preset_from(args: Namespace) -> tuple[Preset, Network]:
-    """Return the preset that the options choose, and the network with the values of --set.
+    """Return the preset that the options select, and its network with the values of --set.
 
     Raises:
-        InputError: an unknown name or an invalid value; the message says which.
+        InputError: an unknown name or an invalid value.
         PresetError: the file of --presets cannot be used.
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Preset files: named parameter sets with the gait each of them runs and a state on its orbit."""
+"""Preset files: named parameter sets, each with its gait and a state on its orbit."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -31,13 +31,13 @@ LARGEST = 1e3
 
 @dataclass(frozen=True, repr=False)
 class Preset(ShortRepr, Generic[AnyDefinition]):
-    """A named parameter set and the gait it runs.
+    """A named parameter set and its gait.
 
     Attributes:
         gait: one of the network's gaits.
         network: parameters.
-        start: a state on the gait's orbit, shape (components,), to distinguish it from other
-            orbits and from rest; None where the solver finds it by itself.
+        start: a state on the gait's orbit, shape (components,), that distinguishes it from other
+            orbits and from rest; None where the solver needs none.
         period: of that orbit, model time, to about a per cent.
 
     """
@@ -100,7 +100,7 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
 
 @cache
 def own_presets(network: type[AnyDefinition]) -> dict[str, Preset[AnyDefinition]]:
-    """Read a network's own presets: of the file beside its module, or the shipped one.
+    """Read a network's own presets, from the file beside its module or the shipped one.
 
     Raises:
         PresetError: as of read_presets.

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The networks by name: shipped ones, those of other packages, and those in files of users.
+"""Networks by name: shipped ones, those of other packages, and those in users' files.
 
-A package offers a network by an entry point of the group ``cpg_ros.networks`` with the network's
-name: ``my_network = my_package.my_network:MyNetwork``. A file that defines one class of networks
-is named by its path; its presets stand in it or beside it, in a file of the same name but .yaml.
-A number after the name of one that takes any number of legs is that number: ``delayed6``.
+A package offers a network by an entry point of the group ``cpg_ros.networks``: ``my_network =
+my_package.my_network:MyNetwork``. A file that defines one network class is named by its path; its
+presets stand in it, or beside it in a file of the same stem with the suffix .yaml. A number after
+the name of a network for any number of legs selects that number: ``delayed6``.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -47,7 +47,7 @@ def definition_error(network: type[Network]) -> str:
     """Return the first error in a network's definition, one line, or ''.
 
     Raises:
-        ValueError: its presets cannot be read, or its line is none.
+        ValueError: its presets or its line cannot be read.
 
     """
     lacking = [name for name in STATED if not hasattr(network, name)]
@@ -159,7 +159,7 @@ Entry = TypeVar('Entry')
 
 
 class NetworkError(CpgError):
-    """There is no such network, or it cannot be used; one line."""
+    """There is no such network, or it cannot be used; the message is one line."""
 
 
 class _Networks(Mapping[str, type[Network]]):
@@ -187,9 +187,9 @@ class _Networks(Mapping[str, type[Network]]):
         """Return a network.
 
         Raises:
-            NetworkError: the entry point of another package is of no use, or a network does not
-                take that number of legs.
-            KeyError: there is none of this name.
+            NetworkError: another package's entry point cannot be used, or a network does not take
+                that number of legs.
+            KeyError: there is no network of this name.
 
         """
         named = {**SHIPPED, **{network.name: network for network in self.files}}
@@ -221,19 +221,19 @@ NETWORKS, PRESETS = _Networks(), _Presets()
 
 
 def is_path(name: str) -> bool:
-    """Tell whether a network is named by its file."""
+    """Tell whether a network's name is a path."""
     return name.endswith('.py') or '/' in name
 
 
 def find_network(name: str, folder: Path | None = None) -> type[Network]:
-    """Return a network by its name, or the network in a file, which then is known by its name.
+    """Return a network by name, or the network in a file, which its name then finds, too.
 
     Args:
         name: of a network, or path of a file.
-        folder: that relative paths start from, instead of the working directory.
+        folder: base of relative paths, by default the working directory.
 
     Raises:
-        NetworkError: there is no such network or file, or what it states cannot be used; the
+        NetworkError: there is no such network or file, or its definition cannot be used; the
             message names the file and the reason.
 
     """
@@ -281,7 +281,7 @@ def _numbered(family: str, legs: int) -> type[Network]:
 
 
 def _usable(source: str, load: Callable[[], Entry]) -> Entry:
-    """Run code of others; an error becomes one line."""
+    """Run foreign code; turn an error into one line."""
     try:
         return load()
     except Exception as error:

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Symmetry groups of networks, and gaits as what a group does to a periodic solution.
+"""Symmetry groups of networks; a gait is the action of a group on a periodic solution.
 
 A symmetry g of a network permutes its cells. It is a spatio-temporal symmetry of a periodic
 solution with shift theta if ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono & Golubitsky
-2001, section 2.1). Those of a solution form a group H, those with shift 0 its subgroup K, and
-H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the circle.
+2001, section 2.1). The spatio-temporal symmetries form a group H, those with shift 0 its subgroup
+K, and H/K is cyclic (eq. 2.2). A gait therefore is a homomorphism from a subgroup H into the
+circle.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -36,7 +37,7 @@ Permutation = tuple[int, ...]
 
 
 def compose(outer: Permutation, inner: Permutation) -> Permutation:
-    """Return the product: first the inner one."""
+    """Return the product: first the inner permutation, then the outer one."""
     return tuple(outer[i] for i in inner)
 
 
@@ -45,8 +46,8 @@ class Group:
     """An abelian group of permutations of cells.
 
     Attributes:
-        cells: how many cells it permutes.
-        generators: name -> permutation; the names of all elements are made of these.
+        cells: number of cells.
+        generators: name -> permutation; names of other elements are products of these.
 
     """
 
@@ -80,10 +81,10 @@ class Group:
         return math.lcm(*(self.order(name) for name in self.elements))
 
     def check_regular(self) -> None:
-        """Check that exactly one element takes the first cell to each cell, and that all commute.
+        """Check that the group is abelian and acts regularly on the cells.
 
         Raises:
-            InputError: they do not.
+            InputError: it does not.
 
         """
         elements = self.elements.values()
@@ -145,11 +146,11 @@ class Symmetry(ShortRepr):
     Attributes:
         group: of the network.
         shifts: element name -> shift in cycles, a homomorphism on H.
-        variables: state variables of each cell.
-        odd: whether the network has the symmetry x -> -x, and the gait has it with a shift of 1/2:
-            every waveform is its own negative half a cycle later.
-        leads: phase of each cell in cycles as the network's parameters state it, between different
-            waveforms; ignored by comparisons.
+        variables: state variables of a cell.
+        odd: whether network and gait have the symmetry x -> -x with a shift of 1/2: every waveform
+            is its own negative half a cycle later.
+        leads: phase of each cell in cycles that parameters state, between different waveforms;
+            comparisons ignore it.
 
     """
 
@@ -166,10 +167,10 @@ class Symmetry(ShortRepr):
     @classmethod
     def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2,
            odd: bool = False, leads: tuple[float, ...] = ()) -> 'Symmetry':
-        """Build from the shifts of elements that generate H.
+        """Build a symmetry from the shifts of elements that generate H.
 
         Raises:
-            ValueError: the shifts contradict one another, or an element is not of the group.
+            ValueError: the shifts contradict one another, or an element is not in the group.
 
         """
         for name in shifts:
@@ -183,7 +184,7 @@ class Symmetry(ShortRepr):
         return self if leads == self.leads else replace(self, leads=leads)
 
     def with_variables(self, variables: int) -> 'Symmetry':
-        """Return the same symmetry of cells with as many variables."""
+        """Return the same symmetry for cells with this number of variables."""
         if variables == self.variables:
             return self
         return _generated(self.group, self.shifts, variables, self.odd).with_leads(self.leads)
@@ -200,7 +201,7 @@ class Symmetry(ShortRepr):
 
     @cached_property
     def order(self) -> int:
-        """Order m of the cyclic group H/K: after T/m the cells have changed places."""
+        """Order m of the cyclic group H/K; after T/m cells have changed places."""
         return len(self.shifts) // len(self.k)
 
     @cached_property
@@ -234,10 +235,7 @@ class Symmetry(ShortRepr):
 
     @cached_property
     def mode(self) -> tuple[int, ...]:
-        """(j, k): shifts j/m and k/n of the group's generators, of the orders m and n.
-
-        Only where H is the whole group.
-        """
+        """(j, k): shifts j/m and k/n of the generators, of orders m and n, if H is the group."""
         shifts = dict(self.shifts)
         return tuple(int(shifts[name] * self.group.order(name))
                      for name, _ in self.group.generators)
@@ -262,7 +260,7 @@ class Symmetry(ShortRepr):
 
     @cached_property
     def classes(self) -> np.ndarray:
-        """Number of each cell's class under K, from 0, shape (cells,): such cells are equal."""
+        """Class of each cell under K, from 0, shape (cells,); a class has one signal."""
         numbers = np.full(self.group.cells, -1)
         for cell in range(self.group.cells):
             if numbers[cell] < 0:
@@ -273,8 +271,8 @@ class Symmetry(ShortRepr):
     def basis(self) -> np.ndarray:
         """Orthonormal rows that span the gait's class, shape (variables * d, variables * cells).
 
-        It is Fix(K), the states that K fixes, which the flow never leaves. With x -> -x an element
-        with the shift 1/2 fixes them in combination with that.
+        The class is Fix(K), which the flow never leaves. With x -> -x, an element with shift 1/2
+        fixes states in combination with the sign.
         """
         still = [(self.group.elements[name], 1.0 if shift == 0 else -1.0)
                  for name, shift in self.shifts
@@ -308,11 +306,11 @@ class Pair:
     """An admissible pair of a network's group.
 
     Attributes:
-        h: the spatio-temporal symmetries.
-        k: the spatial symmetries, a subgroup of h.
-        order: m, the order of the cyclic quotient h/k: shifts are multiples of T/m.
-        waveforms: how many waveforms differ by more than a shift: cells / |h|.
-        signals: how many cells differ at all: cells / |k|.
+        h: spatio-temporal symmetries.
+        k: spatial symmetries, a subgroup of h.
+        order: m, order of the cyclic quotient h/k; shifts are multiples of T/m.
+        waveforms: number of waveforms that differ by more than a shift, cells / |h|.
+        signals: number of cells with different signals, cells / |k|.
         labels: of h and k, by generators.
 
     """
@@ -331,7 +329,7 @@ def _closure(group: Group, names: Iterable[str]) -> Subgroup:
 
 @cache
 def generators(group: Group, subgroup: Subgroup) -> Subgroup:
-    """Return a smallest generating set; of several, the one the group lists first."""
+    """Return a smallest generating set, the first in the group's order."""
     # A group of n elements needs at most log2(n) generators.
     return next(names for size in range(len(subgroup).bit_length())
                 for names in combinations(subgroup[1:], size)
@@ -363,11 +361,11 @@ def subgroups(group: Group) -> tuple[Subgroup, ...]:
 
 @cache
 def admissible_pairs(group: Group) -> tuple[Pair, ...]:
-    """Return all pairs H, K of Theorem 2.2, from the largest H and in it from the largest K.
+    """Return all pairs H, K of Theorem 2.2, ordered from the largest H, then from the largest K.
 
     Raises:
-        InputError: the theorem does not apply: not exactly one symmetry takes the first cell
-            to each cell, or two symmetries do not commute.
+        InputError: the theorem does not apply: the group does not act regularly, or is not
+            abelian.
 
     """
     group.check_regular()
@@ -385,8 +383,8 @@ def admissible_pairs(group: Group) -> tuple[Pair, ...]:
 def symmetries(group: Group) -> tuple[Symmetry, ...]:
     """Return all homomorphisms from a subgroup H into the circle, the largest H first.
 
-    A pair of order m has phi(m) of them (Euler's function): the element with shift 1/m may have
-    any multiple of it prime to m. With m = 4 these are a wave and the same run backwards.
+    A pair of order m has phi(m) of them (Euler's function): the shift 1/m times any number prime
+    to m. For m = 4 these are a wave and its reverse.
     """
     return tuple(homomorphism for h in reversed(subgroups(group))
                  for homomorphism in homomorphisms(group, generators(group, h)))
@@ -399,8 +397,8 @@ def homomorphisms(group: Group, names: Iterable[str], variables: int = 2, odd: b
     Args:
         group: of a network.
         names: of the elements.
-        variables: as of a Symmetry.
-        odd: as of a Symmetry.
+        variables: as of Symmetry.
+        odd: as of Symmetry.
 
     """
     orders = {name: group.order(name) for name in names}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Records topics into a bag, as bytes; the caller takes the messages regularly."""
+"""Recorder of topics into a bag, as bytes; the caller polls it regularly."""
 
 from collections import Counter
 from pathlib import Path
@@ -30,19 +30,19 @@ EVERY, DEPTH = 0.02, 5000
 
 
 class BagRecorder:
-    """Writes messages into a bag.
+    """Writer of messages into a bag.
 
     Attributes:
-        counts: topic -> messages written.
+        counts: topic -> number of messages written.
         passed_over: topic -> why it is not recorded.
 
     """
 
     def __init__(self, node: Node, path: Path) -> None:
-        """Open the bag, a new folder; it gets its name when it is complete.
+        """Open the bag, a new folder, which gets its final name when it is complete.
 
         Raises:
-            BagError: something is there already, or the folder cannot be written to.
+            BagError: the name is taken, or the folder cannot be written to.
 
         """
         self._node, self._writer = node, BagWriter(path)
@@ -81,10 +81,10 @@ class BagRecorder:
         return True
 
     def poll(self) -> None:
-        """Write what has arrived, in the order of arrival.
+        """Write the messages that have arrived, in the order of arrival.
 
         Raises:
-            BagError: the disk is full, or the like.
+            BagError: a write failed, for example on a full disk.
 
         """
         arrived = [(when, connection, data) for source, connection in self._sources
@@ -94,10 +94,10 @@ class BagRecorder:
             self.counts[connection.topic] += 1
 
     def close(self) -> None:
-        """Finish the bag, and give it its name; one without messages is dropped.
+        """Complete and rename the bag; drop one without messages.
 
         Raises:
-            BagError: the disk is full, or the like.
+            BagError: a write failed, for example on a full disk.
 
         """
         for source, _ in self._sources:

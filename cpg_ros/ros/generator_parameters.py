@@ -45,7 +45,7 @@ NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_onl
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:
-    """Return the parameters that depend on nothing but the network, in order of declaration."""
+    """Return the parameters that depend on the network alone, in order of declaration."""
     return {
         'presets': Spec('', 'file with additional presets; empty for none', read_only=True),
         'robot': Spec(network.usual_robot, 'robot file, or the name of a shipped one',
@@ -97,9 +97,9 @@ def specs(network: type[Network]) -> dict[str, Spec]:
 
 
 def network_for(network: Any, robot: Any) -> Any:
-    """Return the variant of a network for a robot's legs, if the robot file asks for that one.
+    """Return the variant of a network for a robot's legs, if the robot file asks for one.
 
-    A network or robot that cannot be found is reported when it is loaded.
+    A network or robot that does not exist is reported when it is loaded.
     """
     if not (isinstance(network, str) and isinstance(robot, str)):
         return network
@@ -122,7 +122,7 @@ def presets_of(network: type[Network], path: str) -> dict[str, Preset]:
 
 
 def gait_spec(network: type[Network], presets: Mapping[str, Preset], further: str = '') -> Spec:
-    """Return the parameter that names one of these presets; ``further`` is added to their list."""
+    """Return the parameter that names one of these presets, or one of ``further``."""
     gaits = [name for name, preset in presets.items() if name == preset.gait]
     others = [name for name in presets if name not in gaits]
     more = f'{PRESETS}{", ".join(others)}' if others else ''
@@ -131,14 +131,14 @@ def gait_spec(network: type[Network], presets: Mapping[str, Preset], further: st
 
 
 def exclusive(command: str) -> Spec:
-    """Return the parameter whose default depends on whether a robot is commanded."""
+    """Return the parameter whose default depends on whether the node commands a robot."""
     return Spec(command != 'none', 'refuse to start if another node publishes on the command or '
                 'joint topics', read_only=True)
 
 
 @dataclass(frozen=True)
 class GaitSettings:
-    """Settings that determine a plan; hashable, so that each plan is made once."""
+    """Settings that determine a plan; hashable, so that plans are cached."""
 
     gait: str
     network: Network
@@ -150,14 +150,14 @@ class GaitSettings:
 
 
 class Planner:
-    """Turns parameters into plans for one network and one robot.
+    """From parameters to plans, for one network and one robot.
 
     Attributes:
-        network: whose parameters.
-        presets: name -> preset, all that ``gait`` can be set to.
-        robot: which the plans are for.
-        steered: whether only gaits that the robot file says how to steer can run.
-        names: of the parameters that make up the settings.
+        network: class of the network.
+        presets: name -> preset, all values of ``gait``.
+        robot: of the plans.
+        steered: whether only gaits with steering in the robot file can run.
+        names: parameters that make up the settings.
 
     """
 
@@ -172,20 +172,20 @@ class Planner:
 
     @property
     def offered(self) -> dict[str, Preset]:
-        """The presets that can run: of a steered robot those that it knows how to steer."""
+        """Presets that can run: with ``steered``, those with steering in the robot file."""
         return {name: preset for name, preset in self.presets.items() if not self.steered
                 or self.robot.motion(name, preset.gait).steering is not None
                 or (self.robot.biped is not None and preset.gait in GAIT_SPEEDS)}
 
     def prepare(self) -> None:
-        """Solve every preset's gait ahead, so that a change to it is immediate."""
+        """Solve every preset's gait in advance, so that a change is immediate."""
         for preset in self.presets.values():
             # A gait that cannot run is rejected, with the reason, when it is set.
             with contextlib.suppress(CpgError):
                 gait_of(preset, preset.network)
 
     def specs(self, preset: str) -> dict[str, Spec]:
-        """Return ``frequency``, the network's and the joints' own, a preset's as defaults."""
+        """Return ``frequency`` and parameters of network and joints, with a preset's defaults."""
         network, values = self.network, self._values(self.presets[preset].network)
         frequency = self._frequency(preset)
         specs = {'frequency': Spec(1.0 if frequency is None else frequency,
@@ -214,7 +214,7 @@ class Planner:
                                         names), current)
 
     def _frequency(self, preset: str) -> float | None:
-        """Frequency for which the robot file has this gait, Hz."""
+        """Return the gait's frequency in the robot file, Hz."""
         gait = self.presets[preset].gait
         frequency = self.robot.motion(preset, gait).frequency
         if frequency is None and self.robot.biped is not None and gait in GAIT_SPEEDS:
@@ -222,13 +222,13 @@ class Planner:
         return frequency
 
     def _readouts(self, preset: str) -> dict[str, list[float]]:
-        """Readouts that the robot file has for this gait, by parameter."""
+        """Return the gait's readouts in the robot file, by parameter."""
         motion = self.robot.motion(preset, self.presets[preset].gait)
         return {READOUT + name: list(readout)
                 for name, readout in gait_readouts(self.robot, motion).items()}
 
     def _values(self, network: Network) -> dict[str, float]:
-        """Return the parameters and groups by their bare names."""
+        """Return parameters and groups by their bare names."""
         values = network.as_dict()
         return {**values, **{group: math.fsum(values[key] for key in members) / len(members)
                              for group, members in network.groups.items()}}
@@ -237,7 +237,7 @@ class Planner:
         """Build settings from all parameters by name.
 
         Raises:
-            PlanError: a value of the wrong kind, not finite, or an unknown gait.
+            PlanError: a value of the wrong type or not finite, or an unknown gait.
 
         """
         for name in self.names:
@@ -261,7 +261,7 @@ class Planner:
         """Return the plan for all parameters, by name.
 
         Raises:
-            PlanError: it cannot run.
+            PlanError: the gait cannot run.
 
         """
         plan = self._solve(self.settings(values))
@@ -284,11 +284,11 @@ class Planner:
                     settings.amplitude, settings.symmetry_gain, settings.duty)
 
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
-        """Add to a batch the changes that follow from it.
+        """Add to a batch the changes that it implies.
 
-        The gait's preset, the frequency and readouts that the robot file has for it, its own
-        duty, then what a group sets, then the means of the groups; single parameters in the batch
-        win over all of them. An unknown gait adds nothing; it is rejected later.
+        These are, in order: the gait's preset, its frequency, readouts and duty in the robot file,
+        the members of a group, and the means of groups. Single parameters in the batch take
+        precedence. An unknown gait adds nothing and is rejected later.
         """
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}

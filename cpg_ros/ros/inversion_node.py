@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node ``cpg_inversion``: records joint states, and fits them on request.
+"""The node ``cpg_inversion``, which records joint states and fits them on request.
 
-One thread records and responds; a fit runs in a thread of its own meanwhile.
+One thread records and responds; a fit runs in another one.
 """
 
 import asyncio
@@ -81,7 +81,7 @@ SPECS = {
 
 
 class Inversion(StartedNode):
-    """Joint states in; on ~/fit parameters, files, and a running generator set."""
+    """Records joint states; ~/fit writes parameters and files and sets up a running generator."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
@@ -113,7 +113,7 @@ class Inversion(StartedNode):
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
 
     def _allowed(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Reject a Python file named over the graph; only the user may name one, at the start."""
+        """Reject a Python file named over the graph: only the user may name one, at the start."""
         refused = any(parameter.name == 'network' and isinstance(parameter.value, str)
                       and is_path(parameter.value)
                       and parameter.value != self._network for parameter in parameters)
@@ -151,7 +151,7 @@ class Inversion(StartedNode):
         return response
 
     async def _done(self) -> tuple[bool, str]:
-        """Fit in a thread; return whether it succeeded, and a summary or the reason."""
+        """Fit in a thread; return success, and a summary or the reason."""
         self._busy = True
         try:
             live, work = self._live.copy(), Future(executor=self.executor)
@@ -170,7 +170,7 @@ class Inversion(StartedNode):
         return well, message
 
     def _work(self, live: LiveRecording, work: Future) -> None:
-        """Fit, write, publish and apply; set success and message as the result of ``work``."""
+        """Fit, write, publish and apply; store success and message."""
         try:
             free = tuple(name for name in self._value('free') if name)
             robot = self._robot
@@ -204,7 +204,7 @@ class Inversion(StartedNode):
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
     def _applied(self, target: str, result: RecordingFit) -> tuple[bool, str]:
-        """Set the parameters of the target, if there is one; return success and what to add."""
+        """Set the parameters of the target, if there is one; return success and a text."""
         if not target:
             return True, ''
         services = ServiceClients(self)
@@ -223,7 +223,7 @@ class Inversion(StartedNode):
                          "start this node with 'out', and it with the file written there"))
 
     async def _set(self, target: NodeClient, result: RecordingFit) -> bool:
-        """Set the parameters of a generator; return whether its robot can take the readouts."""
+        """Set a generator's parameters; return whether its robot can take the readouts."""
         robot = self._robot
         theirs, = await target.values(['robot'])
         # The fit's cells are then those of its joints.

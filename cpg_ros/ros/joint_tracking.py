@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Monitoring whether the measured joints follow the generator's commands."""
+"""Monitor of whether the measured joints follow the generator's commands."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ AGAIN = 3.0
 
 
 class TrackingLimits(NamedTuple):
-    """Settings of a robot that a TrackingMonitor needs: names, rad and s."""
+    """Robot settings for a TrackingMonitor: names, rad and s."""
 
     names: tuple[str, ...]
     tracking_error: float
@@ -40,19 +40,19 @@ class TrackingLimits(NamedTuple):
 
 
 class JointTracking:
-    """Compares the commanded with the measured angles in the executor, beside the ticks.
+    """Comparison of commanded and measured angles in the executor, outside the ticks.
 
     Attributes:
-        text: which joint does not follow, and how far it is; '' while all of them do.
+        text: joint that does not follow, and its distance; '' while all follow.
 
     """
 
     def __init__(self, node: Node, robot: Robot, measured: MeasuredPose,
                  commanded: Callable[[], np.ndarray | None], news: Callable[[str], None]) -> None:
-        """Compare with the limits of the node's tracking_error and tracking_time.
+        """Compare by the node's tracking_error and tracking_time.
 
-        ``commanded`` returns the angles that were sent last, rad, leg by leg, or None; ``news``
-        gets each new text.
+        ``commanded`` returns the last commanded angles, rad, leg by leg, or None; ``news``
+        receives each new text.
         """
         limits: Any = TrackingLimits(
             tuple(joint.name for joint in robot.joints),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Launch arguments that become the parameters of a node, shared by the launch files."""
+"""Launch arguments that become a node's parameters, shared by the launch files."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -43,7 +43,7 @@ RENAMED = {'feedback': 'feedback.enabled'}
 
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
-    """Return the actions that declare the arguments, and those that every launch file has."""
+    """Return the actions that declare the arguments, and those of every launch file."""
     declarations = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
              'panel': ('false', bool, 'serve a browser page at http://127.0.0.1:8080/'),
              'params_file': ('', str, 'parameter file, such as one written by inversion; '
@@ -57,7 +57,7 @@ def value(context: LaunchContext, name: str, kind: type) -> Any:
     """Return the value of an argument.
 
     Raises:
-        RuntimeError: it is not of this kind; one line for the user.
+        RuntimeError: the value has the wrong type; one line for the user.
 
     """
     text = LaunchConfiguration(name).perform(context)
@@ -87,19 +87,19 @@ def page(context: LaunchContext) -> list[Node]:
 
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,
             fixed: Mapping[str, Any] | None = None, **options: Any) -> Node:
-    """Return a node of this package, with those arguments that are not empty as parameters.
+    """Return a node of this package, with the nonempty arguments as parameters.
 
     Args:
-        context: where the arguments have their values.
+        context: with the values of the arguments.
         executable: of the node.
         name: of the node.
-        arguments: which of them are its parameters.
-        fixed: parameters that no argument gives.
+        arguments: those that are parameters of the node.
+        fixed: parameters that no argument sets.
         options: further ones of the action Node.
 
     Raises:
-        RuntimeError: an argument is not of the kind that it should be or has been renamed, or
-            there is no such params_file.
+        RuntimeError: an argument has the wrong type or has been renamed, or params_file does not
+            exist.
 
     """
     for former, now in RENAMED.items():

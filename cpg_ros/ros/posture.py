@@ -56,27 +56,27 @@ QUIET = 5.0
 
 
 class Posture:
-    """Moves the body of a pattern: poses while it is up, and down to sit.
+    """Poses of a pattern's body while the robot is up, and sitting down.
 
     Attributes:
         seated: whether the robot sits, is about to, or rises.
-        walks: whether it walks as soon as it has risen.
+        walks: whether it walks after it has risen.
 
     """
 
     def __init__(self, node: Node, pattern: Pattern, plan: Callable[[], GaitPlan],
                  walk: Callable[[bool], str], refusal: Callable[[], str]) -> None:
-        """Offer topic and services.
+        """Create topic and services.
 
         Args:
-            node: whose parameters SPECS are declared.
-            pattern: whose body it is.
-            plan: returns the gait that the parameters ask for.
+            node: with the parameters SPECS.
+            pattern: with the body.
+            plan: returns the gait of the parameters.
             walk: ramps into the gait, or down to the stand.
             refusal: returns why the robot cannot sit or stand up now, or ''.
 
         Raises:
-            InputError: the parameters ask for a pose that the robot does not have.
+            InputError: the robot cannot take the pose in the parameters.
 
         """
         self._node, self._pattern, self._plan = node, pattern, plan
@@ -109,7 +109,7 @@ class Posture:
         return self._pattern.body
 
     def _asked(self, parameters: Sequence[Parameter]) -> tuple[float, ...]:
-        """Return the pose that the parameters ask for after a batch of changes."""
+        """Return the pose of the parameters after a batch of changes."""
         values = {f'{PREFIX}{name}': self._node.get_parameter(f'{PREFIX}{name}').value
                   for name in POSE}
         values |= {p.name: p.value for p in parameters if p.name in values}
@@ -147,13 +147,13 @@ class Posture:
         self._body.go_to(pose, self._node.get_parameter('ramp').value)
 
     def _take(self, message: Pose) -> None:
-        """Take a pose as champ has it: z from the stand's height, and an orientation."""
-        place, orientation = message.position, message.orientation
-        numbers = np.array([orientation.w, orientation.x, orientation.y, orientation.z])
+        """Accept a pose in champ's convention: z above the stand's height, and an orientation."""
+        place, q = message.position, message.orientation
+        numbers = np.array([q.w, q.x, q.y, q.z])
         length, log = float(np.linalg.norm(numbers)), self._node.get_logger()
         if not (math.isfinite(length + place.z) and abs(length - 1.0) < 0.01):
-            log.warning(f'body_pose ignored: z {place.z} m, orientation {numbers[1:]} {numbers[0]} '
-                        'is not finite or has not the length 1', throttle_duration_sec=QUIET)
+            log.warning(f'body_pose ignored: z {place.z} m, orientation {numbers[1:]} {q.w} is '
+                        'not finite or has not the length 1', throttle_duration_sec=QUIET)
             return
         if place.x or place.y:
             log.warning('body_pose asks for a way forward or to the left: x and y are ignored',
@@ -191,7 +191,7 @@ class Posture:
         return response
 
     def rise(self, walks: bool) -> None:
-        """Stand up from where the robot sits, and then walk, if so."""
+        """Stand up from sitting, and then walk, if requested."""
         self.walks = walks
         if self.seated:
             self._rises = True

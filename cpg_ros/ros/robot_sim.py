@@ -52,13 +52,13 @@ from std_srvs.srv import Trigger
 # The measurements that a simulated robot publishes every period.
 
 class Measurements:
-    """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
+    """Publisher of ``joint_states``, ``odom``, ``foot_contacts``, ``imu``, with tf2 ``/tf``."""
 
     def __init__(self, node: Node, body: Body, sensors: SimulatedSensors, frame: str,
                  delay: float = 0.0) -> None:
         """Publish a body's motion and sensors; ``frame`` is that of its base.
 
-        Joints and feet are published ``delay`` s late.
+        Joints and feet are delayed by ``delay`` s.
         """
         self._body, self._sensors, self._holds = body, sensors, bool(body.robot.held)
         self._delay = round(1e9 * delay)
@@ -125,13 +125,13 @@ MOST_BEHIND = 0.05
 
 
 class Lockstep(TickThread):
-    """Sets the time with ``tell``, waits for the commands of that instant, calls ``tick``.
+    """Thread that sets the time with ``tell``, waits for its commands, and calls ``tick``.
 
     Simulated time begins when every command has a publisher and /clock a reader, and the first
-    ``tick`` is at the first command, so that a run can be repeated exactly. Commands that come
-    only every few periods, as from a generator of a lower rate, are recognised. No tick is
-    dropped; a late one did not get its command. With a ``pace``, simulated time passes that many
-    times as fast as real time, or slower on a slow machine. ``rate`` is in simulated time, Hz.
+    ``tick`` is at the first command, so that a run is repeatable. It recognises commands at every
+    n-th period, from a generator with a lower rate. No tick is dropped; a late one lacked its
+    command. With ``pace``, simulated time passes that many times as fast as real time, or slower
+    on a slow machine. ``rate`` is in simulated time, Hz.
     """
 
     def __init__(self, node: Node, rate: float, commands: Commands,
@@ -341,7 +341,7 @@ class RobotSim(StartedNode):
         self._warn_of_unknown()
 
     def _on_its_ground(self, robot: Robot, timestep: float, terrain: Terrain | None) -> Body:
-        """Return the body; errors as of Body."""
+        """Return the body on its ground; errors as of Body."""
         body = Body(self._value('model'), robot, self._value('kp') or None,
                     self._value('kd') or None, timestep, add_ground if terrain else None,
                     lambda line: self.get_logger().warning(line))
@@ -375,7 +375,7 @@ class RobotSim(StartedNode):
         self.get_logger().info('standing at the origin')
 
     def _begin_again(self) -> None:
-        """Put the robot at the origin, in its stand, and let it approach the commanded pose."""
+        """Put the robot at the origin in its stand, and let it approach the commanded pose."""
         self._body.reset()
         self._approach.begin(self._body.stand)
         self._since, self._fallen, self._upright_from = self._now, False, -1.0

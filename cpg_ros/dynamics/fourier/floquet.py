@@ -14,11 +14,11 @@
 
 """Floquet multipliers of the gaits of networks with a delay, by a spectral method.
 
-Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, which
-keep the subspaces of dynamics.isotypic.split apart. A history has its values at Chebyshev points
-of equal elements of [-tau, 0]. Elements of the same length cover a period, so that a delayed value
-always lies at a point; the monodromy matrix takes the values of a history to those a period later
-(Breda, Maset & Vermiglio 2012).
+Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, under
+which the subspaces of dynamics.isotypic.split are invariant. A history is given by values at
+Chebyshev points of equal elements of [-tau, 0]. Elements of the same length cover a period, so
+that a delayed value always lies at a point; the monodromy matrix maps the values of a history to
+those a period later (Breda, Maset & Vermiglio 2012).
 """
 
 from collections.abc import Callable
@@ -44,7 +44,7 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     """Return the adjoint's waveforms, in cycles per unit of each variable.
 
     Raises:
-        NoOrbit: the orbit is not isolated, or more nodes would be needed than there may be.
+        NoOrbit: the orbit is not isolated, or more nodes are needed than are allowed.
 
     """
     symmetry = orbit.symmetry
@@ -263,14 +263,15 @@ def variation(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[Variatio
 
 def mode(orbit: FourierOrbit, part: int, multiplier: complex
          ) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the disturbance with a multiplier as a function of time, of size 1 at most.
+    """Return the disturbance with a multiplier as a function of time, with largest value 1.
 
-    The multiplier's eigenvector is a history, which the variational equation takes over a period.
+    It is the eigenvector of the multiplier, a history, continued over a period by the variational
+    equation.
 
     Args:
         orbit: of a network with a delay.
-        part: 0 for the gait's class, then the subspaces transverse to it, as in transverse.
-        multiplier: about that of the disturbance, real and not the trivial one.
+        part: 0 for the gait's class, then the transverse subspaces, as in transverse.
+        multiplier: approximate, real and not the trivial one.
 
     Returns:
         States, shape (points, components), as a function of times in cycles, shape (points,).

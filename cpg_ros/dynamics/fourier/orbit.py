@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
+"""Gaits of networks with a delay as periodic orbits, by Fourier collocation.
 
-On a gait every cell has one of a few waveforms, shifted by a known phase, so the delay equations
-reduce to a periodic problem for one cell of each: with theta = t / T in cycles,
-``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for the inputs of a cell,
+On a gait every cell has one of a few waveforms, shifted by a known phase. The delay equations
+reduce to a periodic problem for one cell of each waveform: with theta = t / T in cycles,
+``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for a cell's inputs,
 solved at even nodes with the period as unknown. Cell 1 peaks at phase zero.
 """
 
@@ -81,13 +81,13 @@ def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
 
 
 def tail(values: np.ndarray) -> float:
-    """Largest of the last six harmonics over the largest of all, a measure of the resolution."""
+    """Return the largest of the last six harmonics over the largest of all."""
     size = np.abs(np.fft.rfft(values))
     return float(size[-6:].max() / (size.max() or 1.0))
 
 
 def resample(values: np.ndarray, n: int) -> np.ndarray:
-    """Return the nodal values on n nodes, more than there are, of the same interpolant."""
+    """Return the same interpolant on n nodes, more than it has."""
     return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)
 
 
@@ -96,9 +96,9 @@ class FourierOrbit(Orbit):
     """An orbit by its waveforms on evenly spaced nodes.
 
     Attributes:
-        values: waveforms at the nodes theta = m / n, shape (waves, variables, n); that of
-            cell 1's first variable peaks at the first one.
-        derivatives: of the nodal values by the parameters, at fixed theta, then of the period,
+        values: waveforms at the nodes theta = m / n, shape (waves, variables, n); cell 1's first
+            variable peaks at the first node.
+        derivatives: by the parameters, of the nodal values at fixed theta, then of the period,
             shape (waves variables n + 1, parameters).
 
     """
@@ -174,7 +174,7 @@ SMALLEST = 1e-7
 @lru_cache(maxsize=64)
 def _inputs(network: type[Network], symmetry: Symmetry
            ) -> list[tuple[bool, list[tuple[int, float]]]]:
-    """For each argument: whether it is delayed, and the row and shift of each wave's input."""
+    """Return for each argument whether it is delayed, and row and shift of each wave's input."""
     inputs = []
     for argument in equations_of(network).arguments:
         source = range(network.cells) if argument.source is None else argument.source
@@ -277,7 +277,7 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
              jacobian: np.ndarray, point: Point) -> FourierOrbit:
-    """Complete a solution by its derivatives; the last two arguments are those of equations."""
+    """Complete a solution by its derivatives; the last two arguments are results of equations."""
     derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
     # The equations of one cell contain only the weights of its own inputs.
@@ -291,17 +291,17 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
 
 def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
            periods: Sequence[float] = ()) -> FourierOrbit | None:
-    """Newton from a guess, doubling the nodes until the waveforms are resolved.
+    """Solve by Newton's method from a guess, doubling the nodes until waveforms are resolved.
 
     Args:
         network: parameters.
         symmetry: of the gait.
         u: guess at the waveforms on the nodes, shape (rows, n).
-        period: in model time.
+        period: guess, model time.
         periods: of orbits to keep away from, model time.
 
     Raises:
-        NoOrbit: they would need more nodes than there may be.
+        NoOrbit: more nodes are needed than are allowed.
 
     """
     while True:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Finding the orbit of a gait of a network with a delay: from another, or from its onset."""
+"""Solution for the orbit of a gait with a delay, from another orbit or from its onset."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -93,7 +93,7 @@ class FourierCurve(ShortRepr):
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['FourierCurve', np.ndarray, np.ndarray] | None:
-        """Twice the nodes where the waveforms ask for it, from cell 1's highest peak."""
+        """Double the nodes where the waveforms need it, and start at cell 1's highest peak."""
         rows = self._rows(z)
         n = rows.shape[1]
         fine = collocation.resample(rows[0], 4 * n)
@@ -135,7 +135,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         line: of parameters.
         scales: as of the curve.
         path: the old solution.
-        disturbance: the critical disturbance of it.
+        disturbance: its critical disturbance.
         period: of the new orbits, model time.
 
     """
@@ -161,8 +161,8 @@ Describing = Callable[[float], tuple[complex, complex]]
 def _describing(network: Network, symmetry: Symmetry) -> Describing:
     """Return A and B of ``lambda = A + B exp(-lambda tau)`` as functions of an amplitude.
 
-    They are the first harmonic of a cell's rate where all cells are amplitude * cos, with their
-    phases: to first harmonic, the network is linear at this amplitude.
+    They are the first harmonic of a cell's rate where all cells are amplitude * cos with their
+    phases (describing functions).
     """
     kind, cosine = equations_of(type(network)), np.cos(np.arange(POINTS) * (2.0 * np.pi / POINTS))
     p = [value[0] if value.ndim else value for value in values_of(network)]
@@ -245,7 +245,7 @@ def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None
 
 
 def predicted(network: Network, near: FourierOrbit) -> tuple[np.ndarray, float]:
-    """Predict waveforms and period for a near network by the derivatives of a known orbit."""
+    """Predict waveforms and period of a nearby network by the derivatives of a known orbit."""
     change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
     u = near.values + near.d_values @ change
     return u.reshape(-1, u.shape[-1]), near.period + float(near.d_period @ change)

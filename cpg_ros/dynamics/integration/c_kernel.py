@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exported C as the kernels of a process, in place of those that numba compiles.
+"""The exported C as the kernels of a process, in place of numba's.
 
 Equations and steps are those of an export (field_source, ``c/network.c``) in float64. The system's
-compiler makes a library of them, which is kept on disk. Lanes are stepped one by one.
+compiler makes a library of them, which is cached on disk. Lanes are stepped one by one.
 """
 
 from collections.abc import Iterator, Sequence
@@ -66,7 +66,7 @@ def library_of(network: type[Network]) -> ctypes.CDLL:
     """Return the library that steps a kind of network.
 
     Raises:
-        NoCompiler: it is not on disk, and there is no compiler, or it fails.
+        NoCompiler: it is not in the cache, and there is no compiler, or it fails.
 
     """
     library = load(generated.folder(equations_of(network).key), f'kernel-{version()}',
@@ -89,7 +89,7 @@ def _track_of(components: int) -> type[ctypes.Structure]:
 
 
 class Lane:
-    """A system of one lane and its history, as C takes them."""
+    """A system with one lane and its history, as C takes them."""
 
     def __init__(self, kind: type[ctypes.Structure], system: System, ring: Ring) -> None:
         if len(ring.x) > MOST_NODES:
@@ -106,12 +106,12 @@ class Lane:
 
 
 def lane_of(network: type[Network], system: System, ring: Ring) -> Lane:
-    """Return a system of one lane and its history for the functions of library_of."""
+    """Return a system with one lane and its history for the functions of library_of."""
     return Lane(_track_of(network.cells * network.variables), system, ring)
 
 
 def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Ring]]:
-    """Yield each lane by itself; changes of its history are copied back."""
+    """Yield each lane by itself, and copy changes of its history back."""
     for lane in range(lanes):
         arrays = [array[:, lane::lanes] for array in (ring.x, ring.after, ring.before)]
         own = [array.copy() for array in arrays]
@@ -123,10 +123,10 @@ def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Rin
 
 @cache
 def c_kernels(network: type[Network]) -> Kernels:
-    """Return a network's kernels in C, in place of those of numba.
+    """Return a network's kernels in C, in place of numba's.
 
     Raises:
-        NoCompiler: they are not on disk, and there is no compiler, or it fails.
+        NoCompiler: they are not in the cache, and there is no compiler, or it fails.
 
     """
     library, components = library_of(network), network.cells * network.variables

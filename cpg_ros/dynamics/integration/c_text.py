@@ -26,7 +26,7 @@ WIDTH = 98
 
 
 def part(name: str, values: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return a file of ``c`` in which names between @ are replaced by these values."""
+    """Return a file of ``c`` with names between @ replaced by these values."""
     text = (FOLDER / name).read_text()
     for key, value in values.items():
         text = text.replace(f'@{key}@', value)
@@ -34,7 +34,7 @@ def part(name: str, values: Mapping[str, str] = MappingProxyType({})) -> str:
 
 
 def number(value: float, real: str) -> str:
-    """Return a number to the last digit of its type, float32 or float64."""
+    """Return a number with all digits of its type, float32 or float64."""
     text = f'{value:.9g}' if real == 'float32' else repr(float(value))
     if not any(mark in text for mark in '.e'):
         text += '.0'
@@ -42,7 +42,7 @@ def number(value: float, real: str) -> str:
 
 
 def braces(values: Any, real: str, indent: int = 4) -> str:
-    """Return an initializer of an array of any shape; integers as such."""
+    """Return an initializer of an array of any shape and of integers or floats."""
     values = np.asarray(values)
     if values.ndim > 1:
         inner = ',\n'.join(' ' * indent + braces(row, real, indent + 4) for row in values)

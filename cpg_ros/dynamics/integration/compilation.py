@@ -14,8 +14,8 @@
 
 """Compilation of the numerical kernels, and the elementary functions that they share.
 
-numba is loaded when the first of them runs; the generator needs none without feedback. Without
-numba they are plain Python, which is too slow for feedback and simulation.
+numba is loaded when the first kernel runs; without feedback, the generator needs none. Without
+numba, kernels are plain Python, too slow for feedback and simulation.
 """
 
 from contextlib import AbstractContextManager, nullcontext
@@ -36,25 +36,25 @@ def _numba():
 
 
 class Kernel:
-    """A function that numba compiles when it is first called, by Python or by another one."""
+    """A function that numba compiles when Python or another kernel first calls it."""
 
     def __init__(self, function, decorator: str) -> None:
-        """Take a function, and the name of its decorator in machine_code."""
+        """Set the function, and the name of its decorator in machine_code."""
         update_wrapper(self, function)
         self.py_func, self._decorator = function, decorator
 
     @cached_property
     def code(self):
-        """The function as compiled by numba, or without numba the function itself."""
+        """The compiled function, or without numba the function itself."""
         return getattr(_numba(), self._decorator)(self.py_func) if COMPILED else self.py_func
 
     @property
     def _numba_type_(self):
-        """What numba takes it for where another kernel calls it."""
+        """Type that numba infers where another kernel calls it."""
         return self.code._numba_type_
 
     def __call__(self, *arguments):
-        """Return the function's result; not a number where plain Python has none."""
+        """Return the function's result; nan where plain Python raises an arithmetic error."""
         if COMPILED:
             return self.code(*arguments)
         try:
@@ -64,26 +64,26 @@ class Kernel:
 
 
 def jit(function):
-    """Compile a function that others call."""
+    """Compile a function that other kernels call."""
     return Kernel(function, 'jit')
 
 
 def jit_entry(function):
-    """Compile an entry point of the package, whose machine code is kept on disk."""
+    """Compile an entry point of the package, and cache its machine code on disk."""
     return Kernel(function, 'jit_entry')
 
 
 def specialised(kernel: Kernel, *arguments):
-    """Return a kernel's machine code for arguments like these, to be called as it is.
+    """Return a kernel's machine code for arguments like these.
 
-    It saves the look at the type of every argument, which takes longer than a small kernel. The
-    arguments must be of the same types, dimensions and orders in memory.
+    It skips the type dispatch, which takes longer than a small kernel. Later arguments must have
+    the same types, dimensions and memory orders.
     """
     return _numba().specialised(kernel.code, *arguments) if COMPILED else kernel
 
 
 def on_compile(compiling) -> AbstractContextManager:
-    """Call a function for each function that is not on disk yet, before it is compiled."""
+    """Call a function before each compilation of a function that is not in the cache."""
     return _numba().on_compile(compiling) if COMPILED else nullcontext()
 
 
@@ -116,7 +116,7 @@ def _reduced(z):
 def tanh(x):
     """Hyperbolic tangent, within 4 units in the last place, without a branch.
 
-    It can be vectorised, unlike libm's: expm1 by reduction and a Taylor polynomial of degree 13,
+    Unlike libm's it can be vectorised: expm1 by reduction and a Taylor polynomial of degree 13,
     then tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
     """
     z = abs(x)
@@ -136,7 +136,7 @@ def exp(x):
 
 @jit
 def fetch(lanes, source, given, out):
-    """Copy the inputs of each cell: of cell ``source[cell]`` all lanes."""
+    """Copy the inputs of each cell, all lanes of cell ``source[cell]``."""
     if lanes == 1:
         for cell in range(len(source)):
             out[cell] = given[source[cell]]

@@ -108,8 +108,7 @@ def _field(own, rates, components):
     def field(n, system, driven, x, weight, k, work, out):
         """Return the right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
-        P projects on the rows of the basis; work is scratch, room for z and for what the rates
-        need.
+        P projects on the rows of the basis; ``work`` is scratch memory for z and the rates.
         """
         lanes, basis, gain = n // components, system.basis, system.gain
         z, along = work[:n], work[n:]
@@ -141,7 +140,7 @@ def _past(own):
     """Return the interpolation of the delayed states of all lanes, compiled by ``own``."""
     @own
     def past_state(n, ring, head, back, first, stride, out):
-        """Fill in every stride-th component of the state ``back`` steps before the head node."""
+        """Fill every stride-th component of the state ``back`` steps before the head node."""
         step, x, after, before = ring
         nodes = max(1, math.ceil(back))
         start = head - nodes
@@ -165,7 +164,7 @@ def _past(own):
 
     @own
     def past_states(n, tau, ring, head, c, out):
-        """Return the state at t_head + c step - tau, tau (lanes,); one pass if all agree."""
+        """Return the state at t_head + c step - tau, tau (lanes,); one pass if all are equal."""
         lanes, step = tau.shape[0], ring.step
         same = True
         for lane in range(1, lanes):
@@ -188,7 +187,7 @@ def _stepping(own, field, past_states, drive, sizes):
         """Take RK4 steps from the head node; return the new head.
 
         ``noise`` is the standard deviation of white noise per square root of model time, added
-        once a step (Euler-Maruyama); the caller seeds. The first step here is number ``row``.
+        once a step (Euler-Maruyama); the caller seeds it. ``row`` is the number of the first step.
         """
         step, x, after, before = ring
         every, states, slopes = record
@@ -244,7 +243,7 @@ def _stepping(own, field, past_states, drive, sizes):
 
 
 def _compiled(numba, network):
-    """Return restart and steps_of of a network, compiled; numba is the module machine_code."""
+    """Return restart and steps_of of a network, compiled by the module machine_code."""
     equations = equations_of(network)
 
     def own(function):
@@ -271,7 +270,7 @@ def set_slope(system, ring, head):
 
 
 def integrate(system, ring, head, steps, noise, seed, record, row):
-    """Take steps of one block of lanes, the first one number ``row``; return the new head."""
+    """Take steps of one block of lanes, the first with number ``row``; return the new head."""
     np.random.seed(seed)
     return _steps(system, ring, head, steps, noise, record, row)
 
@@ -280,7 +279,7 @@ def integrate_many(system, ring, head, steps, noise, seeds, record, row):
     """Take and record steps of many blocks on all cores; return the new head.
 
     Arrays of coefficients, delays, states and slopes have a leading axis, the block; the record
-    has one of all lanes.
+    has one for all lanes.
     """
     p, tau, gain, basis = system
     step, x, after, before = ring
@@ -298,8 +297,7 @@ def integrate_many(system, ring, head, steps, noise, seeds, record, row):
 class Kernels:
     """The entry points above, compiled for one kind of network.
 
-    They do not look at the types of their arguments: arrays must be C-contiguous, of floats, and
-    times, gains and noise floats.
+    They do not check types: arrays must be C-contiguous floats, and times, gains and noise floats.
     """
 
     set_slope: Callable[..., None]
@@ -309,7 +307,7 @@ class Kernels:
 
 @cache
 def numba_kernels(network: type[Network]) -> Kernels:
-    """Return the compiled entry points of a kind of network, compiled when they are first used.
+    """Return the entry points of a kind of network, compiled on first use.
 
     Raises:
         MissingLibraryError: numba is not installed.
@@ -323,10 +321,10 @@ def numba_kernels(network: type[Network]) -> Kernels:
     key = equations_of(network).key
 
     def of_network(function, **options):
-        """Compile a copy of an entry point that finds the network's functions as its globals.
+        """Compile a copy of an entry point with the network's functions as its globals.
 
-        Not as closed-over values: numba keys its cache on those, and a compiled function is
-        another value in every process.
+        numba keys its cache on closed-over values, and a compiled function differs in every
+        process.
         """
         copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__)
         copy.__doc__ = function.__doc__

@@ -14,7 +14,7 @@
 
 """Kernel code of a network's right-hand side, in Python and C: loops over all cells and lanes.
 
-A function of another cell's variables is computed at that cell, once, and then fetched. Each
+A function of another cell's variables is computed once, at that cell, and then fetched. Each
 elementary function and each result has a loop of its own, which compilers vectorise.
 """
 
@@ -32,7 +32,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 
 class _KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
-    """Python, numbers to the last digit."""
+    """Printer of Python, with all digits of numbers."""
 
     _print_Float = print_float
 
@@ -41,7 +41,7 @@ _PRINTER = _KernelPrinter({'fully_qualified_modules': False})
 
 
 class LoopProgram:
-    """Loops that compute expressions of arguments of one instant."""
+    """Loops that compute expressions of arguments at one instant."""
 
     def __init__(self, arguments: Sequence[tuple[Any, Argument]], powers: dict[Any, Any]
                  ) -> None:
@@ -70,7 +70,7 @@ class LoopProgram:
         return symbol
 
     def lowered(self, part: Any) -> Any:
-        """Replace arguments and functions in an expression by what the loops have worked out."""
+        """Replace arguments and functions in an expression by results of the loops."""
         if part in self._arguments:
             one = self._arguments[part]
             own = self.own(one.variable)
@@ -101,7 +101,7 @@ class LoopProgram:
 
 
 class Writer:
-    """Writes the loops of a program as the body of a function."""
+    """Writer of a program's loops as the body of a function."""
 
     def __init__(self, program: LoopProgram, sources: dict[Source, int]) -> None:
         self._program, self.sources = program, sources
@@ -111,7 +111,7 @@ class Writer:
         self._allot()
 
     def _allot(self) -> None:
-        """Give every array its place in the room for work."""
+        """Assign every array a place in the scratch memory."""
         program = self._program
         behind: dict[Any, Any] = {}
         for symbol, what, source in program.fetched:
@@ -135,7 +135,7 @@ class Writer:
             self.arrays += 1
 
     def _elements(self, part: Any) -> str:
-        """Code of an expression at place i."""
+        """Return the code of an expression at index i."""
         names = {symbol: sympy.Symbol(f'{symbol}[i]') for symbol in part.free_symbols}
         return str(_PRINTER.doprint(part.xreplace(names)))
 
@@ -181,7 +181,7 @@ def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
     """Write hyperbolic functions of multiples of one argument by one exponential.
 
     Returns:
-        The expressions, and what exponentials the new symbols in them (e0 ...) stand for.
+        The expressions, and symbol in them (e0 ...) -> exponential.
 
     """
     calls = sorted({call for part in parts for call in part.atoms(sympy.tanh, sympy.cosh)},
@@ -234,12 +234,12 @@ def _function(name: str, head: str, doc: str, slices: Sequence[str], lines: Sequ
 
 
 class LoweredPart(NamedTuple):
-    """A part of the right-hand side, as loops over the cells work it out.
+    """A part of the right-hand side as loops over the cells.
 
     Attributes:
-        name: ``drive``, what depends on delayed states alone, or ``field``, the rates.
-        program: the functions that are worked out first.
-        results: expressions of what the part fills in, one for each array.
+        name: ``drive``, terms in delayed states alone, or ``field``, the rates.
+        program: functions that are computed first.
+        results: expressions that the part returns, one for each array.
 
     """
 
@@ -249,9 +249,9 @@ class LoweredPart(NamedTuple):
 
 
 def lowered_parts(equations: Equations) -> list[LoweredPart]:
-    """Return ``drive``, where any input is delayed, and ``field``.
+    """Return ``drive``, if any input is delayed, and ``field``.
 
-    The results of ``drive`` stand in those of ``field`` as d0, d1 ...
+    The results of ``drive`` are d0, d1 ... in those of ``field``.
     """
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
@@ -273,9 +273,9 @@ def lowered_parts(equations: Equations) -> list[LoweredPart]:
 def kernel_source(equations: Equations) -> str:
     """Write a module with ``compiled(decorate)``, which returns (drive or None, field).
 
-    ``drive(n, past, p, lanes, work, out)`` fills ``DRIVEN`` arrays of the length n / variables;
-    ``field(n, z, driven, p, lanes, work, out)`` the rates. ``p`` has a row for each parameter of
-    the equations, ``work`` room for ``WORK`` such arrays and ``EXTRA`` cells.
+    ``drive(n, past, p, lanes, work, out)`` fills ``DRIVEN`` arrays of length n / variables;
+    ``field(n, z, driven, p, lanes, work, out)`` fills the rates. ``p`` has a row for each
+    parameter of the equations, ``work`` memory for ``WORK`` such arrays and ``EXTRA`` cells.
     """
     parts = lowered_parts(equations)
     driven = len(parts[0].results) if len(parts) > 1 else 0
@@ -324,7 +324,7 @@ HEADS = {'drive': 'static void drive(const cpg_real *past, const cpg_real *p, cp
 
 
 class _Printer(C99CodePrinter):  # type: ignore[misc]
-    """C in the type that the macros R (of a number) and F (of a function) stand for."""
+    """Printer of C with numbers in R() and functions in F(), macros of the type."""
 
     def _print_Float(self, value: Any) -> str:
         return f'R({float(value)!r})'
@@ -355,7 +355,7 @@ class FieldSource(NamedTuple):
 
     Attributes:
         text: C.
-        driven: arrays, of one number for each cell, that drive fills in.
+        driven: number of arrays, of one number for each cell, that drive fills.
         parameters: numbers in p, row by row: one, or one for each cell.
 
     """
@@ -437,11 +437,11 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
 
 
 def field_source(equations: Equations, cells: int, each: bool = False) -> FieldSource:
-    """Return C of the functions of a network with a number of cells.
+    """Return C of a network's functions.
 
     Args:
         equations: of the network.
-        cells: that it has.
+        cells: their number.
         each: every row of p has one number for each cell.
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Machine code of the numerical kernels, made by numba and kept on disk."""
+"""Machine code of the numerical kernels, compiled by numba and cached on disk."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -37,7 +37,7 @@ jit = njit(**OPTIONS)
 
 
 class _Disk(FunctionCache):
-    """Machine code on disk, as far as there is room: numba would end with a full disk."""
+    """Cache of machine code on disk, skipped if the disk is full, at which numba would fail."""
 
     def save_overload(self, sig, data):
         with writing():
@@ -45,12 +45,12 @@ class _Disk(FunctionCache):
 
 
 def cached_on_disk(function, folder: Path | None, **options):
-    """Compile a function when it is first called, and keep its machine code on disk.
+    """Compile a function on its first call, and cache its machine code on disk.
 
     Args:
         function: not compiled yet.
-        folder: which is another one whenever something that the function calls has changed;
-            without one, nothing is kept.
+        folder: changes whenever something that the function calls has changed; None caches
+            nothing.
         options: of numba, beside those of every kernel.
 
     """
@@ -70,7 +70,7 @@ def cached_on_disk(function, folder: Path | None, **options):
 
 
 def jit_entry(function):
-    """Compile an entry point of the package, whose machine code is kept on disk."""
+    """Compile an entry point of the package, and cache its machine code on disk."""
     return cached_on_disk(function, equations.folder())
 
 
@@ -92,13 +92,13 @@ def bound_by_first_call(kernel):
 
 
 def renamed(function, key: str):
-    """Give a function that is compiled once for each network a name of its own for this one.
+    """Name a function that is compiled once for each network after that network.
 
-    numba takes two functions of the same qualified name in its disk cache for one and the same: a
-    network would run another's equations.
+    numba identifies functions in its disk cache by their qualified name: a network would run
+    another's equations.
 
     Args:
-        function: to be renamed.
+        function: to rename.
         key: of the network's equations.
 
     """
@@ -107,7 +107,7 @@ def renamed(function, key: str):
 
 
 def machine_function(function, arguments: tuple) -> Any:
-    """Compile a function of a pointer to arguments like these for C; it has its ``address``."""
+    """Compile a function of a pointer to arguments like these for C; it has an ``address``."""
     folder = equations.folder()
     numba: Any = config
     kind = (types.CPointer(typeof(arguments)),), types.int64
@@ -123,7 +123,7 @@ def machine_function(function, arguments: tuple) -> Any:
 
 
 class _Notice(event.Listener):
-    """Calls a function when something is compiled."""
+    """Calls a function at each compilation."""
 
     def __init__(self, compiling: Callable[[], None]) -> None:
         self._compiling = compiling
@@ -132,11 +132,11 @@ class _Notice(event.Listener):
         self._compiling()
 
     def on_end(self, event: event.Event) -> None:
-        """Whatever follows has been announced."""
+        """Announce nothing: the compilation was announced at its start."""
 
 
 @contextmanager
 def on_compile(compiling: Callable[[], None]) -> Iterator[None]:
-    """Call a function for each function that is not on disk yet, before it is compiled."""
+    """Call a function before each compilation of a function that is not in the cache."""
     with event.install_listener('numba:compile', _Notice(compiling)):
         yield

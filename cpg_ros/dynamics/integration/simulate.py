@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Offline simulation: the real-time kernel, every node of it recorded."""
+"""Offline simulation with the real-time kernel, recording every node."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ CHUNK = 20_000_000
 
 
 def use(maker: Callable[[type[Network]], Kernels]) -> None:
-    """Set what makes the kernels of this process: c_kernels are ready at once, without numba."""
+    """Set the kernels of this process; c_kernels are ready at once, without numba."""
     global _maker
     _maker = maker
 
@@ -50,10 +50,9 @@ class Trajectory(ShortRepr):
     """Dense solution on a fixed grid.
 
     Attributes:
-        t: nodes from t = 0 on, model time, shape (nodes,).
-        x: states there, shape (nodes, components) or (batch, nodes, components).
-        slopes: time derivatives there, shaped like x; at t = 0 that of the network, not of the
-            history.
+        t: nodes from t = 0, model time, shape (nodes,).
+        x: states, shape (nodes, components) or (batch, nodes, components).
+        slopes: time derivatives, shaped like x; at t = 0 that of the network, not of the history.
 
     """
 
@@ -67,7 +66,7 @@ class Trajectory(ShortRepr):
                 f'{self.x.shape[-1]} components')
 
     def __call__(self, times: np.ndarray | float) -> np.ndarray:
-        """Return the states at the times given, cubic Hermite, shape (..., times, components).
+        """Interpolate the states at times by cubic Hermite, shape (..., times, components).
 
         Raises:
             ValueError: a time lies outside the simulated span.
@@ -92,10 +91,10 @@ def sample_history(history: History, nodes: int, step: float, components: int
 
     Returns:
         Two arrays of shape (nodes, components). Slopes of a function come from its attribute
-        ``derivative`` if it has one, otherwise from five-point differences a step apart.
+            ``derivative``, otherwise from five-point differences a step apart.
 
     Raises:
-        ValueError: the shape is not that of the network, or a value is not finite.
+        ValueError: the shape does not fit the network, or a value is not finite.
 
     """
     if callable(history):
@@ -130,29 +129,29 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
              lock: tuple[float, Symmetry] | None = None,
              noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
              ) -> Trajectory:
-    """Integrate a network from a history, RK4 with cubic Hermite delayed values.
+    """Integrate a network from a history, by RK4 with cubic Hermite delayed values.
 
-    One network and one history give one trajectory. A sequence of networks, an array of
-    histories of shape (batch, components) or a list of histories give a batch, which runs on all
-    cores; a single one of either goes with every one of the other.
+    One network and one history give one trajectory. A sequence of networks, an array of histories
+    of shape (batch, components) or a list of histories give a batch, which runs on all cores; a
+    single network or history is combined with every one of the other.
 
     Args:
-        network: parameters, one set or a sequence of them.
-        history: constant state, function of times t <= 0, or orbit (see History); or many.
-        t_end: model time to reach; rounded up to whole steps.
-        step: model time per step; every delay must be at least one step. By default half the
-            network's own, or the shortest delay if that is less: without noise, each shipped
-            gait stays within 1e-6 of its range of the exact orbit over a cycle.
-        lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
+        network: parameters, one set or a sequence.
+        history: constant state, function of times t <= 0, or orbit (see History); one or many.
+        t_end: end, model time; rounded up to whole steps.
+        step: model time; every delay must be at least one step. By default half the network's own,
+            or the shortest delay if that is less: without noise, each shipped gait stays within
+            1e-6 of its range of the exact orbit over a cycle.
+        lock: symmetry lock (gain in 1/model time, the gait's symmetry), or None.
         noise: standard deviation of white noise per square root of model time.
-        seed: seeds the noise of the whole batch.
-        every: number of steps from one recorded step to the next; t_end is rounded up to these.
-        progress: show a progress bar on work of more than about two seconds.
+        seed: of the noise of the whole batch.
+        every: steps between recorded ones; t_end is rounded up to a multiple.
+        progress: show a progress bar if the work takes more than about two seconds.
 
     Raises:
-        InputError: step or t_end not positive and finite, a parameter not finite, a delay
-            shorter than a step.
-        ValueError: shapes or numbers of networks and histories that do not fit.
+        InputError: step or t_end is not positive and finite, a parameter is not finite, or a delay
+            is shorter than a step.
+        ValueError: shapes or numbers of networks and histories do not fit.
 
     """
     networks = [network] if isinstance(network, Network) else list(network)

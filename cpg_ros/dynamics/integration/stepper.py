@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A network in real time: a ring of history, a fixed model step, constant memory."""
+"""A network in real time: a ring of history, a fixed step, constant memory."""
 
 from collections.abc import Callable
 import copy
@@ -28,17 +28,17 @@ import numpy as np
 
 
 class Stepper:
-    """One network advancing in model time, evaluated between its nodes.
+    """A network that advances in model time, evaluated between its nodes.
 
-    Parameters can be changed while it runs: the history stays, and the next step starts with the
-    slope of the new ones.
+    Parameters can change while it runs: the history stays, and the next step starts with the slope
+    at the new ones.
 
     Attributes:
         now: x, x', x'' at the output instant, shape (3, components), overwritten by ``advance``.
-        system: the network as kernels take it, and its symmetry lock.
-        ring: the history.
+        system: network and symmetry lock as kernels take them.
+        ring: history.
         lane: both, as C takes them.
-        clock: the newest node, and the model time from the output instant to it, shape (2,).
+        clock: newest node, and model time from the output instant to it, shape (2,).
 
     """
 
@@ -50,14 +50,14 @@ class Stepper:
         Args:
             network: parameters.
             history: constant state, function of times t <= 0, or orbit.
-            step: model time per step, at most the delay; the network's own if not given.
-            max_delay: longest delay that may be set later, in model time; the network's own if
-                not given.
-            gain: gain of the symmetry lock, in 1/model time; 0 is the paper's model.
-            symmetry: of the gait to lock, needed for a gain other than 0.
+            step: model time, at most the delay; by default the network's own.
+            max_delay: longest delay that may be set later, model time; by default the network's
+                own.
+            gain: of the symmetry lock, 1/model time; 0 is the paper's model.
+            symmetry: of the gait to lock, required for a gain other than 0.
 
         Raises:
-            ValueError: a step or delay out of range, or a history that does not fit.
+            ValueError: a step or delay is out of range, or a history does not fit.
 
         """
         step = network.step if step is None else step
@@ -80,8 +80,8 @@ class Stepper:
         """Continue with other parameters from the next step, keeping the history.
 
         Raises:
-            ValueError: the delay is shorter than a step or longer than the ring, a gain
-                without its symmetry class, or a value that is not finite. Nothing is changed then.
+            ValueError: the delay is shorter than a step or longer than the ring, a gain has no
+                symmetry, or a value is not finite. Nothing has changed then.
 
         """
         if not all(math.isfinite(v) for v in (*network.as_dict().values(), gain)):
@@ -107,11 +107,9 @@ class Stepper:
         self._library.set_slope(self.lane.pointer, int(self.clock[0]))
 
     def advance(self, duration: float) -> np.ndarray:
-        """Advance by a duration in model time (0 or more).
+        """Advance by a duration in model time, 0 or more; return x, x', x'', (3, components).
 
-        Returns x, x', x'' there, shape (3, components).
-
-        The array returned is the same one every time.
+        Every call returns the same array.
         """
         clock, now = self._addresses
         self._library.advance(self.lane.pointer, clock, duration, now)

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The compiled part of collocation: every interval's linear equations, and their chain.
+"""Compiled part of collocation: the linear equations of every interval, and their chain.
 
-They are small and many. Gaussian elimination written out, with the right-hand sides as further
-columns, takes a fraction of the time of a call of LAPACK for each: it is C (``c/mesh.c``).
+They are small and many. Gaussian elimination in C (``c/mesh.c``), with the right-hand sides as
+further columns, takes a fraction of the time of one LAPACK call each.
 """
 
 import ctypes
@@ -39,7 +39,7 @@ NODES, WEIGHTS = 0.5 * (_X + 1.0), 0.5 * _W
 
 
 def _lagrange() -> np.ndarray:
-    """Power coefficients of the Lagrange polynomials at the nodes, shape (S, S)."""
+    """Return the power coefficients of the Lagrange polynomials at the nodes, shape (S, S)."""
     rows = []
     for k in range(S):
         others = np.delete(NODES, k)
@@ -56,15 +56,15 @@ LEGENDRE = np.linalg.inv(legendre.legvander(_X, S - 1))
 
 
 def power_coefficients(left: np.ndarray, slopes: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Coefficients of the collocation polynomials in the place on each interval, 0 to 1.
+    """Return the coefficients of the collocation polynomials over the interval, 0 to 1.
 
     Args:
-        left: values where the intervals start, shape (n, d).
+        left: values at the starts of the intervals, shape (n, d).
         slopes: derivatives at the nodes, shape (n, S, d).
         lengths: of the intervals, shape (n,).
 
     Returns:
-        An array of shape (S + 1, n, d).
+        Coefficients of shape (S + 1, n, d).
 
     """
     coefficients = lengths[:, None] * np.einsum('sq,nsd->qnd', INTEGRALS, slopes)
@@ -152,7 +152,7 @@ def solver() -> ctypes.CDLL:
     """Return the functions of ``c/mesh.c``.
 
     Raises:
-        NoCompiler: they are not on disk, and there is no C compiler, or it fails.
+        NoCompiler: they are not in the cache, and there is no C compiler, or it fails.
 
     """
     library = load(generated.folder(), f'mesh-{version()}', lambda: {'mesh.c': part('mesh.c')},
@@ -166,7 +166,7 @@ def solver() -> ctypes.CDLL:
 
 
 def addresses(*arrays: np.ndarray) -> list[int]:
-    """Return where arrays are in memory, all of which are C-contiguous and of floats."""
+    """Return the addresses of arrays, all C-contiguous floats."""
     assert all(array.flags.c_contiguous and array.dtype == float for array in arrays)
     return [array.ctypes.data for array in arrays]
 

@@ -14,13 +14,13 @@
 
 """Variational equation of gaits without delay: adjoint, Floquet multipliers, forced solutions.
 
-A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow keeps Fix(K) and its
-orthogonal complement apart, so the multipliers split into those within the class, 1 among them,
-and those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement and nothing
-else: it multiplies the transverse multipliers by exp(-g T) exactly.
+A gait lies in Fix(K), K its spatial symmetries. Fix(K) and its orthogonal complement are invariant
+under the linearised flow, so the multipliers split into those within the class, 1 among them, and
+those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement: it multiplies the
+transverse multipliers by exp(-g T) exactly.
 
 The multiplier 1 belongs to the direction of the flow. The others of the class are computed across
-it, so that they stay separate at a fold, where 1 is double.
+the flow, so that they stay separate at a fold, where 1 is double.
 """
 
 from functools import lru_cache
@@ -47,7 +47,7 @@ def adjoint(orbit: MeshOrbit) -> Waveforms:
     """Return the adjoint's waveforms, in cycles per unit of each variable.
 
     Raises:
-        NoOrbit: the orbit is not isolated, or more intervals would be needed than there may be.
+        NoOrbit: the orbit is not isolated, or more intervals are needed than are allowed.
 
     """
     mesh, symmetry = orbit.mesh, orbit.symmetry
@@ -152,7 +152,7 @@ def transverse(orbit: MeshOrbit, gain: float = 0.0, accuracy: object = None
 
 
 def largest_transverse(orbit: MeshOrbit, gain: float = 0.0, exact: float = 0.0) -> float:
-    """Return the modulus of the largest of them, 0 if there is none."""
+    """Return the largest modulus of the transverse multipliers, 0 if there is none."""
     return max((float(np.abs(part).max()) for part in transverse(orbit, gain)), default=0.0)
 
 
@@ -228,18 +228,18 @@ def returning(orbit: MeshOrbit, part: int, multiplier: complex
               ) -> tuple[np.ndarray, complex, np.ndarray]:
     """Return the disturbance with a multiplier, and its factor over T/m.
 
-    On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells. So disturbances w that
-    grow by a factor nu are eigenvectors of the map over T/m in the frame that changes places with
-    the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
+    On a gait ``x(t + T/m) = M x(t)``, M the permutation of the cells. Disturbances w that grow by
+    a factor nu are eigenvectors of the map over T/m in the frame that is permuted with the cells,
+    and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
 
     Args:
         orbit: of a network without delay.
-        part: 0 for the gait's class, then the subspaces transverse to it, as in transverse.
-        multiplier: about that of the disturbance over a period, not the trivial one.
+        part: 0 for the gait's class, then the transverse subspaces, as in transverse.
+        multiplier: approximate, over a period, not the trivial one.
 
     Returns:
-        Orthonormal columns of the subspace, shape (components, d); nu; and w at the mesh points in
-        these columns, shape (n + 1, d).
+        Orthonormal columns of the subspace, shape (components, d); nu; w at the mesh points in
+            these columns, shape (n + 1, d).
 
     """
     inside, outside = split(orbit.symmetry)

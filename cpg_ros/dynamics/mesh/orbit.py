@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits of the networks without delay as exact periodic orbits, by Gauss collocation on a mesh.
+"""Gaits of the networks without delay as periodic orbits, by Gauss collocation on a mesh.
 
 On a gait the cells of one class under K are equal, and after T/m, m the order of H/K, the classes
-have changed places. So the network collapses to one cell a class and 1/m of the period, with the
-boundary condition ``y(T/m) = Pi y(0)`` and the period as unknown. Newton's method eliminates each
-interval's inner values, which leaves a linear system in y(0) and T. Secondary gaits, with two
-waveforms, are no different.
+are permuted. The network therefore reduces to one cell of each class and 1/m of the period, with
+the boundary condition ``y(T/m) = Pi y(0)`` and the period as unknown. Newton's method eliminates
+each interval's inner values, which leaves a linear system in y(0) and T. Secondary gaits, with two
+waveforms, are solved in the same way.
 """
 
 from collections.abc import Callable, Sequence
@@ -118,12 +118,12 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
 
 
 def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bool:
-    """Solve on a fixed mesh, in place; tell whether it converged.
+    """Solve on a fixed mesh, in place; return whether it converged.
 
     Args:
         reduced: the network in a gait.
-        now: the guess, and then the solution.
-        periods: lengths T/m, model time, of orbits to be kept off.
+        now: guess; overwritten by the solution.
+        periods: lengths T/m of orbits to keep away from, model time.
 
     """
     scale = np.abs(now.points).max()
@@ -183,7 +183,7 @@ def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarra
 
 
 def finer(mesh: np.ndarray) -> int:
-    """Return the fewest intervals that the next mesh shall have where this one fell short."""
+    """Return the smallest number of intervals of the next mesh where this one fell short."""
     n = mesh.size - 1
     return n + 1 + n // 16
 
@@ -192,7 +192,7 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     """Return a better mesh for a solution, or None if it is resolved.
 
     Raises:
-        NoOrbit: it would need more intervals than there may be.
+        NoOrbit: more intervals are needed than are allowed.
 
     """
     h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
@@ -294,10 +294,10 @@ class MeshOrbit(Orbit):
 
     @property
     def d_coefficients(self) -> np.ndarray:
-        """Derivatives of the coefficients by the parameters at fixed theta.
+        """Derivatives of the coefficients by the parameters, at fixed theta.
 
-        A family of weights that the symmetry carries into one another acts as one: each has an
-        equal part of what moving all of them does. Shape (S + 1, n, d, parameters).
+        The shape is (S + 1, n, d, parameters). Weights that the symmetry maps to each other act as
+        one: each has an equal part of the effect of all.
         """
         return self._derivatives[0]
 
@@ -335,19 +335,19 @@ def columns_of(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
 
 def evaluate(symmetry: Symmetry, mesh: np.ndarray, coefficients: np.ndarray, theta: np.ndarray, *,
              order: int = 0, wave: int = 0, variable: int = 0) -> np.ndarray:
-    """Evaluate a waveform, or its derivative in theta, that polynomials on a mesh describe.
+    """Evaluate a waveform, or its derivative in theta, from polynomials on a mesh.
 
     Args:
         symmetry: of the gait.
         mesh: ends of the intervals over T/m, from 0 to 1, shape (n + 1,).
         coefficients: of reduced states on each interval, shape (terms, n, d, ...).
-        theta: where, in cycles, any shape.
+        theta: cycles, any shape.
         order: of the derivative, 0 for the value.
-        wave: which waveform.
+        wave: index of the waveform.
         variable: of the cell.
 
     Returns:
-        An array of shape theta.shape + (...).
+        Values of shape theta.shape + (...).
 
     """
     theta = np.asarray(theta, dtype=float) - symmetry.phases[symmetry.first[wave]]

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Solving for the orbit of a gait of a network without delay, from the nearest known orbit.
+"""Solution for the orbit of a gait without delay, from the nearest known orbit.
 
 Newton's method starts at the given orbit. If it fails, simulations locked to the gait's symmetry
-start there and at many other states. If they fail, the orbit is continued from the known
-parameters to the given ones, which also shows how far it exists. Without a known orbit, those that
-are unstable within their class are continued from Hopf points.
+start there and at many other states. If these fail, the orbit is continued from the known
+parameters, which also shows how far it exists. Without a known orbit, orbits that are unstable
+within their class are continued from Hopf points.
 """
 
 from collections.abc import Callable, Sequence
@@ -79,11 +79,11 @@ def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
 
 
 def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
-    """Solve for an orbit from the prediction of a known one, on its mesh; None as in from_path.
+    """Solve for an orbit from the prediction of a known one, on its mesh; None as of from_path.
 
     Args:
         network: parameters.
-        near: an orbit of the same gait at near parameters.
+        near: an orbit of the same gait at nearby parameters.
 
     Raises:
         NoOrbit: the known orbit is not isolated.
@@ -420,7 +420,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     Args:
         network: parameters.
         gait: one of the network's.
-        near: an orbit of the same gait to start from; the shipped preset's if not given.
+        near: an orbit of the same gait to start from; by default the shipped preset's.
 
     Raises:
         ValueError: an unknown gait, or parameters that are not finite.
@@ -475,7 +475,7 @@ def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
 
 
 def _states(orbit: MeshOrbit, symmetry: Symmetry) -> np.ndarray:
-    """Return the state at phase 0 of the orbit's waveforms with the phases of another symmetry."""
+    """Return the state at phase 0 of the orbit's waveforms with another symmetry's phases."""
     cells = orbit.network.cells
     out = np.empty(orbit.network.components)
     for cell in range(cells):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Balance for legs with soles: stepping, support and arms on the clock of a network."""
+"""Balance of legs with soles: stepping, support and arms on the clock of a network."""
 
 __all__ = ['balanced_pattern', 'crouch', 'feedback', 'gains', 'links', 'stepping', 'substitutes',
            'support', 'tick']

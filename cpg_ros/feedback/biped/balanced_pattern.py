@@ -20,7 +20,7 @@ import math
 from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import SHIFT, STAND, WALK
-from cpg_ros.feedback.biped.stepping import swing_fraction, WALKS
+from cpg_ros.feedback.biped.stepping import swing_share, WALKS
 from cpg_ros.feedback.biped.substitutes import (
     ADOPTED,
     EXTRAPOLATED,
@@ -41,11 +41,11 @@ from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
 
 #: LEANS: lean of the base, rad, above which the robot has fallen; LOW: height of the centre of
-#: mass, as a fraction of the wanted one, below which it has fallen.
+#: mass, as a share of the wanted one, below which it has fallen.
 LEANS, LOW = 1.0, 0.6
 #: The robot is on its feet, and balance begins, if all of these hold for a time of STEADY, s:
 #: UPRIGHT: largest lean of the base, rad, in the stand; CROUCHED: the same in the crouch;
-#: NEAR: largest distance of a joint from the pose, rad; BORNE: least fraction of the weight on the
+#: NEAR: largest distance of a joint from the pose, rad; BORNE: least share of the weight on the
 #: feet.
 UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
 #: RETURN: duration of the way back into the stand, s; LOWER: duration of the way into the crouch,
@@ -56,15 +56,15 @@ RETURN, LOWER = 0.3, 0.45
 SETTLED, PATIENCE = 0.3, 4.0
 #: BEHIND: how far the centre of mass is behind the middle of the soles in a crouch from a walk, m.
 BEHIND = 0.025
-#: PASSING: begin and end, as fractions of a swing, of the time in which the body passes over the
-#: stance foot: the best time to crouch without any sensor.
+#: PASSING: begin and end, as shares of a swing, of the time in which the body passes over the foot
+#: that stands: the best time to crouch without any sensor.
 PASSING = 0.38, 0.6
 #: CONTRARY: ratio of the swinging foot's load to the other's above which loads contradict the
 #: gait.
 CONTRARY = 4.0
-#: While both feet stand, each under the fraction LOADED of the weight or more, soles that are not
-#: level for COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT:
-#: largest lean by IMU and joints, rad.
+#: While both feet stand, each with a share of LOADED of the weight, soles that are not level for
+#: COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT: largest lean
+#: by IMU and joints, rad.
 PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.1, 0.12, 0.06
 #: Largest deviation from the mean over USUAL, s, meanwhile: TWISTED: of the angle between the
 #: soles while the weight shifts; TURNED: of their lean, rad; SEEN_LEVEL: time for which they are
@@ -303,7 +303,7 @@ class BalancedPattern(Pattern):
     @staticmethod
     def _passes(balance: BipedFeedback) -> bool:
         """Return whether the body is over the foot that stands."""
-        memory, swing = balance.memory, swing_fraction(balance.gains)
+        memory, swing = balance.memory, swing_share(balance.gains)
         fractions = memory.phases[memory.swinging] / swing
         return bool(((fractions > PASSING[0]) & (fractions < PASSING[1])).any())
 

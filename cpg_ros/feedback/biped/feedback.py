@@ -36,8 +36,8 @@ import numpy as np
 SHIFTING, FIRST_STEP = 0.8, 1.0
 #: RISING: speed at which a crouching robot stands up, m/s.
 RISING = 0.2
-#: A walk ends on two feet when the centre of mass is slower than twice STILL, m/s, and the DCM
-#: error is below CAUGHT, m.
+#: A walk ends on two feet when the centre of mass is slower than twice STILL, m/s, and the error
+#: of the capture point is below CAUGHT, m.
 STILL, CAUGHT = 0.15, 0.05
 #: SLOWED: speed at which a run may become a walk, as a multiple of the fastest walk.
 SLOWED = 1.2

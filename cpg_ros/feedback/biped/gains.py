@@ -48,7 +48,7 @@ class BipedMemory(NamedTuple):
         center: of mass, m, then its velocity, m/s, shape (2, 3).
         turning: angular velocity of the base, rad/s, shape (3,).
         soles: velocities of the soles from the base's, m/s and rad/s, shape (2, 6).
-        loads: fraction of the weight on each foot, shape (2,).
+        loads: share of the weight on each foot, shape (2,).
         wanted: velocity forward and left as it is approached, m/s, shape (2,).
         heading: wanted, rad, shape (1,).
         integral: of the missing speed, m, shape (1,).

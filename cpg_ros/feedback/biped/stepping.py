@@ -109,15 +109,15 @@ def level_moment(rotation, heading, turning, gains):
 CLOCK_GAINS = {
     'frequency': Gain(1.65, 4.0, 'Hz', 'strides per second of the undisturbed walk'),
     'duty': Gain(0.511, 0.9, '', 'fraction of the stride that a leg stands, above 0.5', low=0.501),
-    'touchdown': Gain(0.09, 1.0, '', "fraction of the robot's weight on a foot above which, late in"
-                      ' the swing, it has landed: the clock leaps to the stance'),
+    'touchdown': Gain(0.09, 1.0, '', "fraction of the robot's weight on a foot above which, late "
+                      'in the swing, it has landed: the clock leaps to the stance'),
     'early': Gain(0.3, 1.0, '', 'fraction of the load that a leg takes which has landed early')}
 #: LATE: fraction of the swing before which a load on the foot does not count as a touchdown.
 LATE = 0.6
 
 
 @jit
-def swing_fraction(gains):
+def swing_share(gains):
     """Return the fraction of the stride that a leg swings."""
     return 1.0 - gains.duty
 
@@ -125,13 +125,13 @@ def swing_fraction(gains):
 @jit
 def stride_phase(phase, gains):
     """Return a leg's phase from its lift-off on, cycles, by that of its flexor (peak at 0)."""
-    return (phase + 0.5 * swing_fraction(gains)) % 1.0
+    return (phase + 0.5 * swing_share(gains)) % 1.0
 
 
 @jit
 def time_in_step(phase, gains):
     """Return how long ago the other foot took over, s, by the phase of the leg that swings."""
-    swing = swing_fraction(gains)
+    swing = swing_share(gains)
     if phase >= swing and phase > 0.5 + 0.5 * swing:
         phase -= 1.0
     time = (phase + 0.5 * (gains.duty - 0.5)) / gains.frequency
@@ -139,9 +139,9 @@ def time_in_step(phase, gains):
 
 
 @jit
-def load_fractions(phases, landed, gains, fractions):
+def load_shares(phases, landed, gains, fractions):
     """Fill the fraction of the weight that each leg is to bear; phases from lift-off, cycles."""
-    swing, double = swing_fraction(gains), max(gains.duty - 0.5, 1e-4)
+    swing, double = swing_share(gains), max(gains.duty - 0.5, 1e-4)
     total = 0.0
     for leg in range(2):
         if phases[leg] < swing:
@@ -233,9 +233,9 @@ def foothold(speed, target, side, remaining, gains):
 
 
 @jit
-def stance_fraction(phase, gains):
+def stance_share(phase, gains):
     """Return the fraction of a leg's stance that is over, by its phase from lift-off."""
-    return min(max((phase - swing_fraction(gains)) / gains.duty, 0.0), 1.0)
+    return min(max((phase - swing_share(gains)) / gains.duty, 0.0), 1.0)
 
 
 PLACEMENT_GAINS = {
@@ -341,4 +341,4 @@ def integrate(integral, missing, dt):
 @jit
 def time_to_touchdown(phase, gains):
     """Return when a leg that swings will bear half of the weight, s; phase from lift-off."""
-    return ((swing_fraction(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency
+    return ((swing_share(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency

@@ -127,7 +127,7 @@ class Substitutes:
             self._take_joints(latencies[JOINTS], memory, dt)
         time = max(ages[IMU], latencies[IMU])
         if late[IMU] or time > PROMPT:
-            self._rotate(measured, min(time, EXTRAPOLATED))
+            self._turn(measured, min(time, EXTRAPOLATED))
         begins = EXTRAPOLATED if late[JOINTS] else LEANT
         if ages[IMU] > begins:
             # In a stand, one that arrives but is not believed may be that of a robot on its edges.
@@ -182,7 +182,7 @@ class Substitutes:
         self._angles += dt * np.clip(rates, -FASTEST, FASTEST)
         self.sensors.joint_positions[0] = self._angles
 
-    def _rotate(self, measured: SensorData, time: float) -> None:
+    def _turn(self, measured: SensorData, time: float) -> None:
         """Extrapolate the orientation by the angular velocity for a time in s."""
         roll, pitch, _ = measured.rpy[0]
         x, y, z = measured.angular_velocity[0]
@@ -209,9 +209,9 @@ class Substitutes:
         sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
         # The centre of mass goes as the force of the last tick moves it, and the base as it has
         # to while legs move against it.
-        base = memory.pose.rotations[0]
+        turn = memory.pose.rotations[0]
         self._kinematics(self._links, rpy, sensors.joint_positions[0],
-                         (base @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
+                         (turn @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
                          self._center, self._soles, self._weights)
         moved = memory.force / pose.carried[0] - (
             self._center[3:] - memory.center[1] + memory.base) / dt
@@ -221,4 +221,4 @@ class Substitutes:
             center, sole = memory.center[0], memory.pose.soles[int(np.argmax(memory.fractions))]
             moved = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
             moved[2] = GRAVITY
-        sensors.acceleration[0] = base.T @ moved
+        sensors.acceleration[0] = turn.T @ moved

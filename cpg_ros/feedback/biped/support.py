@@ -34,7 +34,7 @@ import numpy as np
 VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
                                         'in which the soles that stand correct the '
                                "accelerometer's velocity")}
-#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, fractions of the
+#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, shares of the
 #: weight.
 FROM, OVER = 0.06, 0.18
 #: SLIP: speed of a sole at which it counts half, m/s; ROLL: angular speed with the same effect,
@@ -43,21 +43,21 @@ SLIP, ROLL = 0.2, 1.0
 
 
 @jit
-def update(rotation, acceleration, soles, loads, dt, gains, velocity):
+def update(turn, acceleration, soles, loads, dt, gains, velocity):
     """Update the base's velocity, world's axes, m/s, shape (3,), in place.
 
     Args:
-        rotation: of the base, shape (3, 3).
+        turn: rotation of the base, shape (3, 3).
         acceleration: as an accelerometer measures it, m/s^2, shape (3,).
         soles: velocities of the soles relative to the base, m/s and rad/s, shape (2, 6).
-        loads: fraction of the weight on each foot, shape (2,).
+        loads: share of the weight on each foot, shape (2,).
         dt: since the last time, s.
         gains: BipedGains.
         velocity: changed.
 
     """
     for k in range(3):
-        velocity[k] += dt * (carry(rotation, acceleration, k) - (GRAVITY if k == 2 else 0.0))
+        velocity[k] += dt * (carry(turn, acceleration, k) - (GRAVITY if k == 2 else 0.0))
     first, second = _trust(soles[0], loads[0], velocity), _trust(soles[1], loads[1], velocity)
     total = first + second
     if total > 0.0:
@@ -172,7 +172,7 @@ STANCE_GAINS = {
     'cop_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
     'stand': Gain(2.5, 10.0, '', 'centre of pressure by the capture point while standing'),
     'stance_damping': Gain(1.63, 20.0, 'N m s/rad', 'of the joints of a leg that stands'),
-    'reaction': Gain(0.0032, 1.5, '', "fraction of the swing leg's moment borne by the stance"),
+    'reaction': Gain(0.0032, 1.5, '', "share of the swing leg's moment that the stance leg gives"),
     'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
     'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
     'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
@@ -182,7 +182,7 @@ LEAST, MOST = 0.3, 1.8
 
 @jit
 def cop_shift(dcm_error, half, gains):
-    """Return the shift of the centre of pressure in the sole's axes, m.
+    """Return the centre of pressure's shift in the sole's axes, m.
 
     Args:
         dcm_error: forward and left, m.

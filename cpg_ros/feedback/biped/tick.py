@@ -64,23 +64,23 @@ def _approach(gains, memory, command, dt):
 @jit
 def _follow_clock(gains, memory, kind):
     """Let legs lift off and land by their phases, and early by the load on them."""
-    soles, swing_fraction = memory.pose.soles, stepping.swing_fraction(gains)
+    soles, swing_share = memory.pose.soles, stepping.swing_share(gains)
     memory.clock[1] = 0.0
     for leg in range(2):
         phase = memory.phases[leg]
-        if phase < swing_fraction and not memory.swinging[leg]:
+        if phase < swing_share and not memory.swinging[leg]:
             memory.swinging[leg], memory.landed[leg] = True, False
             for k in range(3):
                 memory.lift_off[leg, k] = soles[leg, k] - (
                     soles[1 - leg, k] if kind == stepping.WALKS else 0.0)
-        if phase >= swing_fraction and memory.swinging[leg]:
+        if phase >= swing_share and memory.swinging[leg]:
             memory.swinging[leg] = memory.landed[leg] = False
         if (memory.swinging[leg] and not memory.landed[leg]
-                and phase > stepping.LATE * swing_fraction
+                and phase > stepping.LATE * swing_share
                 and memory.loads[leg] > gains.touchdown):
             memory.landed[leg] = True
-            memory.clock[1] = max(memory.clock[1], swing_fraction - phase)
-    stepping.load_fractions(memory.phases, memory.landed, gains, memory.fractions)
+            memory.clock[1] = max(memory.clock[1], swing_share - phase)
+    stepping.load_shares(memory.phases, memory.landed, gains, memory.fractions)
 
 
 @jit
@@ -130,7 +130,7 @@ def _fly(links, gains, memory, axes, kind, dt):
     soles, base, phases, (c, s) = memory.pose.soles, memory.base, memory.phases, axes
     center, velocity, fractions = memory.center[0], memory.center[1], memory.fractions
     for leg in range(2):
-        fractions[leg] = 1.0 if phases[leg] >= stepping.swing_fraction(gains) else 0.0
+        fractions[leg] = 1.0 if phases[leg] >= stepping.swing_share(gains) else 0.0
     total = fractions[0] + fractions[1]
     if total > 1.5:
         fractions[0] = fractions[1] = 0.5
@@ -146,7 +146,7 @@ def _fly(links, gains, memory, axes, kind, dt):
         if memory.swinging[leg]:
             for k in range(3):
                 memory.lift_off[leg, k] -= dt * base[k]
-            remaining = (stepping.swing_fraction(gains) - phases[leg]) / gains.frequency
+            remaining = (stepping.swing_share(gains) - phases[leg]) / gains.frequency
             ahead, left = stepping.foothold(speed, target, links.sides[leg], remaining,
                                             gains)
             memory.target[leg, 0] = center[0] + c * ahead - s * left
@@ -167,7 +167,7 @@ def _upward(gains, memory, mass, mode, kind, level):
     if fractions[0] + fractions[1] < 0.5:
         return 0.0
     leads = 0 if fractions[0] >= fractions[1] else 1
-    return stepping.upward_force(stepping.stance_fraction(memory.phases[leads], gains), kind,
+    return stepping.upward_force(stepping.stance_share(memory.phases[leads], gains), kind,
                                center - memory.ground[0], rise, mass, gains)
 
 
@@ -211,8 +211,8 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
 def _swing(links, gains, memory, leg, kind):
     """Add the torques of a leg that swings, and its reaction moment on the body, N m."""
     pose, other, way = memory.pose, 1 - leg, memory.path
-    duration = stepping.swing_fraction(gains) / gains.frequency
-    fraction = min(max(memory.phases[leg] / stepping.swing_fraction(gains), 0.0), 1.0)
+    duration = stepping.swing_share(gains) / gains.frequency
+    fraction = min(max(memory.phases[leg] / stepping.swing_share(gains), 0.0), 1.0)
     stepping.path(fraction, duration, memory.lift_off[leg], memory.target[leg], gains, way)
     foot, still, moving = pose.soles[leg], pose.soles[other], memory.soles[leg]
     if kind == stepping.WALKS:

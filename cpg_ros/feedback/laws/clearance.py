@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Clearance: swing feet are lifted higher while the ground makes them stumble, as stairs do."""
+"""Clearance: lift swing feet higher while the ground makes them stumble, as on stairs."""
 
 import math
 
@@ -33,7 +33,7 @@ LAW = Law(
 
 @jit
 def stumbles(contact, swinging, progress):
-    """Return whether a foot in swing, a fraction of which is over, has hit something."""
+    """Return whether a swinging foot has hit something; the fraction is that of the swing."""
     return contact and swinging and STUMBLE < progress < EARLY
 
 
@@ -42,8 +42,8 @@ def update(before, stumbling, gains, dt):
     """Return the fraction of the largest lift, dt in s later.
 
     Args:
-        before: the same, dt earlier.
-        stumbling: how many feet stumble.
+        before: fraction dt earlier.
+        stumbling: number of feet that stumble.
         gains: of the law.
         dt: s.
 
@@ -57,5 +57,5 @@ def update(before, stumbling, gains, dt):
 
 @jit
 def lift(fraction, progress, gains):
-    """Return how far to draw in a foot, a fraction of whose swing is over, m."""
+    """Return how far to draw a foot in, m; the fraction is that of its swing."""
     return fraction * gains.clearance_most * 4.0 * progress * (1.0 - progress)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Heading: a robot that has been turned away from its heading turns back."""
+"""Heading: turn back to the heading."""
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.efference_copy import between_speeds
@@ -37,8 +37,8 @@ def response(speeds, yaw_rates, speed):
     """Return the yaw rate for each unit by which right strides exceed left ones, rad/s.
 
     Args:
-        speeds: of the steering table, m/s, rising, shape (rows,).
-        yaw_rates: at these, rad/s, shape (rows,).
+        speeds: of the steering table, m/s, ascending, shape (rows,).
+        yaw_rates: at these speeds, rad/s, shape (rows,).
         speed: forward, m/s.
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Declaration of a feedback law beside its kernel: its switch, its gains and its state."""
+"""Declaration of a feedback law beside its kernel: switch, gains and state."""
 
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
@@ -25,13 +25,13 @@ from cpg_ros.dynamics.integration.compilation import jit
 
 @dataclass(frozen=True)
 class Gain:
-    """A gain of a law, which may be set within its limits.
+    """A gain of a law.
 
     Attributes:
         default: found on a simulated Go2.
         high: upper limit.
         unit: '' for a pure number.
-        text: what it does, without the unit.
+        text: effect, without the unit.
         low: lower limit.
 
     """
@@ -45,10 +45,10 @@ class Gain:
 
 @dataclass(frozen=True)
 class StateVariable:
-    """An array that is kept from tick to tick; its first axis is that of the runs.
+    """An array that persists between ticks; its first axis is the run.
 
     Attributes:
-        text: what it is, with its unit.
+        text: meaning, with the unit.
         shape: for one run; 'legs' stands for their number.
         initial: value at the start; its type is the array's.
 
@@ -65,10 +65,10 @@ class Law:
 
     Attributes:
         name: of its switch.
-        text: what it does.
+        text: effect.
         on: whether it is on by default.
-        gains: by name; the names of all laws differ.
-        memory: its state variables by name; these differ, too.
+        gains: by name; names of all laws differ.
+        memory: state variables by name; names of all laws differ.
 
     """
 
@@ -81,7 +81,7 @@ class Law:
 
 @jit
 def limited(value, most):
-    """Return a value within a limit of its size."""
+    """Return a value with its size limited."""
     return min(max(value, -most), most)
 
 
@@ -92,5 +92,5 @@ def low_passed(value, target, time, dt):
 
 
 def named_tuple(name: str, fields: Iterable[str], defaults: Iterable[Any] = ()) -> Any:
-    """Return a class of named tuples; the laws name its fields, which mypy cannot know."""
+    """Return a class of named tuples with fields that the laws name, unknown to mypy."""
     return namedtuple(name, tuple(fields), defaults=tuple(defaults))

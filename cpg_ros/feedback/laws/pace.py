@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pace: a body that is pushed steps faster, for a while.
+"""Pace: step faster for a while when pushed.
 
-A gait at a higher frequency sways less and is faster than its efference copy says, which would
-pass for a push. The law therefore fatigues, and it weights the forward speed, which follows from
-the frequency itself, less than the sideways speed. It acts only in gaits whose steering was
-measured: others may find another motion at a higher frequency, and stay in it.
+A gait at a higher frequency sways less and is faster than its efference copy expects, which looks
+like a push. The law therefore fatigues, and weights the forward speed, which follows from the
+frequency itself, less than the sideways speed. It acts only in gaits with measured steering:
+others may lock into another motion at a higher frequency.
 """
 
 import math
@@ -45,10 +45,10 @@ LAW = Law(
 
 @jit
 def velocity_error(forward, left, gains):
-    """Return by how much a body is pushed, m/s.
+    """Return the velocity error due to a push, m/s.
 
     Args:
-        forward: velocity beyond what is expected, m/s.
+        forward: velocity beyond the expected one, m/s.
         left: the same, to the left.
         gains: of the law.
 
@@ -62,7 +62,7 @@ def frequency_change(error, fatigue, gains):
 
     Args:
         error: see velocity_error, m/s.
-        fatigue: low-passed increase of late.
+        fatigue: low-passed recent increase.
         gains: of the law.
 
     """

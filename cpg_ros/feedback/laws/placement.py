@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Placement: a body that is too fast steps further in that direction."""
+"""Placement: step further in the direction in which the body is too fast."""
 
 import math
 
@@ -56,10 +56,10 @@ def step(velocity, rate, gain, rate_gain, gains):
     """Return how much further to put feet down, m, forward or to the left.
 
     Args:
-        velocity: in that direction beyond what is expected, m/s.
-        rate: of pitch or roll beyond what is expected, rad/s.
-        gain: of the first.
-        rate_gain: of the second.
+        velocity: in that direction beyond the expected one, m/s.
+        rate: of pitch or roll beyond the expected one, rad/s.
+        gain: of the velocity.
+        rate_gain: of the rate.
         gains: of the law.
 
     """
@@ -81,7 +81,7 @@ def yielding(vx, vy, recovering, gains):
     """Return the speeds forward and to the left to which feet in stance yield, m/s.
 
     Args:
-        vx: forward velocity beyond what is expected, m/s.
+        vx: forward velocity beyond the expected one, m/s.
         vy: the same to the left.
         recovering: whether the body recovers from a push in a gait whose legs swing one by one.
         gains: of the law.
@@ -97,7 +97,7 @@ def advance(displacement, swinging, target, yielded, gains, dt):
 
     Args:
         displacement: of the foot.
-        swinging: whether it is meant to be in the air.
+        swinging: whether it should be in the air.
         target: how much further forward and to the left to put it down, m.
         yielded: speeds to which it yields in stance, m/s, see yielding.
         gains: of the law.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Posture: legs of the low side push, and a foot in the air stays level to gravity."""
+"""Posture: push with the legs of the low side, and keep swinging feet level to gravity."""
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, limited
@@ -40,9 +40,9 @@ def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
     """Return how far to draw a foot in, m.
 
     Args:
-        x: where it is, forward of the middle of all feet that stand, m.
-        y: to the left of that, m.
-        roll: beyond what is expected, rad.
+        x: position forward of the middle of all standing feet, m.
+        y: to the left of it, m.
+        roll: beyond the expected one, rad.
         pitch: the same.
         roll_rate: the same, rad/s.
         pitch_rate: the same.

@@ -57,9 +57,9 @@ def advance(state, contact, swinging, progress, height, lifted, gains, dt):
     Args:
         state: of its reflexes, shape (5,), changed in place.
         contact: whether the foot is on the ground.
-        swinging: whether it is meant to be in the air.
-        progress: fraction of that swing, or else of its stance, that is over.
-        height: of the foot that is planned, base's frame, m.
+        swinging: whether it should be in the air.
+        progress: completed fraction of that swing or stance.
+        height: planned height of the foot, base's frame, m.
         lifted: by an unexpected lean, m.
         gains: of the law.
         dt: s.

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sidestep: feet carry the body sideways while they stand, and step back while they swing.
+"""Sidestep: feet carry the body sideways in stance, and step back in swing.
 
-How fast that is depends on how the gait rocks the body, so the speed is corrected by an integral.
-A gait that turns drifts to the side, too, so that the same integral acts as far as a turn is
-commanded.
+The resulting speed depends on how the gait rocks the body, so an integral corrects it. A gait also
+drifts sideways when it turns; the same integral acts while a turn is commanded.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit
@@ -47,11 +46,11 @@ LAW = Law(
 def landing(target, stance, gains):
     """Return the touchdown target of a foot, m to the left of the gait's own.
 
-    That is half of the distance that the body moves over the foot.
+    It is half of the distance that the body moves over the foot.
 
     Args:
         target: speed to the left, m/s.
-        stance: how long the foot will stand, s.
+        stance: duration of the stance, s.
         gains: of the law.
 
     """
@@ -69,10 +68,10 @@ def advance(displacement, swinging, target, stance, gains, dt):
     """Return the displacement of a foot to the left, m, dt in s later.
 
     Args:
-        displacement: now, m.
-        swinging: whether the foot is meant to be in the air.
+        displacement: present one, m.
+        swinging: whether the foot should be in the air.
         target: speed to the left, m/s.
-        stance: how long the foot will stand, s.
+        stance: duration of the stance, s.
         gains: of the law.
         dt: s.
 
@@ -86,13 +85,13 @@ def advance(displacement, swinging, target, stance, gains, dt):
 def correct_speed(correction, missing, target, turn, gains, dt):
     """Return the correction of the commanded speed to the left, m/s, dt in s later.
 
-    0 where none is commanded, and no turn.
+    It is 0 where neither a speed to the left nor a turn is commanded.
 
     Args:
-        correction: so far, m/s.
+        correction: present one, m/s.
         missing: speed to the left, m/s.
         target: commanded speed to the left, m/s.
-        turn: commanded, low-passed, rad/s.
+        turn: commanded yaw rate, low-passed, rad/s.
         gains: of the law.
         dt: s.
 

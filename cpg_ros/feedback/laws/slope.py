@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Slope: feet stay under the body along gravity, not along the body's own vertical."""
+"""Slope: keep feet under the body along gravity, not along the body's own vertical."""
 
 import math
 
@@ -40,7 +40,7 @@ LAW = Law(
 def shift_ahead(ground, singly, gains):
     """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill.
 
-    Legs swing one by one where singly is 1, and two or more at a time where it is 0.
+    ``singly`` is 1 where legs swing one by one, and 0 where two or more swing at a time.
     """
     uphill = gains.slope_share_up + singly * (gains.slope_share - gains.slope_share_up)
     return shift(ground, gains.slope_share if ground > 0.0 else uphill, gains)

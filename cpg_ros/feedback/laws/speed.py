@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Speed: a robot that is too slow takes longer strides."""
+"""Speed: lengthen the strides of a robot that is too slow."""
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, limited, StateVariable
@@ -32,11 +32,11 @@ LAW = Law(
 
 @jit
 def stride_change(missing, integral, gains):
-    """Return the change of the strides; the missing speed in m/s, its integral in m."""
+    """Return the change of the strides; missing speed in m/s, its integral in m."""
     return limited(gains.speed_share * missing + gains.speed_rate * integral, gains.speed_most)
 
 
 @jit
 def integrate(integral, missing, gains, dt):
-    """Return the integral of the missing speed, m, no larger than the law can use."""
+    """Return the integral of the missing speed, m, limited to what the law can use."""
     return limited(integral + dt * missing, gains.speed_most / max(gains.speed_rate, 1e-9))

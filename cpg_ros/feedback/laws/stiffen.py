@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stiffening: servos are stiff while the body recovers from a push, and soft otherwise.
+"""Stiffening: make servos stiff while the body recovers from a push, and soft otherwise.
 
-Soft servos walk cheaply and yield to stairs; only stiff ones follow the fast, wide steps that
+Soft servos walk at low cost and yield to stairs; only stiff ones follow the fast, wide steps that
 bring a pushed body back under control.
 """
 

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tegotae: load on a leg holds it in its stance, lack of load lets it swing.
+"""Tegotae: load on a leg holds it in stance, lack of load lets it swing.
 
 Owaki, Kano, Nagasawa, Tero and Ishiguro, "Simple robot suggests physical interlimb communication
-is essential for quadruped walking", J. R. Soc. Interface 10 (2013) 20120669: each leg's phase goes
-by d phi / dt = omega - sigma N cos phi, sin phi < 0 in stance. Legs whose phases are locked share
+is essential for quadruped walking", J. R. Soc. Interface 10 (2013) 20120669: each leg's phase
+obeys d phi / dt = omega - sigma N cos phi, sin phi < 0 in stance. Legs with locked phases share
 their mean.
 """
 
@@ -39,8 +39,8 @@ def rate(load, swinging, progress, gains):
 
     Args:
         load: on the foot, fraction of the weight.
-        swinging: whether it is meant to be in the air.
-        progress: fraction of that swing, or else of its stance, that is over.
+        swinging: whether it should be in the air.
+        progress: completed fraction of that swing or stance.
         gains: of the law.
 
     """

@@ -15,8 +15,8 @@
 """Touchdown reset: a foot that lands begins its stance, whatever the clock says.
 
 Aoi and Tsuchiya, "Locomotion control of a biped robot using nonlinear oscillators", Autonomous
-Robots 19 (2005) 219-232, set the phase to that of touchdown. Here legs whose phases are locked
-share the change, and the stride frequency makes it gradually, so that joints do not jump.
+Robots 19 (2005) 219-232, set the phase to that of touchdown. Here legs with locked phases share
+the change, and the stride frequency makes it gradually, so that joints do not jump.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit
@@ -42,8 +42,8 @@ def phase_change(swinging, progress, duty, gains):
     """Return the change of a leg's phase when its foot lands, cycles.
 
     Args:
-        swinging: whether it is meant to be in the air.
-        progress: fraction of that swing, or else of its stance, that is over.
+        swinging: whether it should be in the air.
+        progress: completed fraction of that swing or stance.
         duty: fraction of the stride that it stands.
         gains: of the law.
 
@@ -59,6 +59,6 @@ def phase_change(swinging, progress, duty, gains):
 def frequency_change(correction, frequency):
     """Return the relative change of the stride frequency.
 
-    The correction of the phase that is still to be made in cycles, the frequency in Hz.
+    The remaining correction of the phase is in cycles, the frequency in Hz.
     """
     return limited(correction / (SETTLING * frequency), MOST)

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The files of an export: the C of gaits, a test with golden vectors, an Arduino library.
+"""Files of an export: the C of gaits, a test with golden vectors, an Arduino library.
 
-The parts in ``c`` are put together as a network and a form need them.
+Parts from ``c`` are combined as the network and the form of the export need them.
 """
 
 import math
@@ -35,7 +35,7 @@ class CProject:
 
     Attributes:
         data: the gaits.
-        title: the first line of every file.
+        title: first line of every file.
 
     """
 
@@ -61,18 +61,18 @@ class CProject:
 
     @property
     def nodes(self) -> int:
-        """Nodes of the history that a network keeps."""
+        """Number of nodes in the history of a network."""
         longest = max(plan.orbit.network.delay for plan in self.data.plans)
         return max(2, math.ceil(longest / self.data.step - 1e-9) + 1)
 
     @property
     def tracks(self) -> int:
-        """Most gaits that fade into one another at a time."""
+        """Largest number of gaits that fade into one another at a time."""
         return min(2, len(self.data.plans))
 
     @property
     def ram(self) -> int:
-        """Memory of a struct cpg, bytes, without the padding of its flags."""
+        """Size of a struct cpg, bytes, without the padding of its flags."""
         joints, legs = len(self.data.robot.joints), len(self.data.robot.legs)
         track = 5 + 2 * joints + legs
         if self.data.format.form == 'network':
@@ -152,8 +152,8 @@ class CProject:
         """Return the files, path -> text.
 
         Args:
-            golden: what the Python generator does, for the test.
-            arduino: as an Arduino library with an example sketch.
+            golden: output of the Python generator, for the test.
+            arduino: write an Arduino library with an example sketch.
 
         """
         folder = 'src/' if arduino else ''
@@ -237,9 +237,9 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
 
     Args:
         project: the export.
-        golden: what its test compares with.
-        command: that wrote it.
-        arduino: as an Arduino library.
+        golden: output with which its test compares.
+        command: command line of the export.
+        arduino: whether it is an Arduino library.
 
     """
     data = project.data

@@ -14,8 +14,8 @@
 
 """Executable ``export``: gaits of a robot as C, for microcontrollers and anything without Python.
 
-``export --robot my_robot.yaml --network delayed --gaits trot walk --out gait/`` writes the
-network, its readout and the switching between gaits as C99, and a test against the generator.
+``export --robot my_robot.yaml --network delayed --gaits trot walk --out gait/`` writes network,
+readout and gait switching as C99, and a test against the generator.
 """
 
 import argparse
@@ -126,7 +126,7 @@ def _plans(args: argparse.Namespace) -> list[GaitPlan]:
 
 
 def _refuse_step(step: float | None, plans: Sequence[GaitPlan]) -> None:
-    """Refuse a step that a network could not be run with."""
+    """Refuse a step with which a network cannot run."""
     if step is None:
         return
     shortest = min(plan.orbit.network.delay or plan.orbit.period / 8.0 for plan in plans)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The numbers of gaits as C: their orbits as tables, readouts, limits; ``gait_data.c``."""
+"""Numbers of gaits as C (``gait_data.c``): tables of orbits, readouts, limits."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -43,9 +43,9 @@ class CFormat:
     """Settings of gaits as C.
 
     Attributes:
-        form: ``network``, or ``table`` for their orbits alone.
+        form: ``network``, or ``table`` for the orbits alone.
         real: ``float32`` or ``float64``.
-        tolerance: by which tables may differ from what they are of, over its half range.
+        tolerance: largest error of tables, over half the range of their values.
         steering: whether strides and pace can be changed.
 
     """
@@ -57,15 +57,15 @@ class CFormat:
 
 
 def c_name(name: str) -> str:
-    """Return a name as C can have it, in capitals."""
+    """Return a name as an identifier of C, in capitals."""
     return re.sub(r'\W', '_', name, flags=re.ASCII).upper()
 
 
 def check_names(what: str, names: Sequence[str]) -> None:
-    """Check that names are distinct as C has them.
+    """Check that names are distinct identifiers of C.
 
     Raises:
-        InputError: two of them are the same there.
+        InputError: two of them are the same identifier.
 
     """
     used: dict[str, str] = {}
@@ -77,7 +77,7 @@ def check_names(what: str, names: Sequence[str]) -> None:
 
 
 def comment(text: str) -> str:
-    """Return a text as a comment of C can have it, on one line."""
+    """Return a text as the content of a C comment, on one line."""
     return printable(' '.join(text.split())).replace('*/', '* /').replace('/*', '/ *')
 
 
@@ -86,9 +86,9 @@ def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], 
     """Tabulate periodic curves with as few points as a tolerance allows.
 
     Args:
-        curve: of phases in cycles, shape (m,): values and their slopes per cycle, (curves, m).
-        tolerance: of the cubics in between, over half of each curve's range.
-        points: how many to choose from, rising; the last one if none is enough.
+        curve: phases in cycles, shape (m,) -> values and slopes per cycle, (curves, m).
+        tolerance: of the cubics between points, over half of each curve's range.
+        points: candidate numbers of points, ascending; the last one if none suffices.
 
     Returns:
         Values and slopes per point, shape (curves, points, 2).
@@ -109,7 +109,7 @@ def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], 
 
 
 def distinct_joints(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
-    """Return joints of which no two share their angles over a cycle, and which each is like."""
+    """Return joints with distinct angles over a cycle, and for each joint the one it equals."""
     both = np.hstack([plan.readout.angles, plan.readout.rises])
     _, first, indices = np.unique(np.round(both, 12), axis=0, return_index=True,
                                 return_inverse=True)
@@ -127,7 +127,7 @@ def leg_phases(plan: GaitPlan) -> np.ndarray:
 
 @dataclass
 class _Struct:
-    """A struct's initializer, and the arrays that it points to."""
+    """Initializer of a struct, and the arrays to which it points."""
 
     name: str
     real: str
@@ -137,7 +137,7 @@ class _Struct:
     points: int = 0
 
     def put(self, key: str, value: Any) -> None:
-        """Add a number, or an array that is part of the struct."""
+        """Add a number, or an array inside the struct."""
         if np.ndim(value):
             text = braces(value, self.real, 8)
         else:
@@ -162,12 +162,12 @@ class GaitData:
 
     Attributes:
         plans: of the gaits.
-        format: how they become C.
+        format: settings.
 
     """
 
     def __init__(self, plans: Sequence[GaitPlan], c_format: CFormat) -> None:
-        """Prepare gaits whose plans are of one robot and one network."""
+        """Prepare gaits, given their plans for one robot and one network."""
         self.plans, self.format = plans, c_format
         self.network, self.robot = plans[0].orbit.network, plans[0].robot
         weights = [plan.readout.joints.weights for plan in plans]
@@ -180,7 +180,7 @@ class GaitData:
         self.retimed = any((self.maps(plan) is not None) for plan in plans)
 
     def maps(self, plan: GaitPlan) -> np.ndarray | None:
-        """Return the duty factor's map of each joint's phase, (joints, 3), None for none."""
+        """Return the duty factor's map of each joint's phase, (joints, 3), or None."""
         readout = plan.readout
         if isinstance(readout, WaveReadout):
             return None if readout.retiming is None else readout.retiming.maps
@@ -189,7 +189,7 @@ class GaitData:
 
     @cached_property
     def structs(self) -> list[_Struct]:
-        """The gaits."""
+        """Initializers of the gaits."""
         made = []
         for plan in self.plans:
             struct = _Struct(c_name(plan.name).lower(), self.format.real)
@@ -273,7 +273,7 @@ class GaitData:
 
     @property
     def angles(self) -> int:
-        """Entries of tables by the angle of a waveform."""
+        """Number of entries of tables over the angle of a waveform."""
         return LEAD[self.format.real]
 
     @property
@@ -283,17 +283,17 @@ class GaitData:
 
     @property
     def points(self) -> int:
-        """Most points of a gait's tables."""
+        """Largest number of points of a gait's tables."""
         return max(struct.points for struct in self.structs)
 
     @property
     def bytes(self) -> int:
-        """Memory of all constants, bytes, to which come pointers and small integers."""
+        """Size of all constants, bytes, without pointers and small integers."""
         size = 4 if self.format.real == 'float32' else 8
         return size * (sum(struct.numbers for struct in self.structs) + 4 * len(self.robot.joints))
 
     def text(self) -> str:
-        """Write ``gait_data.c``, but for its head."""
+        """Write ``gait_data.c`` without its head."""
         real, robot = self.format.real, self.robot
         lines = ['#define CPG_INTERNAL', '#include "cpg.h"', '']
         lines += [array for struct in self.structs for array in (*struct.arrays, '')]

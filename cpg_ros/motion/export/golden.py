@@ -39,14 +39,14 @@ class Golden(ShortRepr):
     """Output of the Python generator, with which the C is compared.
 
     Attributes:
-        start: state that the first gait's network has had for all times, shape (components,).
+        start: constant past of the first gait's network, shape (components,).
         states: of the network every EVERY_STEP steps from there, shape (n, components).
-        dt: of a tick, s.
-        events: tick -> gait to switch to from then on; -1 ramps to the stand.
-        strides: each event's strides of the legs, then the pace, shape (events, legs + 1); None
+        dt: tick, s.
+        events: tick -> gait to switch to; -1 ramps to the stand.
+        strides: strides of the legs and the pace at each event, shape (events, legs + 1); None
             without steering.
-        every: ticks from one sample to the next.
-        positions: of the joints at regular ticks, rad, shape (n, joints).
+        every: ticks between samples.
+        positions: of the joints, rad, shape (n, joints).
         network_tolerance: of the states.
         tolerance: of the positions, rad.
 
@@ -72,7 +72,7 @@ class Golden(ShortRepr):
 
 
 def network_states(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
-    """Return a state, and the states every EVERY_STEP steps after the network was held there."""
+    """Return a state, and the states every EVERY_STEP steps after a constant past there."""
     network = plan.orbit.network
     states = plan.orbit(np.array(0.0))
     start = states + 0.1 * np.random.default_rng(SEED).uniform(-1.0, 1.0, states.size)
@@ -86,7 +86,7 @@ def network_states(plan: GaitPlan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def schedule(gaits: int, dt: float) -> dict[int, int]:
-    """Return the times and gaits of SWITCHES switches, and of the final stand."""
+    """Return times and gaits of SWITCHES switches, and of the final stand."""
     times = [RAMP + BETWEEN * n for n in range(SWITCHES + 1)]
     ticks = [round(time / dt) for time in times]
     gait_at = {tick: (n + 1) % gaits for n, tick in enumerate(ticks[:-1])} if gaits > 1 else {}
@@ -118,9 +118,9 @@ def golden_of(data: GaitData, dt: float, substep: float = SUBSTEP) -> Golden:
 
     Args:
         data: the gaits.
-        dt: of a tick, s.
-        substep: longest part of a tick while gaits fade, s; slow boards take longer ones than the
-            generator, and so other ways from gait to gait.
+        dt: tick, s.
+        substep: longest part of a tick while gaits fade, s; longer ones than the generator's
+            change the transitions.
 
     """
     plans = data.plans

@@ -138,13 +138,12 @@ class Delayed(Network):
         return LeastCoupling('|c|', abs(self.c), least)
 
     def sufficient_gain(self, rate: float) -> float:
-        """Return a symmetry gain with which every gait attracts, 1/model time.
+        """Return a symmetry gain at which every gait is attracting, 1/model time.
 
-        A disturbance z outside the gait's class obeys z' = (a - g) z + (b + d R) D(t) z +
-        c S D(t - tau) z(t - tau), with permutations R, S and 0 < D <= 1 (slopes of tanh). So it
-        decays at least as exp(-rate t), on the orbit as at rest, once
-        ``g >= a + |b| + |d| + |c| exp(rate tau) + rate``, and so it does in any state of the
-        network, also while one gait gives way to another.
+        A disturbance z transverse to the gait's class obeys z' = (a - g) z + (b + d R) D(t) z + c
+        S D(t - tau) z(t - tau), with permutations R, S and 0 < D <= 1 (slopes of tanh). It decays
+        at least as exp(-rate t) once ``g >= a + |b| + |d| + |c| exp(rate tau) + rate``, in any
+        state of the network, also during a change of gait.
 
         Args:
             rate: guaranteed decay, 1/model time.
@@ -156,10 +155,10 @@ class Delayed(Network):
 
 @cache
 def _presets(network: type[Delayed]) -> dict[str, Preset]:
-    """Return a set for each gait of any number of legs: the signs of c and d choose it.
+    """Return a preset for each gait of any number of legs; the signs of c and d select it.
 
-    Two waves can run round; d makes the wanted one the faster one (Im A > 0), which attracts;
-    a gives all waves the same Re A, but for rounding.
+    Of the two waves that exist, d makes the wanted one the faster (Im A > 0), which is attracting;
+    a gives all waves the same Re A, up to rounding.
     """
     presets = {}
     for gait, (j, k) in network.modes().items():

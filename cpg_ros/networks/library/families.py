@@ -14,11 +14,11 @@
 
 """Networks with weights between legs, one for each pair and direction, and their gaits.
 
-Legs are counted pair by pair from behind, left before right; where a leg has several cells, the
-first of all legs come before the second ones. A gait is known by a group that takes every cell to
-every other one in one way: Z2 x Z2 of sides and girdles where four legs are in phase or half a
-cycle apart; otherwise, as for the walk and on more legs, the cycle that goes from leg to leg as
-they come down. The second cells of legs, antagonists, are half a cycle apart from the first ones.
+Legs are counted pair by pair from behind, left before right; first come the first cells of all
+legs, then the second ones. A gait is given by a group that acts regularly on the cells: Z2 x Z2 of
+sides and girdles for four legs in phase or half a cycle apart; for the walk and for more legs the
+cycle in which the legs touch down. The second cells of legs, antagonists, are half a cycle apart
+from the first ones.
 """
 
 from collections.abc import Mapping
@@ -65,8 +65,9 @@ def ring_group(legs: int) -> Group:
 def ring_gaits(legs: int) -> dict[str, tuple[int, int]]:
     """Return gait -> (j, k): shifts j/2n of omega and k/2 of kappa.
 
-    A wave runs from hind to fore, as insects' do: each leg follows the one behind it, j is
-    negative; up to eight legs have the reverse, too. Of four legs j = 1 stands for both senses.
+    A wave runs from hind to fore, as in insects: each leg follows the one behind it, and j is
+    negative. Up to eight legs have the reverse, too. For four legs j = 1 stands for both
+    directions.
     """
     if legs == 4:
         return GAITS
@@ -87,10 +88,10 @@ def ring_symmetry(legs: int, mode: tuple[int, int], variables: int, odd: bool = 
 
 
 def ring_legs(legs: int) -> dict[str, dict[str, tuple[int, int]]]:
-    """Return which two cells drive each leg, by assignment.
+    """Return the two cells that drive each leg, by assignment.
 
-    ``implicit`` takes the second cells of a ring back from fore to hind (Buono & Golubitsky 2001,
-    Table 3), ``zigzag`` once more from hind to fore.
+    ``implicit`` runs along the second cells of a ring from fore to hind (Buono & Golubitsky 2001,
+    Table 3), ``zigzag`` again from hind to fore.
     """
     names = leg_names(legs)
     count = len(names)
@@ -103,7 +104,7 @@ def ring_legs(legs: int) -> dict[str, dict[str, tuple[int, int]]]:
 
 
 def ring_places(legs: int) -> dict[str, Any]:
-    """Return the attributes of a network of such rings for a number of legs."""
+    """Return the attributes of a network of two rings for a number of legs."""
     return {'cells': 2 * legs, 'legs': ring_legs(legs), **leg_positions(legs)}
 
 
@@ -113,9 +114,10 @@ GAITS_OF_FOUR = {'trot': (0, 2, 2, 0), 'pace': (0, 2, 0, 2), 'bound': (0, 0, 2, 
 
 
 def partners(legs: int) -> dict[str, tuple[int, ...]]:
-    """Return name of weights -> the leg that is the input of each leg, from 0.
+    """Return name of weights -> input leg of each leg, from 0.
 
-    The other one of the pair; and of a pair further on that of the same side, and of the other.
+    The input is the other leg of the pair or, in a pair further on, the leg of the same side or
+    the leg of the other side.
     """
     inputs = {'k_side': tuple(i ^ 1 for i in range(legs))}
     for m in range(1, legs // 2):
@@ -148,7 +150,7 @@ def _even(phases: tuple[Fraction, ...]) -> bool:
 
 @cache
 def symmetry_of(phases: tuple[Fraction, ...], variables: int = 2, each: int = 1) -> Symmetry:
-    """Return the symmetry of legs with these phases, with one cell or two antagonists each."""
+    """Return the symmetry of legs with these phases and one cell, or two antagonists, each."""
     legs, different = len(phases), len(set(phases))
     steps: dict[str, Permutation] = {'side': (1, 0, 3, 2), 'girdle': (2, 3, 0, 1)}
     shifts = {'side': phases[1], 'girdle': phases[2]} if legs == 4 else {}
@@ -201,7 +203,7 @@ class LegPairs(Network):
 
     @classmethod
     def inputs(cls) -> dict[str, tuple[int, ...]]:
-        """Return name of weights -> the cell that is the input of each cell, from 0."""
+        """Return name of weights -> input cell of each cell, from 0."""
         count = leg_count(cls)
         return {kind: tuple(j + m * count for m in range(cls.each) for j in sources)
                 for kind, sources in partners(count).items()}
@@ -242,10 +244,10 @@ class LegPairs(Network):
 
     @classmethod
     def weights(cls, gait: str, size: float = 1.0, quarter: float = -1.0) -> Mapping[str, float]:
-        """Return weights that choose a gait: cos + quarter * sin of the lead of the input leg.
+        """Return weights that select a gait: cos + quarter * sin of the lead of the input leg.
 
-        So 1 between legs in phase and -1 between legs half a cycle apart; on the walk quarter from
-        the leg a quarter ahead, and -quarter from that a quarter behind.
+        Weights are 1 between legs in phase and -1 between legs half a cycle apart; on the walk
+        they are quarter from the leg a quarter ahead, and -quarter from the leg a quarter behind.
         """
         names, phases, couplings = leg_names(leg_count(cls)), cls.phases(gait), {}
         for sources in partners(leg_count(cls)).values():

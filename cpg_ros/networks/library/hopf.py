@@ -16,13 +16,12 @@
 
 Righetti & Ijspeert (ICRA 2008), without feedback:
 
-    x_i' = alpha (mu - r_i^2) x_i - omega_i y_i,
-    y_i' = beta (mu - r_i^2) y_i + omega_i x_i + sum_j k_ij y_j,
-    omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1).
+    x_i' = alpha (mu - r_i^2) x_i - omega_i y_i, y_i' = beta (mu - r_i^2) y_i + omega_i x_i + sum_j
+        k_ij y_j, omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1).
 
 The leg is in stance while x falls, for y > 0. With ``omega_stance = pi nu / duty`` and
-``omega_swing = pi nu / (1 - duty)``, an uncoupled oscillator has, for large b, the period 1/nu, of
-which the fraction duty is stance. The weights k_ij choose the gait.
+``omega_swing = pi nu / (1 - duty)``, an uncoupled oscillator has, for large b, the period 1/nu and
+the duty factor duty. The weights k_ij select the gait.
 """
 
 from dataclasses import dataclass
@@ -92,13 +91,13 @@ class HopfOscillators(LegPairs):
         return np.concatenate([size * np.cos(angle), size * np.sin(angle)]), 1.0 / self.nu
 
     def at_rest(self) -> np.ndarray:
-        """Return 0, from which all oscillations emerge."""
+        """Return 0, at which all oscillations bifurcate."""
         return np.zeros(2)
 
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """Return one for each gait: alpha, beta and mu of the paper, duty 0.6."""
+        """Return a preset for each gait: alpha, beta and mu of the paper, duty 0.6."""
         return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait))) for gait in cls.gaits()}
 
 

@@ -14,17 +14,17 @@
 
 """Matsuoka oscillators: two neurons per leg, flexor and extensor, that inhibit each other.
 
-Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987), as used for legs since Taga, Yamaguchi & Shimizu
-(Biol. Cybern. 65, 1991):
+Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987); for legs Taga, Yamaguchi & Shimizu (Biol. Cybern.
+65, 1991):
 
-    tau u_i' = -u_i - beta v_i - a y_e(i) + c + sum_j k_ij (y_j - y_e(j)),
-    tau_v v_i' = -v_i + y_i,    y_i = max(0, u_i),
+    tau u_i' = -u_i - beta v_i - a y_e(i) + c + sum_j k_ij (y_j - y_e(j)), tau_v v_i' = -v_i + y_i,
+        y_i = max(0, u_i),
 
 where u is the potential and v the fatigue of a neuron, e(i) is the antagonist of neuron i, and j
-runs over the neurons of the same kind in other legs: the output of a leg is the difference of its
-neurons. Two neurons on their own oscillate for ``1 + tau/tau_v < a < 1 + beta``, almost
-sinusoidally, at the frequency ``omega = sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v``
-(Matsuoka, Biol. Cybern. 104, 2011).
+runs over the neurons of the same kind in other legs. The output of a leg is the difference of its
+neurons. Two uncoupled neurons oscillate for ``1 + tau/tau_v < a < 1 + beta``, almost sinusoidally,
+at the frequency ``omega = sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v`` (Matsuoka, Biol.
+Cybern. 104, 2011).
 """
 
 from dataclasses import dataclass
@@ -109,7 +109,7 @@ class MatsuokaOscillators(LegPairs):
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """Return one for each gait, with fatigue and weights close to those of Taga et al."""
+        """Return a preset for each gait, with fatigue and weights close to those of Taga et al."""
         size = 0.15 / max(leg_count(cls) - 1, 1)
         return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait, size, 1.0)))
                 for gait in cls.gaits()}

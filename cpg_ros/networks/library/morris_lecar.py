@@ -14,10 +14,10 @@
 
 """The Morris-Lecar cell: membrane potential v and the fraction w of open potassium channels.
 
-``v' = -gCa m(v)(v - vCa) - gK w (v - vK) - gL (v - vL) + i``, ``w' = phi tau(v) (n(v) - w)``,
-``m = (1 + tanh((v - v1)/v2))/2``, ``n = (1 + tanh((v - v3)/v4))/2`` and
-``tau = (base + cosh((v - v3)/(2 v4)))/(base + 1)``: base 0 in Buono & Golubitsky 2001, section 6,
-base 1 in Rashidi et al. 2016, eq. 2. All quantities are without dimension.
+``v' = -gCa m(v)(v - vCa) - gK w (v - vK) - gL (v - vL) + i``, ``w' = phi tau(v) (n(v) - w)``, ``m
+= (1 + tanh((v - v1)/v2))/2``, ``n = (1 + tanh((v - v3)/v4))/2`` and ``tau = (base + cosh((v -
+v3)/(2 v4)))/(base + 1)``: base 0 in Buono & Golubitsky 2001, section 6, base 1 in Rashidi et al.
+2016, eq. 2. All quantities are dimensionless.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from cpg_ros.networks.definition import cosh, Number, tanh, Term
 
 @dataclass(frozen=True)
 class MorrisLecar:
-    """Constants of a cell; i and phi are the network's own, as some vary them by gait."""
+    """Constants of a cell; i and phi are parameters of the network."""
 
     g_ca: float
     v_ca: float

@@ -14,17 +14,16 @@
 
 """Amplitude-controlled phase oscillators, one per leg: any footfall pattern is a gait.
 
-Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text; with all
-weights equal, this is the rhythm generator of CPG-RL (Bellegarda & Ijspeert 2022):
+Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text; with all weights equal,
+this is the rhythm generator of CPG-RL (Bellegarda & Ijspeert 2022):
 
-    theta_i' = 2 pi nu + sum_j w r_j sin(theta_j - theta_i - phi_ij),
-    r_i'' = a (a/4 (R - r_i) - r_i').
+    theta_i' = 2 pi nu + sum_j w r_j sin(theta_j - theta_i - phi_ij), r_i'' = a (a/4 (R - r_i) -
+        r_i').
 
 Every oscillator receives input from every other one. ``phi_ij = 2 pi (offset_j - offset_i)``,
-where offset_i is the number of cycles by which leg i is ahead. All sines therefore vanish on the
-gait: the period is exactly 1/nu, the amplitude R, and the phases are the offsets. With n legs, a
-small disturbance of the phases decays at the rate n w R. The amplitude is critically damped and
-converges at the rate a/2.
+where leg i leads by offset_i cycles. All sines vanish on the gait: the period is exactly 1/nu, the
+amplitude R, and the phases are the offsets. With n legs, a small disturbance of the phases decays
+at the rate n w R. The amplitude is critically damped and converges at the rate a/2.
 
 A cell has the variables x = r cos(theta), y = r sin(theta) and s = r', so nothing jumps by 2 pi.
 """
@@ -125,7 +124,7 @@ class PhaseOscillators(Network):
         return tuple(cls.footfalls)
 
     def symmetry(self, gait: str) -> Symmetry:
-        """Return no symmetry, and the gait's phases: as the offsets state it, if they do.
+        """Return the trivial symmetry, with the gait's phases (from the offsets if they state it).
 
         Raises:
             ValueError: there is no gait of this name.
@@ -144,7 +143,7 @@ class PhaseOscillators(Network):
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """Return one for each footfall pattern, all with a = 20 (Ijspeert et al.) and w = 1."""
+        """Return a preset for each footfall pattern, with a = 20 (Ijspeert et al.) and w = 1."""
         return {gait: Preset(gait, cls(1.0, 1.0, 20.0, 1.0, *(-fall % 1.0 for fall in falls)))
                 for gait, falls in cls.footfalls.items()}
 

@@ -104,8 +104,8 @@ class Quadruped(Network):
     def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry.
 
-        The wave of walk and jump runs so that each cell follows its input for
-        alpha >= 0 (LH leads LF), and the other way round for alpha < 0.
+        In walk and jump each cell follows its input for alpha >= 0 (LH leads LF), and precedes it
+        for alpha < 0.
 
         Raises:
             ValueError: the gait is not one of the six primary ones.

@@ -14,7 +14,7 @@
 
 """Executable ``cpg``: the package's executables, and a running graph, from one command line.
 
-``cpg param set gait walk`` is ``ros2 param set /cpg_generator gait walk``, by the same services;
+``cpg param set gait walk`` does ``ros2 param set /cpg_generator gait walk`` by the same services;
 ros2 comes with ROS and is not on PyPI.
 """
 

@@ -14,8 +14,8 @@
 
 """Executable ``demo``: a simulated robot to drive, or on a tour of the gaits.
 
-``ros2 run cpg_ros demo``: it starts the nodes as a user would, and sets the generator's
-parameter ``gait``, as typed or on a tour.
+It starts the nodes as a user would, and sets the generator's parameter ``gait``, as typed or on a
+tour.
 """
 
 from argparse import HelpFormatter, Namespace
@@ -66,9 +66,9 @@ FALLEN = 0.5
 
 
 def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
-    """Walk the course, then leave the robot to others; return whether it reached the end.
+    """Walk the course, then release the robot; return whether it reached the end.
 
-    ``check`` is called repeatedly; an exception that it raises ends the run.
+    ``check`` is called repeatedly; an exception from it ends the run.
     """
     steer, push = (robot.create_publisher(Twist, 'cmd_vel', 10),
                    robot.create_publisher(Wrench, 'robot_sim/push', 10))
@@ -126,10 +126,10 @@ RATE = 500
 
 @contextmanager
 def free_port() -> Iterator[int]:
-    """Yield the usual port, or another one where that is taken or another demonstration's.
+    """Yield the usual port, or another one if it is taken, also by another demonstration.
 
-    The page listens to it about a second later: a demonstration that starts in between would
-    find it free, and show the other's page as its own. A name on this machine is taken at once.
+    A page listens about a second after its start. A name on this machine is taken at once, so that
+    two demonstrations do not find the same port free.
     """
     with socket.socket(socket.AF_UNIX) as reserved:
         for port in (PORT, 0):
@@ -143,7 +143,7 @@ def free_port() -> Iterator[int]:
 
 
 def typed() -> queue.Queue:
-    """Return a queue of the lines that are typed; None marks the end of the input."""
+    """Return a queue of typed lines; None marks the end of the input."""
     lines: queue.Queue = queue.Queue()
 
     def read() -> None:
@@ -160,14 +160,14 @@ def typed() -> queue.Queue:
 
 def guide(operator: Operator, gaits: Sequence[str], every: float | None,
           interruption: Interruption) -> None:
-    """Switch to the gaits that are typed, until ``q``; first take the robot through ``gaits``.
+    """Switch to gaits that are typed, until ``q``, after a tour of ``gaits``.
 
     Args:
         operator: of the robot.
-        gaits: of the tour, the first of which it walks; it ends when a line is typed, or a gait is
-            chosen elsewhere.
-        every: simulated time for each gait, s. Where the input ends, as in ``echo walk | demo``,
-            the demonstration ends this long after its last gait began; None: it goes on.
+        gaits: of the tour, the first of which it walks; the tour ends when a line is typed, or a
+            gait is set elsewhere.
+        every: simulated time for each gait, s. If the input ends, as in ``echo walk | demo``, the
+            demonstration ends this long after its last gait began; None: it continues.
         interruption: ends it, too.
 
     Raises:
@@ -204,7 +204,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float | None,
 
 
 def wait_for_page(page: subprocess.Popen, port: int, interruption: Interruption) -> bool:
-    """Wait until the page is served; return whether it is: the robot walks without it, too."""
+    """Wait until the page is served; return whether it is. The robot walks without it, too."""
     end = time.monotonic() + PAGE
     while page.poll() is None and time.monotonic() < end:
         interruption.check()
@@ -231,7 +231,7 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 
 def parser() -> Parser:
-    """Arguments of the executable."""
+    """Return the parser of the executable's arguments."""
     top = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
                   'Unitree Go2, a hexapod, a humanoid, or a robot of your own, from a page in the '
                   'browser or by cmd_vel. Type the name of a gait and Enter to switch to it, q or '
@@ -288,7 +288,7 @@ def _nodes(args: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
 
 
 def _humanoid() -> DemoRobot:
-    """Return the Unitree G1 if its model is there, or else our own humanoid."""
+    """Return the Unitree G1 if its model is installed, else the shipped humanoid."""
     if find_spec('mjlab') is not None:
         return BIPEDS['unitree_g1']
     say('the humanoid is our own; for a Unitree G1: pip install --no-deps mjlab==1.6.0')
@@ -296,7 +296,7 @@ def _humanoid() -> DemoRobot:
 
 
 def _own(args: Namespace, interruption: Interruption) -> DemoRobot:
-    """Make and tune a robot of one's own, or use again what is there; errors as of prepare."""
+    """Create and tune a user's robot, or reuse existing files; errors as of prepare."""
     node = rclpy.create_node('cpg_demo')
     try:
         return demo_parts.prepare(args, Steps(node, interruption.check))
@@ -310,7 +310,7 @@ def demonstrate(args: Namespace) -> int:
     Raises:
         DemoError: a node ended, does not answer, or is not the only one.
         InputError: options that do not go together.
-        OSError: there can be no folder for the files.
+        OSError: the folder for the files cannot be created.
 
     """
     if not args.every > 0.0:

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parts of the demonstration: its node, its processes, and the way to drive a user's own robot.
+"""Parts of the demonstration: its node, its processes, and the steps from a URDF to a robot.
 
-Each step is an executable of its own, whose files stay in a folder and are used again.
+Each step is an executable of its own, whose files stay in a folder and are reused.
 """
 
 from argparse import ArgumentParser, Namespace
@@ -54,12 +54,12 @@ class DemoError(CpgError):
 
 
 class Operator(Node):
-    """Sets the gait of the generator, and follows the robot.
+    """Node that sets the generator's gait, and follows the robot.
 
     Attributes:
         pose: of the robot's base; None until it is known.
         time: of the robot's simulation, s.
-        taken_over: whether somebody else has set another gait.
+        taken_over: whether another client has set another gait.
 
     """
 
@@ -83,10 +83,10 @@ class Operator(Node):
         self.taken_over |= message.data != self._wanted
 
     def check_alone(self) -> None:
-        """See that these are the only robot and the only generator.
+        """Check that these are the only robot and the only generator.
 
         Raises:
-            DemoError: there is another one, perhaps from before ours.
+            DemoError: there is another one, perhaps left over.
 
         """
         for topic, who in (('cpg_generator/phase', 'generator'), ('odom', 'robot')):
@@ -122,7 +122,7 @@ class Operator(Node):
 
     @property
     def upright(self) -> float:
-        """Cosine of the angle by which the base leans."""
+        """Cosine of the base's lean."""
         rotation = Quaternion() if self.pose is None else self.pose.orientation
         return float(1.0 - 2.0 * (rotation.x**2 + rotation.y**2))
 
@@ -145,13 +145,13 @@ def running(*arguments: str) -> Iterator[subprocess.Popen]:
 
 
 class Interruption:
-    """Watches for the end of the demonstration: a signal, or the end of one of its nodes.
+    """Monitor of the demonstration's end: a signal, or the end of one of its nodes.
 
-    A signal is only recorded, and acted upon where that is safe: an exception raised while a node
-    starts would leave that node behind.
+    A signal is only recorded, and handled where that is safe: an exception while a node starts
+    would leave that node behind.
 
     Attributes:
-        nodes: the processes to watch.
+        nodes: processes to watch.
 
     """
 
@@ -168,7 +168,7 @@ class Interruption:
         self._noted = True
 
     def check(self) -> None:
-        """Return if nothing ended it.
+        """Return if nothing has ended it.
 
         Raises:
             KeyboardInterrupt: a signal arrived.
@@ -197,7 +197,7 @@ PATIENCE = 10.0
 
 
 class StepFailed(CpgError):
-    """A step of the way to a driven robot failed, and has said why."""
+    """A setup step failed; its error is already printed."""
 
     def __init__(self, code: int) -> None:
         super().__init__('a step failed')
@@ -212,10 +212,10 @@ class DemoRobot:
         file: robot file with tuned gaits.
         model: for the simulation.
         name: for files.
-        gaits: that are tuned, the one to begin with first.
-        steered: whether it follows commands of speed in that one.
-        network: that drives it, '' for the generator's own choice.
-        unjudged: whether it is one's own, and its file does not say whether feedback helps.
+        gaits: tuned ones, the initial one first.
+        steered: whether the initial gait follows velocity commands.
+        network: of the robot, '' for the generator's own choice.
+        unjudged: whether it is a user's robot whose file does not state whether feedback helps.
 
     """
 
@@ -229,7 +229,7 @@ class DemoRobot:
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add the options that choose a user's own robot."""
+    """Add the options that select a user's own robot."""
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help="with --urdf or --mjcf: "
                         "velocity limit of all joints instead of the file's")
     parser.add_argument('--evaluations', type=int, metavar='N', help='with --urdf or --mjcf: '
@@ -242,7 +242,7 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 def name_of(args: Namespace) -> str:
-    """Return the name of a user's own robot, from its file; '' if none is chosen.
+    """Return the name of a user's own robot, from its file, or ''.
 
     Raises:
         CpgError: there is no such file, it is no URDF, or options do not go together.
@@ -262,14 +262,14 @@ def name_of(args: Namespace) -> str:
 
 
 class Steps:
-    """Announces steps, and waits for each while the page shows it."""
+    """Runner of steps, which the page shows."""
 
     def __init__(self, node: Node, check: Callable[[], None]) -> None:
         """Announce steps by ``node``; ``check`` raises what ends the demonstration."""
         self._node, self._check, self._count = node, check, 0
 
     def run(self, what: str, seconds: float, words: Sequence[str]) -> int:
-        """Run an executable, ``words``, that takes about ``seconds``; return its exit code."""
+        """Run an executable, ``words``, for about ``seconds``; return its exit code."""
         self._count += 1
         say(f'step {self._count}: {what}, about {seconds:.0f} s (Ctrl-C stops it)')
         progress = StartProgress(self._node, what, seconds)
@@ -287,7 +287,7 @@ class Steps:
 
 
 def _end(process: subprocess.Popen) -> None:
-    """Stop a step as Ctrl-C would, so that it ends its workers and leaves no half files."""
+    """Stop a step as Ctrl-C would, so that it ends its workers and leaves no partial files."""
     for number_of in (signal.SIGINT, signal.SIGKILL):
         if process.poll() is None:
             with suppress(ProcessLookupError):
@@ -297,11 +297,11 @@ def _end(process: subprocess.Popen) -> None:
 
 
 def prepare(args: Namespace, steps: Steps) -> DemoRobot:
-    """Make a robot's file and tune it, or use again what the folder has.
+    """Create a robot's file and tune it, or reuse the folder's files.
 
     Raises:
         StepFailed: a step failed.
-        RobotError: a file that is there already cannot be used.
+        RobotError: an existing file cannot be used.
 
     """
     name = name_of(args)
@@ -334,7 +334,7 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
 
 
 def _again(file: Path, source: Path, option: str, args: Namespace) -> None:
-    """Say that a file is used again; refuse an option that would have changed it."""
+    """Report that a file is reused; refuse an option that would have changed it."""
     if getattr(args, option) is not None:
         raise InputError(f'argument --{option}: {file} is there already; delete it, or give '
                          'another folder with --out')
@@ -345,7 +345,7 @@ def _again(file: Path, source: Path, option: str, args: Namespace) -> None:
 
 
 def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequence[str]) -> None:
-    """Tune gaits one by one: each on all cores, and with a progress of its own."""
+    """Tune gaits one by one, each on all cores and with its own progress."""
     file, tuned = files
     source, evaluations = str(args.urdf or args.mjcf), args.evaluations or EVALUATIONS
     gains = [word for name in SERVO_GAINS if (gain := getattr(args, name)) is not None

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executables: each loads its module, and can be interrupted while it does."""
+"""The executables; each loads its module, and can be interrupted meanwhile."""
 
 from collections.abc import Callable
 from functools import partial
@@ -47,12 +47,12 @@ WITHOUT_NUMBA = ('generator', 'export', 'unitree_bridge', 'check_robot')
 
 
 def command(name: str) -> list[str]:
-    """Return the words that run an executable in a process of its own, whatever installed it."""
+    """Return the words that run an executable in a process of its own, however it is installed."""
     return [sys.executable, '-P', '-m', 'cpg_ros.ros.cli.executables', name]
 
 
 def start(name: str) -> int:
-    """Run an executable on the words of the command line; return its exit code."""
+    """Run an executable with the arguments of the command line; return its exit code."""
     def leave(number: int, _: FrameType | None = None) -> NoReturn:
         # An exception while compiled code loads would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)

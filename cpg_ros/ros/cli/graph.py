@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Topics of a graph: list, messages, rates, bags and schedules that are played."""
+"""Topics of a graph: list, messages, rates; record and play bags, play schedules."""
 
 from array import array
 import asyncio
@@ -47,9 +47,9 @@ PATIENCE = 1.0
 
 
 def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
-    """Publish a bag's messages as they were received, ``rate`` times as fast.
+    """Publish a bag's messages with their timing, ``rate`` times as fast.
 
-    No topics mean all. Returns the number of messages of each topic.
+    Without topics, play all. Return the number of messages of each topic.
 
     Raises:
         RecordingError: the bag cannot be read, or a topic is not in it.
@@ -105,10 +105,10 @@ USUAL = ('/rosout', '/parameter_events')
 
 
 def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
-    """Record topics until Ctrl-C; if none is named, all that exist or appear.
+    """Record topics until Ctrl-C; by default all that exist or appear.
 
     Raises:
-        BagError: something is at ``path`` already, or the folder cannot be written to.
+        BagError: the name is taken, or the folder cannot be written to.
 
     """
     recorder, searched = BagRecorder(node, path), 0.0
@@ -145,7 +145,7 @@ ANSWER = 60.0
 async def play_schedule(path: Path, other: NodeClient, rate: float) -> str:
     """Set a generator's parameters at the times of a schedule, ``rate`` times as fast.
 
-    Returns what was done.
+    Return a summary.
 
     Raises:
         ScheduleError: the file cannot be used.
@@ -200,14 +200,14 @@ def topics(node: Node) -> dict[str, str]:
 
 
 class Topic:
-    """A topic, subscribed to."""
+    """A subscribed topic."""
 
     def __init__(self, node: Node, name: str, wait: float,
                  late: Callable[[str], None] = lambda name: None) -> None:
-        """Find a topic's type and subscribe; relative names are of the namespace /.
+        """Find a topic's type and subscribe; relative names are in the namespace /.
 
-        A publisher and the first message are waited for, ``wait`` s each; ``late`` is called once
-        with the topic's name if neither has come within ``SILENCE``.
+        It waits up to ``wait`` s each for a publisher and the first message; ``late`` is called
+        once with the topic's name if neither has come within ``SILENCE``.
 
         Raises:
             SilentTopic: it has no publisher.

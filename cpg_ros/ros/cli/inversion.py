@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executable ``inversion``: it fits a file, or runs the node if no file is named."""
+"""Executable ``inversion``: fits a file, or runs the node if no file is named."""
 
 import sys
 
@@ -20,7 +20,7 @@ from cpg_ros.fitting.inversion import inversion
 
 
 def main() -> int:
-    """Run the tool or the node on the words of the command line; return the exit code."""
+    """Run the tool or the node with the arguments of the command line; return the exit code."""
     if sys.argv[1:2] in ([], ['--ros-args']):
         # Files are inverted without ROS, too.
         from cpg_ros.ros.inversion_node import run

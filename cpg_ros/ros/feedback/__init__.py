@@ -12,6 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sensor topics into the feedback, and its output into the generator."""
+"""From sensor topics to the feedback, and from its output to the generator."""
 
 __all__ = ['loop', 'odometry', 'sensor_input', 'switch']

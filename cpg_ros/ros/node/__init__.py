@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What rclpy lacks: parameters as a batch, deadlines, polling, diagnostics, clients.
+"""Additions to rclpy: parameter batches, deadlines, polling, diagnostics, clients.
 
 Imports ``common`` only.
 """

@@ -52,7 +52,7 @@ LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
 
 
 def level(status: Any) -> str:
-    """Return the level of a diagnostic status, which rclpy has as bytes, as pages name it."""
+    """Return the level of a diagnostic status as pages name it; rclpy has it as bytes."""
     number = status.level if isinstance(status.level, int) else ord(status.level)
     return LEVELS.get(number, 'stale')
 
@@ -68,7 +68,7 @@ class Graph:
     topics: frozenset[tuple[str, str]] = frozenset()
 
     def beside(self, generator: str, kind: tuple[str, ...]) -> str:
-        """Return the first of a kind in a generator's namespace, '' if there is none."""
+        """Return the first of a kind in a generator's namespace, or ''."""
         space = namespace(generator)
         return next((name for name in kind if namespace(name) == space), '')
 
@@ -109,7 +109,7 @@ POLL = 0.01
 
 
 class CallError(CpgError):
-    """A node refused, or did not answer; one line for the user."""
+    """A node refused or did not answer; one line for the user."""
 
     exit_code = 1
 
@@ -139,9 +139,9 @@ class ServiceClients:
         """Call through a node.
 
         Args:
-            node: makes the clients.
+            node: that has the clients.
             total: limit of all calls together, s.
-            search: how long a service is looked for, s, where ``total`` sets no limit.
+            search: time limit for finding a service, s, without ``total``.
             late: called once if a service has not been found within ``SILENCE``.
 
         """
@@ -150,10 +150,10 @@ class ServiceClients:
         self._clients: dict[str, Client] = {}
 
     async def call(self, kind: Any, name: str, request: Any, patience: float = PATIENCE) -> Any:
-        """Call a service and return its response; ``patience`` is that for the response, s.
+        """Call a service and return its response; ``patience`` is the time limit for it, s.
 
         Raises:
-            NoService: it is not there in time.
+            NoService: the service is not there in time.
             CallError: it does not answer in time.
 
         """
@@ -173,7 +173,7 @@ class ServiceClients:
         return answer.result()
 
     def client(self, kind: Any, name: str) -> Client:
-        """Return the client of a service; made early, the service knows it before a call."""
+        """Return the client of a service; created early, it is discovered before a call."""
         if name not in self._clients:
             self._clients[name] = self._node.create_client(kind, name,
                                                            callback_group=PolledGroup())
@@ -223,7 +223,7 @@ class NodeClient:
         """Call a service of a type such as SetBool or Trigger; return the message.
 
         Raises:
-            RequestRefused: it was not successful.
+            RequestRefused: success is false.
 
         """
         answer = await self.call(kind, service, patience, **fields)

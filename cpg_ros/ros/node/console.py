@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Standard output and error of a node, copied by a separate process that may have to wait.
+"""Standard output and error of a node, copied by a process that may wait.
 
-A terminal paused by Ctrl-S, a pipe that nobody reads and a slow disk make their writers wait;
-rclpy's logger waits with the interpreter's lock, and so do all threads. Therefore both streams
-become pipes that never make a writer wait: lines that do not fit are lost. Another process, which
-outlives the node even if it crashes, copies them to the original streams, and the log to its file,
-too. As a program, this file is that process: python console.py LOG_FILE PIPE.
+A terminal paused by Ctrl-S, a pipe without a reader and a slow disk make a writer wait; rclpy's
+logger waits with the interpreter's lock, and so do all threads. Therefore both streams become
+pipes that never make a writer wait; lines that do not fit are lost. Another process, which
+outlives a crash of the node, copies them to the original streams, and the log to its file. As a
+program, this file is that process: python console.py LOG_FILE PIPE.
 """
 
 import atexit
@@ -45,7 +45,7 @@ COLOR = re.compile(rb'\033\[\d+m')
 
 
 class _Stream(io.FileIO):
-    """A stream that drops what does not fit, instead of raising an error in a print."""
+    """A stream that drops what does not fit, instead of raising an exception in print."""
 
     def __init__(self, descriptor: int, terminal: bool) -> None:
         super().__init__(descriptor, 'w', closefd=False)
@@ -73,14 +73,14 @@ def aside() -> TextIO:
 
 
 def never_wait(name: str, arguments: list[str]) -> None:
-    """Make writing to standard output and error never wait, and start the process that copies.
+    """Make writing to standard output and error never wait; start the copying process.
 
     Args:
         name: prefix of the log file's name unless --log-file-name gives one.
         arguments: of ROS.
 
     Raises:
-        OSError: the system has no pipe or process left.
+        OSError: no pipe or process is available.
 
     """
     for descriptor in OUT, ERROR:
@@ -113,7 +113,7 @@ def never_wait(name: str, arguments: list[str]) -> None:
 
 
 def _end(copying: subprocess.Popen) -> None:
-    """Close both streams, and wait until all is copied, but no longer than PATIENCE."""
+    """Close both streams, and wait for the copying process, no longer than PATIENCE."""
     closed = os.open(os.devnull, os.O_WRONLY)
     for descriptor in OUT, ERROR:
         os.dup2(closed, descriptor)
@@ -140,7 +140,7 @@ def _log_file(name: str, arguments: list[str]) -> str:
 
 
 def _write(descriptor: int, data: bytes) -> None:
-    """Write all, and wait where need be; drop what a full disk or a closed terminal refuses."""
+    """Write all, waiting if necessary; drop what a full disk or a closed terminal refuses."""
     while data:
         try:
             data = data[os.write(descriptor, data):]

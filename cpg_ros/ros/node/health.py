@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A node's health on /diagnostics, and other publishers on the topics that move the robot."""
+"""A node's health on /diagnostics, and other publishers on topics that move the robot."""
 
 from collections.abc import Callable, Mapping, Sequence
 import time
@@ -41,7 +41,7 @@ class HealthPublisher:
 
         Args:
             node: that publishes.
-            part: of the node, for the name of the status.
+            part: of the node, in the name of the status.
             hardware: name of the robot.
             status: called for each message.
 
@@ -72,21 +72,21 @@ PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,
 
 
 def node_of(endpoint: TopicEndpointInfo) -> str:
-    """Return the full name of an endpoint's node, or a text if the name is not known."""
+    """Return the full name of an endpoint's node, or a text if it is unknown."""
     return PLACEHOLDERS.get(endpoint.node_name,
                             f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
 
 
 def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companion: str = ''
               ) -> str:
-    """Return the names of the others that publish on a topic, or ''.
+    """Return the names of other nodes that publish on a topic, or ''.
 
     Args:
-        node: whose others they are.
+        node: the node itself.
         topic: resolved.
         own: number of the node's own publishers.
-        tolerated: number of others that may publish, too.
-        companion: full name of a node that may publish, such as a watchdog, '' for none.
+        tolerated: number of allowed others.
+        companion: full name of a node that may publish, such as a watchdog, or ''.
 
     """
     if node.count_publishers(topic) <= own + tolerated:
@@ -103,22 +103,22 @@ def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companio
 
 
 class OtherPublishers:
-    """Warns as soon as another node publishes on one of a node's own topics.
+    """Warning as soon as another node publishes on one of a node's own topics.
 
     Attributes:
-        text: who publishes where; '' for nobody.
+        text: who publishes where, or ''.
 
     """
 
     def __init__(self, node: Node, topics: Sequence[str]) -> None:
-        """Monitor topics, given by resolved names, on each of which the node publishes once."""
+        """Monitor topics, by resolved names, on each of which the node has one publisher."""
         self._node, self._topics = node, topics
         self.text = self._warned = ''
         self._since = 0.0
         self._timer = node.create_timer(LOOK, self.check, clock=STEADY)
 
     def seek(self, seconds: float) -> str:
-        """Search until one is found, or for some time in s; return the text."""
+        """Search until one is found, or for a time in s; return the text."""
         end = time.monotonic() + seconds
         while not self.check() and time.monotonic() < end:
             time.sleep(LOOK / 5)

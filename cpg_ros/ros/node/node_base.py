@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The base class of nodes: parameters, start, transport, life cycle, service threads and end."""
+"""Base class of nodes: parameters, start, transport, life cycle, service threads and end."""
 
 from collections.abc import Callable, Iterator, Mapping
 import contextlib
@@ -62,9 +62,9 @@ def termination_signals() -> list[signal.Signals]:
 
 
 def exit_code(code: int, *threads: threading.Thread | None) -> int:
-    """Return the exit code once the threads have ended; if one does not, end the process with it.
+    """Return the exit code once all threads have ended; if one does not, end the process with it.
 
-    The C++ runtime aborts a process whose thread returns from C++ to an ended interpreter.
+    The C++ runtime aborts a process whose thread returns to an ended interpreter.
     """
     for thread in filter(None, threads):
         thread.join(PATIENCE)
@@ -87,13 +87,13 @@ LOCALHOST = Path(__file__).with_name('localhost.xml')
 
 
 def leave_shared_memory() -> None:
-    """Make this process use UDP alone, also on this computer; call it before rclpy.init.
+    """Restrict this process to UDP, also on this computer; call it before rclpy.init.
 
-    When a participant joins on the same computer, Fast DDS checks its port of shared memory, and
-    may sleep for 333 ms (a third of healthy_check_timeout_ms) with the lock that every publisher
+    When a participant joins on the same computer, Fast DDS checks its shared-memory port, and may
+    sleep for 333 ms (a third of healthy_check_timeout_ms) with the lock that every publisher
     needs. With the discovery range LOCALHOST the middleware adds shared memory itself; a profile
-    that restricts the process to the loopback interface takes its place. A transport, profiles and
-    static peers of the user stay.
+    that restricts the process to the loopback interface replaces the range. A transport, profiles
+    and static peers of the user stay.
     """
     environment = os.environ
     name, udp = TRANSPORT
@@ -109,18 +109,18 @@ def leave_shared_memory() -> None:
 # ROS's life cycle beside a node that is no LifecycleNode: a step for each transition.
 
 class Lifecycle(LifecycleNodeMixin):
-    """The states and services of https://design.ros2.org/articles/node_lifecycle.html.
+    """States and services of https://design.ros2.org/articles/node_lifecycle.html.
 
-    A parameter can decide whether a node is managed; rclpy decides before there are parameters.
+    A parameter decides whether a node is managed, which rclpy would have to know earlier.
     """
 
     def __init__(self, node: Node, steps: Mapping[str, Callable[[], str]]) -> None:
         """Serve ``~/change_state`` and the others.
 
         Args:
-            node: in whose name.
-            steps: configure, activate, deactivate, cleanup and shutdown -> what does it, and
-                returns why it cannot be done, or ''. The state stays as it was then.
+            node: that has the services.
+            steps: configure, activate, deactivate, cleanup and shutdown -> function that carries
+                it out, and returns why it cannot, or ''. The state then stays.
 
         """
         self._logger, self._steps = node.get_logger(), steps
@@ -140,7 +140,7 @@ class Lifecycle(LifecycleNodeMixin):
                          ) -> ChangeState.Response:
         """Change the state; refuse a transition that the state does not have.
 
-        rclpy raises an exception for that one, and the client waits for ever.
+        rclpy would raise an exception, and the client would wait for ever.
         """
         try:
             return self._change(request, response)
@@ -152,7 +152,7 @@ class Lifecycle(LifecycleNodeMixin):
             return response
 
     def _step(self, name: str, state: LifecycleState) -> TransitionCallbackReturn:
-        """Do the step of a transition."""
+        """Carry out a transition's step."""
         if reason := self._steps[name]():
             self._logger.warning(f'{name}: refused: {reason}')
             return TransitionCallbackReturn.FAILURE
@@ -175,15 +175,15 @@ class StartError(CpgError):
 
 
 class StartedNode(Node):
-    """A node with parameters declared by specs, and with a thread of its own.
+    """A node with parameters declared by specs, and a thread.
 
     Attributes:
         stop: set to end the node.
-        signals: that have come to end it, by their numbers.
+        signals: numbers of the signals that ended it.
         failure: exception that ended the thread, or None.
-        thread: one that may still be at work when the node ends, or None.
-        parameter_service: services of the parameters, which have a thread of their own.
-        SETS_OTHERS: parameters whose values set those of others.
+        thread: thread that may still run when the node ends, or None.
+        parameter_service: parameter services, with a thread of their own.
+        SETS_OTHERS: parameters whose values set others.
 
     """
 
@@ -208,8 +208,7 @@ class StartedNode(Node):
         """Declare parameters by name.
 
         Raises:
-            StartError: the value that one was given at the start has the wrong type, or is out of
-                range.
+            StartError: an override has the wrong type, or is out of range.
 
         """
         overrides = self._parameter_overrides
@@ -233,19 +232,19 @@ class StartedNode(Node):
                                  f'{spec.low:g} to {spec.high:g}') from error
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Return a batch of changes with the types and the further changes that it implies."""
+        """Return a batch of changes with converted types and the changes that it implies."""
         return [as_list(parameter, self._lists[parameter.name])
                 if parameter.name in self._lists else parameter
                 for parameter in as_doubles(parameters, self._doubles)]
 
     def resolve_topic_name(self, topic: str, **options: Any) -> str:
-        """Do as the base class does; errors as of create_publisher."""
+        """Resolve a topic's name; errors as of create_publisher."""
         with _topic(topic):
             return super().resolve_topic_name(topic, **options)
 
     def create_publisher(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
                          **options: Any) -> Any:
-        """Do as the base class does.
+        """Create a publisher.
 
         Raises:
             StartError: the topic's name or a QoS override of it cannot be used.
@@ -256,7 +255,7 @@ class StartedNode(Node):
 
     def create_subscription(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
                             **options: Any) -> Any:
-        """Do as the base class does; errors as of create_publisher."""
+        """Create a subscription; errors as of create_publisher."""
         with _topic(topic):
             return super().create_subscription(kind, topic, *rest, **options)
 
@@ -292,7 +291,7 @@ class StartedNode(Node):
 
 @contextlib.contextmanager
 def _topic(name: str) -> Iterator[None]:
-    """Add the topic to an error of its name or of an override of its QoS."""
+    """Add the topic to an error of its name or QoS overrides."""
     try:
         yield
     except (NameValidationException, ParameterException, RuntimeError) as error:
@@ -334,13 +333,13 @@ def _help_or_error(executable: str, text: str, specs: Mapping[str, Spec],
 
 
 def _first(error: Exception) -> str:
-    """Return the reason of an error of rclpy on one line, without the place in its sources."""
+    """Return the reason of an rclpy error on one line, without its place in the sources."""
     reason = str(error).replace('. Error: error not set', '').partition(', at /')[0]
     return ' '.join(reason.replace('. Error: ', ': ').split())
 
 
 def _domain() -> str:
-    """Return what is wrong with the domain, or ''; with a wrong one Fast DDS aborts."""
+    """Return what is wrong with the domain, or ''; a wrong one makes Fast DDS abort."""
     domain = os.environ.get('ROS_DOMAIN_ID', '')
     return (f'ROS_DOMAIN_ID {domain} is not from 0 to {LAST_DOMAIN}'
             if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
@@ -351,12 +350,12 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     """Run a node until a signal ends it, or until it stops itself; return the exit code.
 
     Args:
-        make: returns the node; a CpgError that it raises ends the start with one line.
+        make: returns the node; a CpgError ends the start with one line.
         name: of the node.
-        text: what it does, a sentence for ``--help``.
-        specs: of its parameters, listed by ``--help``.
-        args: from the command line, without the program's name; None for those of the process.
-        executable: the program's name, '' if it is that of the node.
+        text: description for ``--help``, a sentence.
+        specs: of its parameters, for ``--help``.
+        args: of the command line, without the program's name; by default those of the process.
+        executable: name of the program, '' for that of the node.
 
     """
     code = _help_or_error(executable or name, text, specs, args)

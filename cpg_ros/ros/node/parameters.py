@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameter services that process requests in a thread of their own and survive malformed ones."""
+"""Parameter services that handle requests in a thread and survive malformed ones."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 import ctypes
@@ -54,25 +54,25 @@ PRESETS = '; presets: '
 
 
 def one_of(names: Iterable[str], further: str = '') -> str:
-    """Return the constraints of a parameter that is one of some words; ``further`` is added."""
+    """Return the constraints of a parameter with given words as values, and ``further`` text."""
     return 'one of: ' + ', '.join(names) + further
 
 
 def choices(constraints: str) -> list[str]:
-    """Return the words that a descriptor's constraints list, if they are those of one_of."""
+    """Return the words in a descriptor's constraints, if one_of wrote them."""
     match = re.search(r'one of: (.*)', constraints)
     names = re.split(f', |{PRESETS}', match[1]) if match else []
     return [name for name in names if re.fullmatch(r'[\w.-]+', name)]
 
 
 def presets_among(constraints: str) -> list[str]:
-    """Return those of the choices that the constraints list as presets with other names."""
+    """Return those choices that are presets with other names than gaits."""
     return choices(f'one of: {constraints.partition(PRESETS)[2]}')
 
 
 @dataclass(frozen=True)
 class Spec:
-    """One parameter: default, description, range of a number, whether it is read-only."""
+    """One parameter: default, description, range, and whether it is read-only."""
 
     default: Any
     text: str
@@ -82,7 +82,7 @@ class Spec:
     constraints: str = ''
 
     def descriptor(self) -> ParameterDescriptor:
-        """Return it as a ROS descriptor."""
+        """Return the ROS descriptor."""
         descriptor = ParameterDescriptor(description=self.text, read_only=self.read_only,
                                    additional_constraints=self.constraints)
         if self.low is not None and self.high is not None:
@@ -96,14 +96,14 @@ class Spec:
 
 
 def fixed(specs: Mapping[str, Spec]) -> dict[str, Spec]:
-    """Return the same parameters, which can be set at the start only."""
+    """Return the same parameters as read-only ones."""
     return {name: replace(spec, read_only=True) for name, spec in specs.items()}
 
 
 def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
-    """Turn whole numbers given for floating-point parameters into doubles.
+    """Convert integers that are given for floating-point parameters to doubles.
 
-    ``ros2 param set /cpg_generator frequency 2`` sends an integer; refusing it would be pedantry.
+    ``ros2 param set /cpg_generator frequency 2`` sends an integer.
     """
     return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
             if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
@@ -111,7 +111,7 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
 
 
 def as_list(parameter: Parameter, default: list) -> Parameter:
-    """Turn one value, or whole numbers, given for a list of such values into the list."""
+    """Convert one value, or integers, to the list type of a parameter."""
     value = parameter.value
     values = value if parameter.type_.name.endswith('_ARRAY') else [value]
     kind = type(default[0]) if default else str
@@ -121,7 +121,7 @@ def as_list(parameter: Parameter, default: list) -> Parameter:
 
 
 def kind_of(default: Any) -> str:
-    """Return the name of a parameter's type by its default, for messages."""
+    """Return the name of a parameter's type, from its default, for messages."""
     if isinstance(default, list):
         return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
     return KINDS[type(default)]
@@ -142,7 +142,8 @@ _capsule_owners: list[Any] = []
 def bounded(service: type, most: int) -> type:
     """Return a type to take instead of a service's Request.
 
-    Taken is a Request or, if its first field has more than ``most`` elements, their number.
+    A taken message is a Request or, if its first field has more than ``most`` elements, their
+    number.
 
     Args:
         service: type of a service whose requests begin with a sequence.
@@ -177,7 +178,7 @@ def _refused(reason: str) -> SetParametersResult:
 
 
 class _Change:
-    """Parameters that are set together or not at all, and the receiver of the result."""
+    """Parameters that are set atomically, and the receiver of the result."""
 
     def __init__(self, parameters: list[Parameter],
                  answer: Callable[[SetParametersResult], None]) -> None:
@@ -188,14 +189,14 @@ class _Change:
 
 
 class StrictParameterService(ParameterService):
-    """rclpy's services in a callback group of their own, with changes applied in a thread.
+    """Parameter services in a callback group of their own, with changes applied in a thread.
 
-    The executor stays free for what must not wait, such as a stop. Of several waiting changes of
-    the same parameters, only the last valid one is applied. Values of no known type, unknown names
-    and more than MOST parameters are rejected with a reason; rclpy 7.1 raises in the executor.
+    The executor stays free for urgent requests, such as a stop. Of several waiting changes of the
+    same parameters, only the last valid one is applied. Values of unknown type, unknown names and
+    more than MOST parameters are rejected with a reason; rclpy 7.1 raises in the executor.
 
     Attributes:
-        thread: applies the changes, once it is started.
+        thread: applies the changes, once started.
 
     """
 
@@ -243,14 +244,14 @@ class StrictParameterService(ParameterService):
         return response
 
     def _defer(self, service: Any, response: Any, header: Any) -> None:
-        """Send a response; leave a request to the thread."""
+        """Send a response, or leave the request to the thread."""
         if isinstance(response, service.srv_type.Response):
             Service.send_response(service, response, header)
         else:
             self._requests.put((service, response, header))
 
     def _next(self) -> list[_Change]:
-        """Wait for a request; return its changes, each of which is answered on its own."""
+        """Wait for a request; return its changes, each of which gets a response."""
         if (received := self._requests.get()) is None:
             return []
         service, request, header = received
@@ -285,10 +286,10 @@ class StrictParameterService(ParameterService):
         return changes
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
-        """Read parameters that the node has and that may be set while it runs.
+        """Read parameters that the node has and that can be set while it runs.
 
         Raises:
-            ValueError: a value of no known type, an unknown name, or a read-only parameter.
+            ValueError: a value of unknown type, an unknown name, or a read-only parameter.
 
         """
         parameters = []
@@ -307,7 +308,7 @@ class StrictParameterService(ParameterService):
         return parameters
 
     def end(self) -> None:
-        """Stop after the change that is being applied."""
+        """Stop after the present change."""
         self._ending = True
         self._requests.put(None)
 
@@ -350,11 +351,11 @@ class StrictParameterService(ParameterService):
 
 
 def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:
-    """Return the changes that still have to be made, in order; drop those that are superseded.
+    """Return the remaining changes in order, without those that are superseded.
 
     A later change that sets all parameters of an earlier one supersedes it, and lists it in
     ``replaced``. Parameters in ``barriers`` may set others: none is superseded across a change
-    that sets a barrier, and such a change only by the one right after it.
+    that sets a barrier, and such a change only by the next one.
     """
     remaining: list[_Change] = []
     for change in reversed(changes):

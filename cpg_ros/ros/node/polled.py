@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Subscriptions, services and clients that no executor serves: messages wait to be taken.
+"""Subscriptions, services and clients without an executor: the caller takes messages.
 
-No code of the process runs when a message arrives, however many there are; the middleware drops
-those that are not taken in time.
+No code of the process runs when messages arrive, however many; the middleware drops those that are
+not taken in time.
 """
 
 from collections.abc import Iterator
@@ -33,12 +33,12 @@ OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
 
 def latched(depth: int = 1) -> QoSProfile:
-    """Return the QoS of a topic whose last messages wait for later subscribers."""
+    """Return the QoS of a topic whose last messages reach later subscribers."""
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 def command_qos() -> QoSProfile:
-    """Return the QoS of commands: only the newest one matters."""
+    """Return the QoS of commands: only the newest one counts."""
     return QoSProfile(depth=1)
 
 
@@ -48,26 +48,26 @@ def best_effort(depth: int = 1) -> QoSProfile:
 
 
 class PolledGroup(CallbackGroup):
-    """Keeps subscriptions, services and clients from the executor."""
+    """Callback group that keeps its entities from the executor."""
 
     def can_execute(self, entity: object) -> bool:
-        """Never."""
+        """Return False."""
         return False
 
     def beginning_execution(self, entity: object) -> bool:
-        """Never."""
+        """Return False."""
         return False
 
     def ending_execution(self, entity: object) -> None:
-        """None has begun."""
+        """Do nothing."""
 
 
 class PolledSubscription:
-    """A topic whose messages are taken, without a callback.
+    """A subscription without a callback.
 
     Attributes:
-        topic: its resolved name.
-        depth: most messages that can wait.
+        topic: resolved name.
+        depth: largest number of waiting messages.
 
     """
 
@@ -77,11 +77,11 @@ class PolledSubscription:
 
         Args:
             node: that subscribes.
-            kind: type of the messages.
-            topic: its name.
-            quality: of service; best effort and the newest message by default.
-            raw: take messages as bytes: decoding whole ones costs far more.
-            overridable: let parameters of the node override the quality of service.
+            kind: message type.
+            topic: name.
+            quality: QoS, by default best effort and the newest message.
+            raw: take messages as bytes, as decoding is far more expensive.
+            overridable: allow QoS overrides by parameters.
 
         """
         self._node = node
@@ -93,14 +93,14 @@ class PolledSubscription:
         self.depth: int = self._subscription.qos_profile.depth
 
     def receive(self) -> Iterator[tuple[Any, int]]:
-        """Take what has arrived: each message, and its time of arrival, ns of system time."""
+        """Take the messages that have arrived, each with its time of arrival, ns (system time)."""
         handle = self._subscription.handle
         with handle:
             while (taken := handle.take_message(self._kind, self._raw)) is not None:
                 yield taken[0], taken[1]['received_timestamp']
 
     def newest(self) -> Any:
-        """Return the newest message since the last call, None if none has come."""
+        """Return the newest message since the last call, or None."""
         newest, handle = None, self._subscription.handle
         with handle:
             # No more than these can wait.
@@ -112,7 +112,7 @@ class PolledSubscription:
 
     @property
     def handle(self) -> Any:
-        """What keeps the subscription, and has its ``pointer``, while it is entered."""
+        """Context manager with the ``pointer``, which keeps the subscription alive."""
         return self._subscription.handle
 
     def close(self) -> None:
