@@ -68,7 +68,7 @@ def test_the_example_of_the_readme_runs():
 
 
 def test_the_readme_is_short():
-    assert len((ROOT / 'README.md').read_text().splitlines()) <= 150
+    assert len((ROOT / 'README.md').read_text().splitlines()) <= 120
 
 
 def test_the_reference_has_the_keys_of_robot_files(monkeypatch):
