@@ -92,7 +92,7 @@ class GaitAssessment(ShortRepr):
 
     @property
     def orbits(self) -> tuple['GaitAssessment', ...]:
-        """This assessment and the others; empty where there is no orbit."""
+        """Assessments of this orbit and the others; empty where there is no orbit."""
         return () if self.orbit is None else (self, *self.others)
 
     @property

@@ -26,7 +26,7 @@ from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np
-from plain_pattern import PlainStrides, PlainPattern
+from plain_pattern import PlainPattern, PlainStrides
 import pytest
 
 SEED = 5757
