@@ -87,9 +87,10 @@ def of_dataset(folder: Path) -> dict[str, object]:
                                   servo=Servo(**truth['servo']))
             for kind, one in ('angles', fit), ('commands', fit_recording(
                     sent, robot, truth['network'], truth['gait'])):
+                bounded = {name: number for name, number in one.fit.parameters.items()
+                           if name in truth['parameters'] and number.bounded}
                 inside[kind] += [number.low <= truth['parameters'][name] <= number.high
-                                 for name, number in one.fit.parameters.items()
-                                 if name in truth['parameters']]
+                                 for name, number in bounded.items()]
             off.append(abs(fit.stride.frequency / truth['frequency'] - 1.0))
             if fit.stride.contacts is not None:
                 duties += [abs(fit.stride.contacts.duty[leg] - fraction)
@@ -98,7 +99,8 @@ def of_dataset(folder: Path) -> dict[str, object]:
             wrong.append(path.parent.name)
     return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
             'most_frequency_error': float(np.max(off)),
-            'median_duty_error': float(np.median(duties)), 'intervals': len(inside['angles']),
+            'median_duty_error': float(np.median(duties)),
+            'bounded_intervals': {kind: len(one) for kind, one in inside.items()},
             'with_the_truth': {kind: sum(one) for kind, one in inside.items()}}
 
 

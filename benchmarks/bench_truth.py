@@ -18,18 +18,19 @@ Each recording is 24 strides read off an exact gait by the generator's own reado
 2 % of each joint's range, stamps off by 0.5 ms and 1 % of the samples missing, averaged. A fit
 starts from other values than the truth. By chance 95 of 100 intervals hold it.
 
-Then networks with parameters drawn within a tenth of a drawn gait's preset, from which the fit
-starts, with noise of 1 %; and the same as whole recordings of 14 s, 1 to 5 % of whose samples are
-missing, or repeat the pose in which a generator was held up, 30 to 250 ms at a time.
-``--readouts`` makes mean cycles of drawn parameters with more noise or by other readouts than the
-fit's: three harmonics without Lanczos' factors, legs retimed to a duty, or another order.
+Then networks with parameters drawn within a tenth of a drawn gait's preset, or phases within a
+twentieth of a cycle, fitted as ``inversion`` does, with noise of 1 %; and the same as whole
+recordings of 14 s, 1 to 5 % of whose samples are missing, or repeat the pose in which a generator
+was held up, 30 to 250 ms at a time. ``--readouts`` also makes recordings with more noise or by
+other readouts than the fit's: three harmonics without Lanczos' factors, legs retimed to a duty, or
+another order.
 
 Last, what the generator publishes of every shipped robot, network and gait, 14 s of it with noise
 of 1 %, fitted with the robot file as ``inversion`` does, five seeds each.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 import sys
 import time
@@ -70,13 +71,15 @@ CASES = (('delayed', 'trot', 3, QUADRUPED, {'c': 1.05, 'tau': 1.1}),
          ('hopf', 'trot', 3, LEGS, {'duty': 0.95}),
          ('matsuoka', 'trot', 3, LEGS, {'beta': 1.05}),
          ('matsuoka', 'walk', 3, LEGS, {'beta': 1.05, 'a': 0.97}))
-#: Networks whose parameters are drawn, and noise of them, over each joint's range.
-DRAWN, NOISE = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka'), 0.01
-#: Noise, readout of the recordings, and order of the fit.
-READOUTS = {'exact': (0.01, joint_angles, 3), 'noise of 3 %': (0.03, joint_angles, 3),
-            'no Lanczos factors': (0.01, plain_readout, 3),
-            'duty 0.65': (0.01, partial(joint_angles, duty=0.65), 3),
-            'order 2': (0.01, joint_angles, 2)}
+#: Networks whose parameters are drawn.
+DRAWN = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka', 'phase')
+#: Noise over each joint's range, readout of the recordings, order of the fit, and stalls.
+READOUTS = {'exact': (0.01, joint_angles, 3, ''), 'noise of 3 %': (0.03, joint_angles, 3, ''),
+            'no Lanczos factors': (0.01, plain_readout, 3, ''),
+            'duty 0.65': (0.01, partial(joint_angles, duty=0.65), 3, ''),
+            'order 2': (0.01, joint_angles, 2, ''),
+            'samples missing': (0.01, joint_angles, 3, 'missing'),
+            'poses repeated': (0.01, joint_angles, 3, 'repeated')}
 #: Samples a second, share of them that are stalled, and how long one stall lasts, s.
 RATE, STALLED, STALL = 200.0, (0.01, 0.05), (0.03, 0.25)
 #: Gaits whose phases are read off the legs, recorded for so long (s) at so many strides a second.
@@ -128,90 +131,93 @@ def phases_covered(name: str, gait: str) -> dict[str, object]:
 
 
 def drawn(name: str, runs: int, seed: int) -> Iterator[tuple]:
-    """Yield rng, preset, free numbers, their true values and the orbit, where there is one."""
+    """Yield rng, preset, true numbers and the orbit, where there is one.
+
+    The numbers are the free parameters by name, or the phases of the legs where these are stated.
+    """
     gaits = [gait for gait, preset in PRESETS[name].items() if preset.gait == gait]
     for run in range(runs):
         rng = np.random.default_rng([seed, run])
         preset = PRESETS[name][gaits[rng.integers(len(gaits))]]
-        numbers = free_numbers(preset.network, preset.gait, preset.network.free)
-        values = [one.value(preset.network) for one in numbers]
-        values = [value * rng.uniform(0.9, 1.1) if value else rng.uniform(-0.1, 0.1)
-                  for value in values]
+        network = preset.network
+        if network.offsets:
+            first, *others = network.offsets.values()
+            truth = {offset: getattr(network, offset) - getattr(network, first)
+                     + rng.uniform(-0.05, 0.05) for offset in others}
+            made = network.replace(**{first: 0.0}, **truth)
+        else:
+            numbers = free_numbers(network, preset.gait, network.free)
+            values = [one.value(network) for one in numbers]
+            values = [value * rng.uniform(0.9, 1.1) if value else rng.uniform(-0.1, 0.1)
+                      for value in values]
+            truth = {one.name: value for one, value in zip(numbers, values, strict=True)}
+            made = with_values(network, numbers, values)
         try:
-            orbit, _ = gait_of(preset, with_values(preset.network, numbers, values))
+            orbit, _ = gait_of(preset, made)
         except CpgError:
             continue
-        if not refusal(orbit, preset.gait, HARMONICS):
-            yield rng, preset, numbers, values, orbit
+        if network.offsets or not refusal(orbit, preset.gait, HARMONICS):
+            yield rng, preset, truth, orbit
 
 
-def held_up(name: str, rng: np.random.Generator, orbit: object, repeated: bool) -> tuple:
-    """Return the stride of a recording with stalls, and the cells of its joints."""
+def recorded(name: str, rng: np.random.Generator, orbit: object, noise: float, angles: Callable,
+             stalls: str) -> tuple:
+    """Return a recording, the joints of its legs, and their cells.
+
+    In stalls samples are 'missing', or the pose in which the robot was held up is 'repeated'.
+    """
     legs = next(iter(NETWORKS[name].legs.values()))
     cells = {f'{leg}_{joint}': cell for leg, own in legs.items()
              for joint, cell in zip(('hip', 'thigh', 'calf'), (own[0], own[0], own[-1]),
                                     strict=True)}
     times, fraction = np.arange(0.0, LASTING, 1.0 / RATE), rng.uniform(*STALLED)
     stalled = np.zeros(times.size, bool)
-    while stalled.mean() < fraction:
+    while stalls and stalled.mean() < fraction:
         begin = rng.integers(times.size)
         stalled[begin:begin + int(RATE * rng.uniform(*STALL))] = True
-    steps = np.where(stalled & repeated, 0.0, STRIDES / RATE)
+    steps = np.where(stalled & (stalls == 'repeated'), 0.0, STRIDES / RATE)
     weights = np.tile(weights_of(3, 3, int(rng.integers(1 << 30))), (len(legs), 1))
-    clean = joint_angles(orbit, tuple(cells.values()), weights, rng.random() + np.cumsum(steps)).T
-    seen = noisy(rng, 0.1 + clean, NOISE)
-    there = np.full(times.size, True) if repeated else ~stalled
+    clean = angles(orbit, tuple(cells.values()), weights, rng.random() + np.cumsum(steps)).T
+    seen = noisy(rng, 0.1 + clean, noise)
+    there = ~stalled if stalls == 'missing' else np.full(times.size, True)
     by_leg = {leg: tuple(joint for joint in cells if joint.startswith(leg)) for leg in legs}
-    return find_stride(Recorded(tuple(cells), times[there], seen[there]), by_leg,
-                       NETWORKS[name], cells), cells
-
-
-def random_covered(name: str, runs: int, seed: int, stalls: str = '') -> dict[str, object]:
-    """Count the truths inside of drawn parameters; stalls: '', 'missing' or 'repeated'."""
-    inside: dict[str, int] = {}
-    fitted, none = 0, 0
-    for rng, preset, numbers, values, orbit in drawn(name, runs, seed):
-        try:
-            if stalls:
-                cycle, cells = held_up(name, rng, orbit, stalls == 'repeated')
-            else:
-                joints = JOINTS.get(name, QUADRUPED)
-                cycle, cells = record(orbit, joints, weights_of(
-                    len(joints), 3, int(rng.integers(1 << 30))), rng, noise=NOISE, jitter=0.0,
-                    dropouts=0.0)
-            fit = invert(cycle, cells, preset.network, preset.gait, order=3)
-        except CpgError:
-            none += 1
-            continue
-        fitted += 1
-        for one, value in zip(numbers, values, strict=True):
-            found = fit.parameters[one.name]
-            inside[one.name] = inside.get(one.name, 0) + (found.low <= value <= found.high)
-    log(f'{name} drawn {stalls}: {inside} of {fitted} inside, {none} not fitted')
-    return {'fitted': fitted, 'not_fitted': none,
-            'inside': {key: count / max(fitted, 1) for key, count in inside.items()}}
+    return Recorded(tuple(cells), times[there], seen[there]), by_leg, cells
 
 
 def misread_covered(name: str, which: str, runs: int, seed: int) -> dict[str, object]:
     """Count the truths inside of recordings that are made otherwise than the fit assumes."""
-    noise, angles, order = READOUTS[which]
+    noise, angles, order, stalls = READOUTS[which]
     inside = total = open_ends = none = 0
     began = time.process_time()
-    for rng, preset, numbers, values, orbit in drawn(name, runs, seed):
-        joints = JOINTS.get(name, QUADRUPED)
+    for rng, preset, truth, orbit in drawn(name, runs, seed):
         try:
-            cycle, cells = record(orbit, joints, weights_of(len(joints), 3, int(
-                rng.integers(1 << 30))), rng, noise=noise, jitter=0.0, dropouts=0.0, angles=angles)
-            fit, _ = fit_with_fallbacks(cycle, cells, preset.network, preset.gait, order=order)
+            if stalls or preset.network.offsets:
+                seen, by_leg, cells = recorded(name, rng, orbit, noise, angles, stalls)
+                cycle = find_stride(seen, by_leg, NETWORKS[name], cells)
+            else:
+                joints = JOINTS.get(name, QUADRUPED)
+                cycle, cells = record(orbit, joints, weights_of(len(joints), 3, int(rng.integers(
+                    1 << 30))), rng, noise=noise, jitter=0.0, dropouts=0.0, angles=angles)
+            if preset.network.offsets:
+                found = {preset.network.offsets[leg]: (
+                    cycle.phases[leg] - scatter.half_width,
+                    cycle.phases[leg] + scatter.half_width, True)
+                         for leg, scatter in list(cycle.scatter.items())[1:]}
+            else:
+                fit, _ = fit_with_fallbacks(cycle, cells, preset.network, preset.gait,
+                                            order=order)
+                found = {key: (one.low, one.high, one.bounded)
+                         for key, one in fit.parameters.items() if key in truth}
         except CpgError:
             none += 1
             continue
-        for one, value in zip(numbers, values, strict=True):
-            if one.name in fit.parameters:
-                found = fit.parameters[one.name]
-                total += 1
-                inside += found.low <= value <= found.high
-                open_ends += not found.bounded
+        for key, (low, high, bounded) in found.items():
+            # Phases are the same a whole cycle on.
+            value = truth[key] + (np.round(0.5 * (low + high) - truth[key])
+                                  if preset.network.offsets else 0.0)
+            total += 1
+            inside += bool(low <= value <= high)
+            open_ends += not bounded
     low, high = binomtest(inside, max(total, 1)).proportion_ci(0.95, 'wilson')
     log(f'{name} {which}: {inside} of {total} inside ({low:.0%} to {high:.0%}), {open_ends} not '
         f'bounded, {none} not fitted, {time.process_time() - began:.1f} s')
@@ -264,18 +270,21 @@ def main() -> None:
                         help='of the noise of what the generator publishes')
     parser.add_argument('--readouts', nargs='*', metavar='NETWORK', help='only drawn parameters '
                         'read otherwise than the fit does, of these networks or all')
+    parser.add_argument('--which', nargs='+', choices=READOUTS, default=list(READOUTS),
+                        metavar='READOUT', help='of the readouts: '
+                        + ', '.join(READOUTS).replace('%', '%%'))
     given = parser.parse_args()
     if given.readouts is not None:
         emit(benchmark='truth', seed=given.seed, readouts={
             f'{name} {which}': misread_covered(name, which, given.runs, given.seed)
-            for which in READOUTS for name in given.readouts or DRAWN})
+            for which in given.which for name in given.readouts or DRAWN})
         return
     seeds = range(*given.seeds)
     if given.generator is not None:
         emit(benchmark='truth', generator=generated_covered(seeds, given.generator))
         return
-    random = {f'{name} {stalls}'.strip(): random_covered(name, given.runs, given.seed, stalls)
-              for stalls in ('', 'missing', 'repeated') for name in DRAWN}
+    random = {f'{name} {which}': misread_covered(name, which, given.runs, given.seed)
+              for which in ('exact', 'samples missing', 'poses repeated') for name in DRAWN}
     found = {f'{case[0]} {case[1]} order {case[2]}': covered(*case) for case in CASES}
     found |= {f'{name} {gait} phases': phases_covered(name, gait) for name, gait in STATED}
     worst = min(fraction for case in found.values() for fraction in case['inside'].values())

@@ -266,7 +266,7 @@ def inversion(number: int, key: str, name: str) -> Iterator[ReproducedRow | Pict
     for start, fit in fits.items():
         yield at.number(
             f'{name} from the start {start}', SOLUTIONS[name], float(fit.values[0]),
-            note=f'made-up recording (erratum 5); {fit.evaluations} orbits solved, where '
+            note=f'made-up recording (erratum 5); {fit.trial.evaluations} orbits solved, where '
                  f'{starts[start]} iterations are printed; error f {fit.cost:.4f}')
     values = np.array([fit.values[0] for fit in fits.values()])
     best = fitted(getattr(example.network, name))

@@ -16,7 +16,8 @@
 
 A stride is from touchdown to touchdown; duty is the fraction of it in stance. In a walk a foot is
 on the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal
-Locomotion).
+Locomotion). A runner's foot is foremost before it lands: contacts that are estimated from its motion begin too
+early, and what they show of flight is less than there is.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -44,6 +45,7 @@ FEWEST = 12
 #: WALK: fraction of the time in flight up to which a gait is a walk; RUN: fraction from which it
 #: is a run. WALK is above 0, as a foot that is about to be lifted bears little and may count as
 #: lifted.
+#: By the motion of the feet it is a run from WALK on, and a walk from as much double support on.
 WALK, RUN = 0.1, 0.15
 
 
@@ -55,16 +57,23 @@ class FootContacts(ShortRepr):
         legs: their names.
         times: s, rising, shape (n,).
         down: whether each foot bears a load, bool, shape (n, legs).
+        by_motion: whether that is estimated from the motion of the feet.
 
     """
 
     legs: tuple[str, ...]
     times: np.ndarray
     down: np.ndarray
+    by_motion: bool = False
 
     def __str__(self) -> str:
         duty = ', '.join(f'{leg} {fraction:.0%}' for leg, fraction in self.duty.items())
         return f'{duty} of the time in stance, {self.flight:.0%} in flight'
+
+    @property
+    def source(self) -> str:
+        """What they are known by."""
+        return 'the motion of the feet' if self.by_motion else 'the loads on the feet'
 
     def _summary(self) -> str:
         return str(self)
@@ -82,6 +91,9 @@ class FootContacts(ShortRepr):
     @property
     def gait(self) -> str | None:
         """Walk or run, None where the flight is between theirs."""
+        if self.by_motion:
+            both = float(self.down.all(axis=1).mean())
+            return 'run' if self.flight >= WALK else 'walk' if both >= WALK else None
         return 'walk' if self.flight <= WALK else 'run' if self.flight >= RUN else None
 
     def leads(self, phase: Callable[[np.ndarray], np.ndarray], legs: Sequence[str]
@@ -200,7 +212,7 @@ def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end
                 inner = first > 0 and last + 1 < len(times)
                 if inner and times[last + 1] - times[first] < BOUNCE * period:
                     column[first:last + 1] = not state
-    return FootContacts(named, times, down)
+    return FootContacts(named, times, down, loads.by_motion)
 
 
 def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] | None:

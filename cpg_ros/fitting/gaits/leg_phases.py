@@ -440,11 +440,13 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
     """
     if set(match.alike) != {'walk', 'run'}:
         return match
-    gait, why = (None, '') if contacts is None else (
-        contacts.gait, f'by the loads on the feet: {contacts}')
-    if gait is None and falling is not None:
-        gait = 'walk' if falling <= NEVER else 'run' if falling >= OFTEN else None
-        why = (f'by the height of the body, which falls freely in {falling:.0%} of the stride')
+    evidence = [] if contacts is None else [(contacts.gait, f'by {contacts.source}: {contacts}')]
+    if falling is not None:
+        # Before what is only estimated of the feet, after what was measured of them.
+        evidence.insert(0 if contacts is None or contacts.by_motion else 1, (
+            'walk' if falling <= NEVER else 'run' if falling >= OFTEN else None,
+            f'by the height of the body, which falls freely in {falling:.0%} of the stride'))
+    gait, why = next(((name, words) for name, words in evidence if name), (None, ''))
     if gait is None:
         return match
     # The other one was a rival with even odds.

@@ -63,6 +63,10 @@ class FootLoadsLike(Protocol):
     def loads(self) -> np.ndarray:
         """In any unit, shape (n, legs)."""
 
+    @property
+    def by_motion(self) -> bool:
+        """Whether contacts are estimated from the motion of the feet."""
+
 
 #: FASTEST: largest stride frequency that is searched for, Hz.
 FASTEST = 12.5

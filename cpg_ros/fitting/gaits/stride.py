@@ -327,10 +327,10 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     contacts = None if loads is None else foot_contacts(
         loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
     leads = None if contacts is None else contacts.leads(warp, tuple(own))
-    if leads is not None:
+    if contacts is not None and leads is not None:
         # Joints of legs that are built alike move alike, others need not.
         ahead, vague = leads, ()
-        by_legs = (*by_legs, "the legs' phases are those of touchdown, by the loads on the feet")
+        by_legs = (*by_legs, f"the legs' phases are those of touchdown, by {contacts.source}")
     gait, mean = match_gait(ahead, kind), average.mean(theta)
     issues = [*check_rhythm(warp.frequency, phases, x, average.coefficients),
               *check_angles(names, mean), *check_legs(vague),

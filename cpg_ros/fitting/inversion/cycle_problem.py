@@ -132,6 +132,8 @@ class CycleProblem:
         #: Whether a joint is the first, second, ... of its leg, (joints,).
         self.kinds = np.array([np.count_nonzero(leading[:j] == lead)
                                for j, lead in enumerate(leading)])
+        #: Whether the feet bore loads, which move joints off what the network does.
+        self.loaded = False
         self._orbits = orbits or Orbits()
         self._placed: tuple[bytes, ReadoutFit] | None = None
 

@@ -150,7 +150,7 @@ class ModelError(ShortRepr):
 
     Attributes:
         size: RMS of the waveforms' errors, each harmonic over half the waveform's range; 0 where
-            noise explains the residual.
+            noise explains the residual, infinite if it is not known.
         errors: standard deviation of each number by these, shape (n,).
         quantile: half the width of a 95 % interval, in these.
 
@@ -159,6 +159,11 @@ class ModelError(ShortRepr):
     size: float
     errors: np.ndarray
     quantile: float
+
+    @classmethod
+    def unknown(cls, count: int) -> 'ModelError':
+        """Return errors of any size, for this many numbers."""
+        return cls(np.inf, np.full(count, np.inf), QUANTILE)
 
 
 def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndarray,
@@ -308,7 +313,7 @@ class Fit(ShortRepr):
         misfit: joint -> what the readout leaves, over the stated standard error of the mean.
         sharing: instants that share one independent error.
         model_error: RMS of the waveforms' errors that explain the residual, each harmonic over
-            half the waveform's range; 0 where noise explains it.
+            half the waveform's range; 0 where noise explains it, infinite if it is not known.
         starts: what came of every start.
         warnings: one line each.
 

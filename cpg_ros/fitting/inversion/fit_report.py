@@ -293,7 +293,8 @@ def _judged(result: RecordingFit) -> list[str]:
 
 def _shares(result: RecordingFit) -> str:
     return 'Mean RMS error over range by order of the readout: ' + ', '.join(
-        f'{order}: {100 * fraction:.2f} %' for order, fraction in result.fractions.items()) + '.'
+        f'{order}: {100 * fraction:.2f} %'
+        for order, fraction in result.fit.fractions.items()) + '.'
 
 
 def as_text(result: RecordingFit) -> str:
@@ -356,7 +357,8 @@ def _strides(result: RecordingFit) -> list[str]:
     parts = ['<h2>Gait</h2>', _html_table(stride_report.gait_summary(result, legs)),
              _image(stride_curves(result), 'Angles over the stride'),
              _html_table(stride_report.ranges(result)),
-             '<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
+             '<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(
+                 legs, result.stride.contacts)),
              _html_table(stride_report.by_leg(legs))]
     if len(pairs := stride_report.symmetry(legs)) > 1:
         parts += ['<p>Symmetry index, 0 where both sides are alike:</p>', _html_table(pairs)]

@@ -91,9 +91,11 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
         clauses = [f'the intervals of {_listed(bounded)} include that'] if bounded else []
         if unknown:
             clauses.append(f'{_listed(unknown)}: cannot tell')
-        lines.append(
+        lines.append((
             f'the model is not what was recorded: it leaves {times:.3g} times the noise, as '
-            f'waveforms that are off by {100.0 * model.size:.2g} % would; {"; ".join(clauses)}')
+            f'waveforms that are off by {100.0 * model.size:.2g} % would; '
+            if np.isfinite(model.size) else 'feet bore loads: how far joints gave way to them '
+            "counts as the network's motion, and is not known; ") + '; '.join(clauses))
     for row in spread.blind:
         blind = [estimate.name for estimate,
                  fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]
@@ -162,7 +164,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
            bounds: Mapping[str, tuple[float, float]] | None = None,
            time_scale: float = 0.0, orbits: Orbits | None = None,
-           straight: bool = False,
+           straight: bool = False, loaded: bool = False,
            done: Callable[[float], None] = lambda fraction: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
 
@@ -182,6 +184,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             as the generator's frequency does.
         orbits: of earlier fits of the same parameters, gait and readout.
         straight: whether intervals are quadratic however wide they are, which is quicker.
+        loaded: whether the feet bore loads to which joints gave way: the model is then off by
+            nobody knows how much, and no parameter has an interval within its bounds.
         done: called with the fraction of the work that is done, 0 to 1.
 
     Raises:
@@ -193,6 +197,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     numbers = _numbers(network, gait, free or network.free, bounds)
     problem = _problem(cycle, joints_of(cycle, cells, network), network, gait, numbers, order,
                        readout or GaitReadout.of(type(network), gait), time_scale, orbits)
+    problem.loaded = loaded
     trials = _trials(problem, starts, done)
     best = min(trials, key=lambda trial: trial.cost)
     values = _weighed(problem, best.values)
@@ -415,7 +420,8 @@ def _estimates(problem: CycleProblem, values: np.ndarray, straight: bool
     left, slopes = problem(values)
     uncertainty = spread(slopes, correlation_length(
         problem.best_readouts(values).residual / problem.sizes))
-    model = model_error(left, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
+    model = ModelError.unknown(values.size) if problem.loaded else model_error(
+        left, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
     return estimates(problem, values, uncertainty, model, straight), uncertainty, model
 
 
@@ -440,18 +446,23 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
     for k, (name, one) in enumerate(estimated.items()):
         ends = [one.low, one.high]
         for side, half in ((0, one.low - one.value), (1, one.high - one.value)):
+            beyond = False
             with suppress(NoOrbit):
                 for times in BEYOND if one.bounded else ():
                     there = problem.coordinates.moved(
                         values, times * half * uncertainty.covariance[:, k]
                         / uncertainty.covariance[k, k])
-                    if not fits(there):
+                    good = fits(there)
+                    # The end lies before the first value that fits worse.
+                    if good or beyond:
+                        ends[side] = float(there[k])
+                    if not good:
                         break
-                    ends[side] = float(there[k])
+                    beyond = True
         if ends != [one.low, one.high]:
-            lines.append(f'{name} from {ends[0]:.4g} to {ends[1]:.4g} fits as well if joints of a '
-                         'leg lag one another: the interval is that of joints which move with '
-                         "their cells, as the generator's do")
+            lines.append(f'{name} may be from {ends[0]:.4g} to {ends[1]:.4g} if joints of a leg '
+                         'lag one another: the interval is that of joints which move with their '
+                         "cells, as the generator's do")
     return lines
 
 

@@ -65,16 +65,6 @@ class CycleFit(ShortRepr):
     errors: np.ndarray
     trial: Minimisation
 
-    @property
-    def evaluations(self) -> int:
-        """Number of orbits that were solved for."""
-        return self.trial.evaluations
-
-    @property
-    def converged(self) -> bool:
-        """Whether a tolerance was met, not only the limit of evaluations."""
-        return self.trial.converged
-
 
 def cycle_samples(orbit: Orbit, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample an orbit's cells over the cycle, with derivatives by the network's parameters.

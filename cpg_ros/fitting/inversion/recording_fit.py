@@ -73,7 +73,7 @@ def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, floa
 def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
                        free: Sequence[str] = (), order: int = 3,
                        starts: Sequence[Mapping[str, float]] = (),
-                       readout: GaitReadout | None = None,
+                       readout: GaitReadout | None = None, loaded: bool = False,
                        done: Callable[[float], None] = lambda fraction: None
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit these parameters at this order, or the nearest fit that the generator runs.
@@ -102,7 +102,8 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
             return _as_it_is(cycle, cells, network, gait, lower, readout, done)
         same = tuple(name for name in names if name != GAIT_DUTY)
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
-                      orbits=orbits.setdefault(same, Orbits()), straight=straight, done=done)
+                      orbits=orbits.setdefault(same, Orbits()), straight=straight,
+                      loaded=loaded, done=done)
 
     for names, lower, begins, relaxation in _ways(free_names, order, starts):
         notes: tuple[str, ...] = ()
@@ -143,8 +144,8 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
     if rise > 0.5 * ASKED**2 * other.sharing:
         return fitted((*names, GAIT_DUTY), order, minima), ()
-    error = other.parameters[GAIT_DUTY].stderr
-    return own, () if error < KNOWN else (
+    known = other.parameters[GAIT_DUTY].stderr < KNOWN or np.isinf(other.model_error)
+    return own, () if known else (
         'the recording does not tell how long legs stand: they are taken to stand as the cells of '
         'the network do, and the intervals hold for that alone',)
 
@@ -178,7 +179,6 @@ class RecordingFit(ShortRepr):
         legs: leg -> its joints.
         stride: its steady gait.
         fit: the network's gait fitted to that.
-        fractions: order of the readout -> mean over the joints of RMS error over range.
         warnings: one line each.
 
     """
@@ -188,7 +188,6 @@ class RecordingFit(ShortRepr):
     legs: Mapping[str, Sequence[str]]
     stride: Stride
     fit: Fit
-    fractions: dict[int, float]
     warnings: tuple[str, ...]
 
     def _summary(self) -> str:
@@ -224,7 +223,7 @@ class RecordingFit(ShortRepr):
                                   'low': estimate.low, 'high': estimate.high}
                            for name, estimate in fit.parameters.items()},
             'order': fit.order, 'rms_share': fit.mean_rms_share,
-            'rms_share_by_order': {str(order): value for order, value in self.fractions.items()},
+            'rms_share_by_order': {str(order): value for order, value in fit.fractions.items()},
             'joints': {name: {'rms': rms[name], 'rms_share': fraction[name],
                               'cell': fit.cells[name]}
                        for name in fit.joints},
@@ -423,18 +422,16 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if (stride.gait or kind.unnamed) != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
-    if stride.contacts is not None:
-        warnings.append('feet bore loads: what servos, the ground and feedback changed of the '
-                        "joints' motion counts as the network's, which intervals do not know")
     fit, fallbacks = fit_with_fallbacks(
         stride, cells, _parameters(kind, gait, preset, stride), gait, free, order, starts,
-        GaitReadout.of(kind, gait, preset, robot), done)
+        GaitReadout.of(kind, gait, preset, robot),
+        stride.contacts is not None and not recording.commanded, done)
     fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
     if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
         read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
                  'which, and parameters and intervals hold for that alone')
-    result = RecordingFit(recording, read, legs, stride, fit, fit.fractions,
-                         (*warnings, *fallbacks, *fit.warnings))
+    result = RecordingFit(recording, read, legs, stride, fit,
+                          (*warnings, *fallbacks, *fit.warnings))
     return result if not result.poor else replace(result, warnings=(
         f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "
         f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',

@@ -30,8 +30,10 @@ import io
 from itertools import pairwise
 
 from cpg_ros.common.errors import ShortRepr
+from cpg_ros.fitting.gaits.foot_contacts import FootContacts
 from cpg_ros.fitting.gaits.leg_names import role_of
 from cpg_ros.fitting.gaits.mean_cycle import evaluate_coefficients
+from cpg_ros.fitting.gaits.quality_checks import TRAVELS
 from cpg_ros.fitting.gaits.steady_stretch import RecordingLike
 from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.recording_fit import RecordingFit
@@ -269,7 +271,7 @@ def by_leg(legs: list[LegStrides]) -> Rows:
         scatter = (f'{leg.periods.std(ddof=1) / leg.periods.mean():.1%}'
                    if len(leg.periods) >= FEWEST else f'fewer than {FEWEST}')
         rows.append((leg.leg, str(len(leg.begins)), *cells, scatter, f'{leg.range:.3f}',
-                     'foot loads' if leg.by_contacts else leg.joint))
+                     'contacts' if leg.by_contacts else leg.joint))
     return rows
 
 
@@ -292,14 +294,28 @@ def gait_summary(result: RecordingFit, legs: list[LegStrides]) -> Rows:
         else:
             rows.append((f'retraction of {leg.leg} [% of stride]', 'cannot tell'))
     if contacts is None:
-        rows.append(('stance, swing, double support', 'not known without loads on the feet'))
+        rows.append(('stance, swing, double support', 'not known without contacts of the feet'))
     elif len(legs) == 2:
         rows.append(('double support [% of stride]',
                      f'{100.0 * float(contacts.down.all(axis=1).mean()):.1f}'))
     if contacts is not None:
         rows.append(('flight [% of stride]', f'{100.0 * contacts.flight:.1f}'))
-    rows.append(('stride length', 'not known: joint angles do not tell how far the body travels'))
+    rows += _travel(result)
     return rows
+
+
+def _travel(result: RecordingFit) -> Rows:
+    """Return the rows of stride length and speed, by the way of the body over the stretch."""
+    recording, stride = result.recording, result.stride
+    if recording.body is None or recording.cycle:
+        return [('stride length', 'not known: joint angles do not tell how far the body travels')]
+    inside = (recording.times >= stride.begin) & (recording.times <= stride.end)
+    first, *_, last = recording.body[inside, :2]
+    length = float(np.linalg.norm(last - first)) / stride.warp.cycles
+    if length < TRAVELS:
+        return [('stride length', 'not known: the body stays where it is, as on a treadmill')]
+    return [('stride length [m]', f'{length:.3f}'),
+            ('speed [m/s]', f'{length * stride.frequency:.3f}')]
 
 
 def ranges(result: RecordingFit) -> Rows:
@@ -359,14 +375,14 @@ def symmetry(legs: list[LegStrides]) -> Rows:
     return rows
 
 
-def notes(legs: list[LegStrides]) -> list[str]:
+def notes(legs: list[LegStrides], contacts: FootContacts | None = None) -> list[str]:
     """Return the basis of the strokes, one line each."""
     by_angles = [strides.leg for strides in legs if not strides.why and not strides.by_contacts]
     lines = [f'{strides.leg}: cannot tell retraction from protraction: {strides.why}'
              for strides in legs if strides.why]
-    if legs[0].by_contacts:
-        lines.insert(0, 'stance and swing are those of the loads on the feet: strides begin with '
-                     'a touchdown')
+    if contacts is not None and legs[0].by_contacts:
+        lines.insert(0, f'stance and swing are those of {contacts.source}: strides begin with a '
+                     'touchdown')
     if by_angles:
         lines.insert(0, f'{", ".join(by_angles)}: a leg is retracted from the foremost to the '
                      'hindmost angle of the joint named, and then protracted; contacts are not '

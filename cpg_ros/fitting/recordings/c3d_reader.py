@@ -26,23 +26,23 @@ from typing import Any
 from cpg_ros.common import files
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.markers import (
-    body_of,
+    contacts,
+    Footfall,
     joint_recording,
     load_segments,
     marker_names,
     Markers,
     SEGMENTS,
+    travelling,
     UNITS,
 )
 from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLES,
-    FootLoads,
     JOINTS,
     matching,
     Recording,
-    recording_of,
     RecordingError,
     RecordingFormat,
     unwrapped,
@@ -77,7 +77,7 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
     markers, angles, unit, events = _contents(Path(path))
     recording = (_modelled(markers, angles, unit, joints) if segments is None and angles else
                  joint_recording(markers, segments, joints))
-    if (loads := contacts(events, recording.start, recording.times)) is None:
+    if (loads := contacts(footfalls(events), recording.start, recording.times)) is None:
         return recording
     return replace(recording, loads=loads, notes=(*recording.notes, 'which foot is on the ground '
                                                   "is taken from the file's events"))
@@ -112,45 +112,24 @@ def c3d_arrays(path: str) -> dict[str, Any]:
 STRIKE, OFF = ('foot strike', 'heel strike', 'hs'), ('foot off', 'toe off', 'to')
 
 
-def contacts(events: Mapping[str, Any], start: float, times: np.ndarray) -> FootLoads | None:
-    """Return which foot is on the ground, between the first and the last event of each side.
+def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
+    """Return when the feet land and leave the ground by a file's events.
 
     Args:
         events: LABELS, CONTEXTS (Left, Right) and TIMES (s) of the parameters EVENT; a label
             may have the side as its first letter, LHS.
-        start: of the recording, s.
-        times: of the recording, s, shape (n,).
-
-    Returns:
-        1 on the ground and 0 in the air; None unless both feet are in both where both are known.
 
     """
-    known: dict[str, list[tuple[float, bool]]] = {'left': [], 'right': []}
+    found = []
     labels = events.get('LABELS', ())
     sides = [*events.get('CONTEXTS', ()), *[''] * len(labels)]
     for label, side, time in zip(labels, sides, events.get('TIMES', ()), strict=False):
-        name = ' '.join(label.lower().split())
-        if side.lower() not in known:
-            side, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
-        if side.lower() in known and name in STRIKE + OFF:
-            known[side.lower()].append((time - start, name in STRIKE))
-    if not all(len({down for _, down in own}) == 2 for own in known.values()):
-        return None
-    begin, end = (most([one([time for time, _ in own]) for own in known.values()])
-                  for most, one in ((max, min), (min, max)))
-    # Whole strides where there are any, so that fractions of the time are those of a stride.
-    landed = [[time for time, down in own if down and begin <= time <= end]
-              for own in known.values()]
-    begin, end = max(((own[0], own[-1]) for own in map(sorted, landed) if len(own) > 1),
-                     key=lambda one: one[1] - one[0], default=(begin, end))
-    times = times[(times >= begin) & (times <= end)]
-    rows = []
-    for own in known.values():
-        when, down = zip(*sorted(own), strict=True)
-        rows.append(np.array(down, float)[np.searchsorted(when, times, side='right') - 1])
-    if not len(times) or min(map(np.ptp, rows)) == 0.0:
-        return None
-    return FootLoads(tuple(known), times, np.column_stack(rows))
+        leg, name = side.lower(), ' '.join(label.lower().split())
+        if leg not in ('left', 'right'):
+            leg, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
+        if leg and name in STRIKE + OFF:
+            found.append((leg, time, name in STRIKE))
+    return found
 
 
 def c3d_markers(path: str | Path) -> Markers:
@@ -227,10 +206,9 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
         notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
     if silent:
         notes.append(f'without a value, left out: {abbreviate(silent)}')
-    return recording_of(source, points.stamps, [names[k] for k in indices],
-                        unwrapped(first[:, indices]), notes, body=body_of(
-                            load_segments('human_plug_in_gait').named_as(points.names),
-                            points, points.points))
+    return travelling(source, [names[k] for k in indices], unwrapped(first[:, indices]), notes,
+                      load_segments('human_plug_in_gait').named_as(points.names), points,
+                      points.points)
 
 
 def _stated(path: Path) -> int:

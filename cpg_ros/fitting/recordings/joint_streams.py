@@ -375,7 +375,8 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         notes += stream.notes(headers)
     chunks = (chunk for stream in read for chunk in stream.chunks(headers))
     recording = merged(chunks, whole, joints)
-    return replace(recording, notes=(*notes, *recording.notes))
+    return replace(recording, notes=(*notes, *recording.notes),
+                   commanded=any(stream.servo for stream in read))
 
 
 # Joint states as they arrive, kept as bytes until a recording is requested.

@@ -21,6 +21,7 @@ laboratory's axes stand.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -30,6 +31,7 @@ from cpg_ros.common.files import resource_folder
 from cpg_ros.common.yaml_reader import within, YamlReader
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    FootLoads,
     matching,
     Option,
     Recording,
@@ -91,7 +93,7 @@ class Segments:
         least_likelihood: below it, a marker is not seen.
         alternatives: marker -> other names for it, or for what may stand in its place.
         body: markers whose mean is the place of the body.
-        feet: markers below it.
+        feet: leg -> markers of its foot, from the heel to the toe.
 
     """
 
@@ -100,7 +102,7 @@ class Segments:
     least_likelihood: Annotated[float, within(0.0, 1.0)] = LIKELY
     alternatives: dict[str, tuple[str, ...]] = field(default_factory=dict)
     body: tuple[str, ...] = ()
-    feet: tuple[str, ...] = ()
+    feet: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def named_as(self, there: Sequence[str]) -> 'Segments':
         """Return the same with those alternatives for markers that are there."""
@@ -112,7 +114,8 @@ class Segments:
 
         return replace(self, segments={name: Segment(ends(marker.begin), ends(marker.end))
                                        for name, marker in self.segments.items()},
-                       body=ends(self.body), feet=ends(self.feet))
+                       body=ends(self.body),
+                       feet={leg: ends(names) for leg, names in self.feet.items()})
 
     def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
         """Return the markers that a joint's angle is made of, each once.
@@ -167,8 +170,9 @@ def load_segments(name: str | Path) -> Segments:
           knee: {between: [thigh, shank], axis: leftward, neutral: 0.0}
         alternatives:               # optional: other names for a marker, the first that is there
           hip: [greater_trochanter]
-        body: [pelvis_left, pelvis_right]   # optional: what carries the legs, and what is below
-        feet: [toe]                         # it, which tells where up is
+        body: [pelvis_left, pelvis_right]   # optional: what carries the legs, and the feet, from
+        feet: {left: [heel, toe]}           # the heel on, which tell where up is and when legs
+                                            # stand
 
     In three dimensions, a joint with an axis is the angle that its two segments have as seen along
     the axis, positive by the right hand; one without is the angle between them, which is never
@@ -352,22 +356,124 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
     if silent:
         notes.append(f'never seen, left out: {abbreviate(silent)}{lacking}')
     kept = [name for name in angles if name not in silent]
-    return recording_of(source, markers.stamps, kept,
-                        np.column_stack([angles[name] for name in kept]), notes,
-                        body=body_of(segments, markers, points))
+    return travelling(source, kept, np.column_stack([angles[name] for name in kept]), notes,
+                      segments, markers, points)
 
 
-def body_of(segments: Segments, markers: Markers, points: np.ndarray) -> np.ndarray | None:
-    """Return where the body is, m, shape (n, 3), the last axis from the feet upward."""
-    body, feet = ([markers.names.index(name) for name in names if name in markers.names]
-                  for names in (segments.body, segments.feet))
-    if points.shape[2] < 3 or not body or not feet or math.isnan(markers.unit):
-        return None
-    place = markers.unit * points[:, body].mean(axis=1)
-    below = np.nanmean(points[:, body][:, :, None] - points[:, feet][:, None], axis=(0, 1, 2)
-                       ) if np.isfinite(points[:, feet]).any() else np.zeros(3)
+def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: Sequence[str],
+               segments: Segments, markers: Markers, points: np.ndarray) -> Recording:
+    """Return the recording of angles with the place of the body, and which foot stands when.
+
+    Args:
+        source: the file.
+        joints: their names.
+        angles: rad, shape (n, joints).
+        notes: to begin with.
+        segments: body and feet, as their markers are called in the file.
+        markers: of the file.
+        points: of the markers, nan where not seen, shape (n, markers, 2 or 3).
+
+    """
+    there = set(markers.names)
+    body = [markers.names.index(name) for name in segments.body if name in there]
+    feet = {leg: [markers.names.index(name) for name in names]
+            for leg, names in segments.feet.items() if set(names) <= there}
+    solid = points.shape[2] == 3 and body and feet
+    below = points[:, body].mean(axis=1, keepdims=True) - points[:, [
+        marker for own in feet.values() for marker in own]] if solid else np.empty(0)
+    if not np.isfinite(below).any():
+        return recording_of(source, markers.stamps, joints, angles, notes)
+    below = np.nanmean(below, axis=(0, 1))
     up = int(np.argmax(np.abs(below)))
-    return np.sign(below[up]) * np.roll(place, 2 - up, axis=1)
+    # The last axis from the feet upward.
+    points = np.sign(below[up]) * np.roll(points, 2 - up, axis=2)
+    place = points[:, body].mean(axis=1)
+    recording = recording_of(
+        source, markers.stamps, joints, angles, notes,
+        body=None if math.isnan(markers.unit) else markers.unit * place)
+    loads = contacts(footfalls(1e-9 * markers.stamps, place, {
+        leg: points[:, own] for leg, own in feet.items()}), recording.start, recording.times)
+    return recording if loads is None else replace(recording,
+                                                   loads=replace(loads, by_motion=True))
+
+
+#: STEP: least range of a foot's way forward and back that counts, over the usual one.
+STEP = 0.5
+#: Leg, time, s, and whether its foot lands or leaves the ground then.
+Footfall = tuple[str, float, bool]
+
+
+def footfalls(times: np.ndarray, body: np.ndarray, feet: Mapping[str, np.ndarray]
+              ) -> list[Footfall]:
+    """Estimate when feet land and leave the ground, from their motion against the body.
+
+    A heel lands when it is foremost, a toe leaves the ground when it is hindmost (Zeni, Richards
+    & Higginson 2008, Gait & Posture 27, 710-714). Forward is where the toes are before the heels.
+
+    Args:
+        times: s, shape (n,).
+        body: where it is, shape (n, 3), the last axis upward.
+        feet: leg -> places of the markers of its foot, from the heel to the toe, (n, markers, 3).
+
+    Returns:
+        Nothing where a foot does not land and leave in turn.
+
+    """
+    from scipy.signal import find_peaks
+
+    forward = np.mean([foot[:, -1] - foot[:, 0] for foot in feet.values()], axis=0)[:, :2]
+    forward /= np.linalg.norm(forward, axis=1, keepdims=True)
+    events: list[Footfall] = []
+    for leg, foot in feet.items():
+        own = []
+        for marker, down in ((0, True), (-1, False)):
+            along = np.sum((foot[:, marker] - body)[:, :2] * forward, axis=1)
+            along *= 1.0 if down else -1.0
+            seen = np.isfinite(along)
+            if not seen.any():
+                return []
+            least = STEP * np.ptp(np.percentile(along[seen], (5.0, 95.0)))
+            own += [(time, down) for time in
+                    times[seen][find_peaks(along[seen], prominence=least)[0]].tolist()]
+        states = [down for _, down in sorted(own)]
+        if any(one == after for one, after in pairwise(states)):
+            return []
+        events += [(leg, time, down) for time, down in own]
+    return events
+
+
+def contacts(events: Sequence[Footfall], start: float, times: np.ndarray) -> FootLoads | None:
+    """Return which foot is on the ground, between the first and the last event of each leg.
+
+    Args:
+        events: of two legs or more.
+        start: of the recording, s.
+        times: of the recording, s, shape (n,).
+
+    Returns:
+        1 on the ground and 0 in the air; None unless all feet are in both where all are known.
+
+    """
+    known: dict[str, list[tuple[float, bool]]] = {}
+    for leg, time, down in sorted(events):
+        known.setdefault(leg, []).append((time - start, down))
+    if len(known) < 2 or not all(len({down for _, down in own}) == 2 for own in known.values()):
+        return None
+    begin, end = (most([one([time for time, _ in own]) for own in known.values()])
+                  for most, one in ((max, min), (min, max)))
+    # Whole strides where there are any, so that fractions of the time are those of a stride.
+    landed = [[time for time, down in own if down and begin <= time <= end]
+              for own in known.values()]
+    begin, end = max(((own[0], own[-1]) for own in landed if len(own) > 1),
+                     key=lambda one: one[1] - one[0], default=(begin, end))
+    times = times[(times >= begin) & (times <= end)]
+    rows = []
+    for own in known.values():
+        when, state = np.array(own, float).T
+        rows.append(state[np.searchsorted(when, times, side='right') - 1])
+    if not len(times) or min(map(np.ptp, rows)) == 0.0:
+        return None
+    return FootLoads(tuple(known), times, np.column_stack(rows))
 
 
 def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:

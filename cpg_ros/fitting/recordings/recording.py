@@ -45,12 +45,14 @@ class FootLoads(ShortRepr):
         legs: their names, or those of columns that name them, such as FR_force.
         times: s from the recording's start, rising, shape (n,).
         loads: in the robot's unit, such as N, or 1 for contact; shape (n, legs).
+        by_motion: whether contacts are estimated from the motion of the feet.
 
     """
 
     legs: tuple[str, ...]
     times: np.ndarray
     loads: np.ndarray
+    by_motion: bool = False
 
     def _summary(self) -> str:
         return f'{len(self.times)} loads on {", ".join(self.legs)}'
@@ -90,6 +92,7 @@ class Recording(ShortRepr):
         cycle: duration of a stride, s, of which the recording is copies; nan where its times are
             fractions of one stride of unknown duration; 0 for all other recordings.
         body: where the body was, m, the last axis upward, shape (n, 3), where that was recorded.
+        commanded: whether the positions are those that servos were driven to, not what they did.
 
     Raises:
         RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
@@ -106,6 +109,7 @@ class Recording(ShortRepr):
     loads: FootLoads | None = None
     cycle: float = 0.0
     body: np.ndarray | None = None
+    commanded: bool = False
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '
@@ -280,40 +284,16 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
         raise RecordingError(f'{source}: no samples')
     require(joints, names, source)
     wanted_names = tuple(joints) or tuple(names)
-    notes: list[str] = []
-    read_streams = []
-    for group in list(groups):
-        columns = [k for k, name in enumerate(group) if name in wanted_names]
-        if columns:
-            samples = groups.pop(group)
-            stamps, positions = samples.taken()
-            notes += [samples.note] if samples.note else []
-            read_streams.append((stamps, [wanted_names.index(group[k]) for k in columns],
-                          positions[:, columns] if len(columns) < len(group) else positions))
-    read_streams, astray = drop_outlier_stamps(read_streams)
+    parts, notes = _parts(groups, wanted_names)
+    parts, astray = drop_outlier_stamps(parts)
     notes += astray
-    origin = min(int(stamps.min()) for stamps, _, _ in read_streams)
-    ordered = []
-    late = again = received = 0
-    for stamps, columns, positions in read_streams:
-        received += len(stamps)
-        # Duplicates are found in float64, where two stamps can be one a week into a recording.
-        times = (stamps - origin) / 1e9
-        steps = np.diff(times)
-        if (steps < 0.0).any():
-            late += int((times < np.maximum.accumulate(times)).sum())
-            order = np.argsort(times, kind='stable')
-            times, positions = times[order], positions[order]
-            steps = np.diff(times)
-        if (steps == 0.0).any():
-            fresh = np.append(True, steps > 0.0)
-            again += int((~fresh).sum())
-            times, positions = times[fresh], positions[fresh]
-        ordered.append((times, columns, positions))
-    del read_streams
-    far = drop_outlier_positions(ordered, len(wanted_names))
-    times, positions, odd, twice = _one_table(ordered, len(wanted_names))
-    del ordered
+    origin = min(int(stamps.min()) for stamps, _, _ in parts)
+    received = sum(len(stamps) for stamps, _, _ in parts)
+    # What is no longer needed goes at once: a long recording is large.
+    parts, late, again = _in_order(parts, origin)
+    far = drop_outlier_positions(parts, len(wanted_names))
+    times, positions, odd, twice = _one_table(parts, len(wanted_names))
+    del parts
     if late:
         notes.append(f'{pluralize(late, "sample")} out of order, sorted by stamp')
     if again + twice:
@@ -362,6 +342,46 @@ def _groups(chunks: Iterable[Chunk], source: str
             require(names, names, source)
         groups.setdefault(tuple(names), Thinned()).add(stamps.astype(np.int64), positions)
     return groups
+
+
+def _parts(groups: dict[tuple[str, ...], Thinned], wanted: tuple[str, ...]
+           ) -> tuple[list[Part], list[str]]:
+    """Take the wanted joints' samples out of groups; return them, and notes on their thinning."""
+    parts, notes = [], []
+    for group in list(groups):
+        columns = [k for k, name in enumerate(group) if name in wanted]
+        if columns:
+            samples = groups.pop(group)
+            stamps, positions = samples.taken()
+            notes += [samples.note] if samples.note else []
+            parts.append((stamps, [wanted.index(group[k]) for k in columns],
+                          positions[:, columns] if len(columns) < len(group) else positions))
+    return parts, notes
+
+
+def _in_order(parts: list[Part], origin: int) -> tuple[list[Part], int, int]:
+    """Sort samples by time, s from an origin in ns, of equal times the first only.
+
+    Returns:
+        The samples, how many came late, and how many were duplicates.
+
+    """
+    ordered, late, again = [], 0, 0
+    for stamps, columns, positions in parts:
+        # Duplicates are found in float64, where two stamps can be one a week into a recording.
+        times = (stamps - origin) / 1e9
+        steps = np.diff(times)
+        if (steps < 0.0).any():
+            late += int((times < np.maximum.accumulate(times)).sum())
+            order = np.argsort(times, kind='stable')
+            times, positions = times[order], positions[order]
+            steps = np.diff(times)
+        if (steps == 0.0).any():
+            fresh = np.append(True, steps > 0.0)
+            again += int((~fresh).sum())
+            times, positions = times[fresh], positions[fresh]
+        ordered.append((times, columns, positions))
+    return ordered, late, again
 
 
 def _one_table(parts: list[Part], width: int
@@ -489,8 +509,8 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
     loads = recording.loads
     if loads is not None:
         held = loads.times < own
-        loads = FootLoads(loads.legs, scale * (starts + loads.times[held]).ravel(),
-                          np.tile(loads.loads[held], (COPIES, 1)))
+        loads = replace(loads, times=scale * (starts + loads.times[held]).ravel(),
+                        loads=np.tile(loads.loads[held], (COPIES, 1)))
     return replace(
         recording, times=scale * (starts + recording.times[:count]).ravel(), loads=loads,
         positions=np.tile(recording.positions[:count], (COPIES, 1)), cycle=scale * own,

@@ -20,6 +20,7 @@ from cpg_ros.fitting.gaits.foot_contacts import foot_contacts
 from cpg_ros.fitting.gaits.stride import find_stride
 from cpg_ros.fitting.inversion.stride_report import leg_strides
 from cpg_ros.fitting.recordings.csv_reader import read_csv
+from cpg_ros.fitting.recordings.recording import FootLoads
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 import pytest
@@ -44,7 +45,7 @@ def recorded(duty, seed=0, rate=100.0, bounce=False):
         loads.append(20.0 + load * (1.0 + 0.05 * rng.normal(size=at.size)))
     x = np.array(angles).T + 0.003 * rng.normal(size=(times.size, 4))
     return (SimpleNamespace(joints=sum(LEGS.values(), ()), times=times, positions=x, source='it'),
-            SimpleNamespace(legs=('left', 'right'), times=at, loads=np.array(loads).T))
+            FootLoads(('left', 'right'), at, np.array(loads).T))
 
 
 @pytest.mark.parametrize('bounce', [False, True])
@@ -109,7 +110,7 @@ def test_feet_that_are_never_lifted_stand_and_few_samples_tell_nothing():
     loads.loads[:] = 250.0 + 30.0 * np.sin(loads.times)[:, None]
     stood = foot_contacts(loads, LEGS, 1.0, 9.0, PERIOD)
     assert stood.duty == {'left': 1.0, 'right': 1.0} and stood.flight == 0.0
-    seldom = SimpleNamespace(legs=loads.legs, times=loads.times[::10], loads=loads.loads[::10])
+    seldom = FootLoads(loads.legs, loads.times[::10], loads.loads[::10])
     assert foot_contacts(seldom, LEGS, 1.0, 9.0, PERIOD) is None
 
 
@@ -135,5 +136,5 @@ def test_columns_of_a_table_tell_walk_from_run(tmp_path, duty, gait):
 def test_feet_of_other_legs_tell_nothing():
     _, loads = recorded(0.6)
     for names in (('left_force', 'torso_force'), ('left_force', 'left_contact'), ('one', 'two')):
-        other = SimpleNamespace(legs=names, times=loads.times, loads=loads.loads)
+        other = FootLoads(names, loads.times, loads.loads)
         assert foot_contacts(other, LEGS, 1.0, 9.0, PERIOD) is None

@@ -17,6 +17,7 @@
 from cpg_ros.fitting.gaits.stride import NoSteadyGait
 from cpg_ros.fitting.inversion.gait_schedule import cut
 from cpg_ros.fitting.inversion.recording_fit import fit_recording, leg_joints, stride_of
+from cpg_ros.fitting.inversion.stride_report import gait_summary, strides_of
 from cpg_ros.fitting.recordings.formats import read_recording
 from cpg_ros.networks.library.biped import Biped
 import numpy as np
@@ -190,3 +191,61 @@ def test_a_refusal_says_what_is_needed(tmp_path):
     path.write_text('\n'.join([*lines[:50], *lines[90:]]) + '\n')
     with pytest.raises(NoSteadyGait, match='1 dropout, about 40 samples'):
         stride(path)
+
+
+def walker(path, frequency, speed, duty, unit='mm'):
+    """Write markers of a body on two legs whose feet stand still on the ground, and go forward.
+
+    Heels are foremost where they land, and toes hindmost where they leave the ground. The pelvis
+    stays at its height, which then tells nothing.
+    """
+    t = np.arange(600) / RATE
+    turn = 2.0 * np.pi * frequency * t
+    points = {}
+    for k, side in enumerate('LR'):
+        phase = (frequency * t + 0.5 * k) % 1.0
+        back = speed * duty / frequency
+        swing = np.clip((phase - duty) / (1.0 - duty), 0.0, 1.0)
+        way = np.where(phase < duty, back * (0.5 - phase / duty),
+                       back * (swing - 0.5 - 0.1 * np.sin(2.0 * np.pi * swing)))
+        top = np.column_stack([speed * t, np.full_like(t, 0.1 - 0.2 * k), np.full_like(t, 1.0)])
+        low = np.column_stack([speed * t + way, top[:, 1],
+                               0.1 + 0.05 * np.sin(np.pi * swing)])
+        middle = 0.5 * (top + low) + 0.2 * np.column_stack([
+            1.0 + 0.3 * np.cos(turn + np.pi * k), 0.0 * t, 0.0 * t])
+        ahead = np.array([0.05, 0.0, 0.0])
+        points |= {f'{side}ASI': top + ahead, f'{side}PSI': top - ahead, f'{side}KNE': middle,
+                   f'{side}ANK': low, f'{side}HEE': low - ahead, f'{side}TOE': low + 3.0 * ahead}
+    text = trc(t, np.stack([points[label] for label in LABELS], axis=1))
+    path.write_text(text.replace('\tmm\t', f'\t{unit}\t'))
+    return path
+
+
+@pytest.mark.parametrize(('duty', 'speed', 'name'), [
+    (0.62, 1.3, 'walk'), (0.35, 2.6, 'run'), (0.5, 2.0, 'walk or run: cannot tell')])
+def test_feet_that_are_foremost_land(tmp_path, duty, speed, name):
+    # Without a unit nothing is known of how fast the body falls.
+    recording = read_recording(walker(tmp_path / 'walk.trc', 1.1, speed, duty, 'feet'),
+                               progress=False, segments='human_plug_in_gait')
+    assert recording.body is None and recording.loads.by_motion
+    found = stride_of(recording, leg_joints(recording, None)[0], Biped, None)[1]
+    assert found.verdict == name
+    for leg in ('left', 'right'):
+        assert found.contacts.duty[leg] == pytest.approx(duty, abs=0.03)
+    assert found.phases['right'] == pytest.approx(0.5, abs=0.02)
+    assert any('by the motion of the feet' in note for note in found.notes)
+
+
+def test_a_report_has_stance_and_the_length_of_strides(tmp_path):
+    recording = read_recording(walker(tmp_path / 'walk.trc', 1.1, 1.3, 0.62), progress=False,
+                               segments='human_plug_in_gait')
+    fitted = fit_recording(recording, order=1, free=['current'])
+    rows = dict(gait_summary(fitted, strides_of(fitted)))
+    assert float(rows['stride length [m]']) == pytest.approx(1.3 / 1.1, abs=0.02)
+    assert float(rows['speed [m/s]']) == pytest.approx(1.3, abs=0.02)
+    assert float(rows['stance of left [% of stride]']) == pytest.approx(62.0, abs=3.0)
+    assert float(rows['double support [% of stride]']) == pytest.approx(24.0, abs=4.0)
+    # Feet on the ground bear loads, which the model does not know.
+    assert not any(one.bounded for one in fitted.fit.parameters.values())
+    assert any(line.startswith('feet bore loads') and line.endswith('current: cannot tell')
+               for line in fitted.warnings)

@@ -52,7 +52,7 @@ def test_the_parameters_of_a_network_are_found_again(truth, gait, names, start):
     samples = cycle_samples(solve(truth, gait), THETA)[0]
     fit = fit_cycle(samples, THETA, replace(truth, **start), gait, names)
     assert fit.values == pytest.approx([getattr(truth, name) for name in names], abs=1e-8)
-    assert fit.converged and fit.cost < 1e-15
+    assert fit.trial.converged and fit.cost < 1e-15
     assert fit.orbit.network.as_dict() == pytest.approx(truth.as_dict(), abs=1e-8)
 
 

@@ -94,7 +94,7 @@ def test_rhythm_and_coordination_of_six_legs():
 
 
 def test_the_readout_error_falls_with_the_order():
-    fractions = fitted().fractions
+    fractions = fitted().fit.fractions
     assert fractions[1] > fractions[2] > fractions[3] and fractions[3] < 0.06
 
 

@@ -81,7 +81,7 @@ def test_the_tool_writes_the_table_and_the_page(tmp_path, capsys):
     text = page.read_text()
     assert text.index('cadence [steps/min]') < text.index('<h2>Parameters</h2>')
     assert '>132.0<' in text and '>0.909 +-' in text
-    assert 'not known without loads on the feet' in text
+    assert 'not known without contacts of the feet' in text
     printed = capsys.readouterr().out
     assert printed.index('cadence [steps/min]') < printed.index('parameter')
     assert main([*command, str(tmp_path / 'strides.xls')]) == 2
