@@ -16,8 +16,8 @@
 
 A stride is from touchdown to touchdown; duty is the fraction of it in stance. In a walk a foot is
 on the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal
-Locomotion). A runner's foot is foremost before it lands: contacts that are estimated from its motion begin too
-early, and what they show of flight is less than there is.
+Locomotion). A runner's foot is foremost before it lands: contacts that are estimated from its
+motion begin too early, and what they show of flight is less than there is.
 """
 
 from collections.abc import Callable, Collection, Sequence
