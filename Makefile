@@ -53,6 +53,7 @@ KERNELS := feedback balance networks
 build: install/.built install/.compiled
 
 run: install/.built
+	@echo 'Next, in another terminal: make shell; there: cpg gait walk, cpg topic hz joint_states, panel'
 	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/generator $(ARGS)
 
 demo: install/.built

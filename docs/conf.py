@@ -28,7 +28,10 @@ project_copyright = 'cpg_ros maintainers, Apache-2.0'
 version = release = cpg_ros.__version__
 
 extensions = ['myst_parser', 'sphinx_design', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon',
-              'sphinx.ext.mathjax', 'generated_tables', 'dark_images', 'playground']
+              'generated_tables', 'dark_images', 'mathml', 'playground']
+html_math_renderer = 'mathml'
+# An option such as --help keeps its two hyphens.
+smartquotes = False
 html_theme = 'furo'
 html_static_path = ['static']
 html_css_files = ['site.css']

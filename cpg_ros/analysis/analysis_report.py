@@ -54,16 +54,12 @@ class Commentary:
     """Statements of a paper on the Hopf points of its network; none for other networks.
 
     Attributes:
-        heads: of columns in a table of Hopf points.
-        explained: explanation of these columns.
         title: of the remarks.
-        numbers: of the columns, name -> number.
+        numbers: name -> number, for JSON.
         remark: statement on a point, as text and in plain types.
 
     """
 
-    heads: tuple[str, ...] = ()
-    explained: str = ''
     title: str = ''
     numbers: Callable[[HopfPoint], dict[str, float]] = lambda point: {}
     remark: Callable[[HopfPoint], tuple[str, dict[str, Any]]] = lambda point: ('', {})
@@ -71,8 +67,7 @@ class Commentary:
 
 #: Network -> commentary.
 COMMENTARIES = {
-    'delayed': Commentary(("k1'", "k2'"), "k1', k2' as\nLiu & Zhang print them, which is wrong; ",
-                          numbers=_published_numbers),
+    'delayed': Commentary(numbers=_published_numbers),
     'quadruped': Commentary(title='Buono & Golubitsky at these points:', remark=_theorem)}
 
 
@@ -301,21 +296,20 @@ class Analysis(ShortRepr):
         """Return a table of the Hopf points."""
         text, heads = self._commentary, () if self.delay else ('l1',)
         rows: list[tuple[str, ...]] = [(
-            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *text.heads,
+            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads,
             'type', 'orbits', 'others', 'transverse')]
         for point in self.hopf:
-            numbers = {'omega': point.omega, 'period': math.tau / point.omega,
-                       **self._form(point), **text.numbers(point)}
+            numbers = {'omega': point.omega, 'period': math.tau / point.omega, **self._form(point)}
             rows.append((
                 point.gait, point.wave, f'{point.value:.4f}',
                 *('-' if number is None else f'{number:.4f}' for number in numbers.values()),
                 *_kind(point), str(point.unstable_roots), str(point.unstable_transverse_roots)))
         explained = (
             f'{self.delay} and period in model time; omega in rad per model time; '
-            f'{text.explained}others: further roots with positive real part, transverse: of them '
-            'outside the class' if self.delay else
-            f'omega in rad per model time; {text.explained}others: further eigenvalues with '
-            'positive\nreal part, transverse: of them outside the class')
+            'others: further roots with\npositive real part, transverse: of them outside the class'
+            if self.delay else
+            'omega in rad per model time; others: further eigenvalues with positive\n'
+            'real part, transverse: of them outside the class')
         middle = len(rows[0]) - 6
         lines = [*f'Hopf points {where} ({explained}):'.split('\n'),
                  *(f'  {line}' for line in table(rows, '<<' + '>' * middle + '<<>>'))]

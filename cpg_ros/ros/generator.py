@@ -36,6 +36,7 @@ from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, FASTEST, MeasuredPo
 from cpg_ros.ros.generator_parameters import (
     COMMANDS,
     exclusive,
+    FREQUENCY,
     gait_spec,
     NETWORK,
     network_for,
@@ -604,14 +605,21 @@ class Generator(StartedNode):
             self.ticker.join(timeout=0.2)
 
 
+HELP = """\
+Publishes the joint states of a gait. While it runs, cpg param list shows all parameters,
+also those of the networks and the gains of the feedback.
+
+examples:
+  generator --ros-args -p gait:=walk -p rate:=500.0
+  generator --ros-args -p network:=biped -p gait:=skip
+  generator --ros-args -p robot:=my_robot.yaml -p cmd_vel:=true"""
+
+
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    specs_known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
-             ENABLED: switch.SWITCH, **switch.TOPICS}
-    return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
-               "networks and the feedback's gains are listed by ros2 param describe.", specs_known,
-               args,
-               'generator')
+    listed = {'network': NETWORK, **specs(find_network(NETWORK.default)), 'frequency': FREQUENCY,
+              'exclusive': exclusive('none'), ENABLED: switch.SWITCH, **switch.TOPICS}
+    return run(Generator, NAME, HELP, listed, args, 'generator')
 
 
 if __name__ == '__main__':

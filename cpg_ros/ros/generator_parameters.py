@@ -16,7 +16,7 @@
 
 from collections.abc import Mapping
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import functools
 import math
 from pathlib import Path
@@ -42,6 +42,10 @@ NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_onl
                                   'append a number of legs, as in delayed6, for a variant; '
                                   "without one, the robot file's number of legs is used where the "
                                   'file asks for that variant'))
+
+
+FREQUENCY = Spec(1.0, "strides per second [Hz]; 0 runs in the model's own time, one unit per "
+                 'second', 0.0, 10.0)
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:
@@ -88,8 +92,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                         read_only=True),
         'cmd_vel': Spec(False, 'follow the commands on cmd_vel; the robot file must have steering '
                         'tables', read_only=True),
-        'stamped_cmd_vel': Spec(False, "type of cmd_vel: geometry_msgs/TwistStamped, as Jazzy's "
-                                'navigation and controllers send it, in place of '
+        'stamped_cmd_vel': Spec(False, 'type of cmd_vel: geometry_msgs/TwistStamped in place of '
                                 'geometry_msgs/Twist', read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'the robot stops if no cmd_vel arrives for this time [s]',
                                 0.05, 60.0),
@@ -188,9 +191,8 @@ class Planner:
         """Return ``frequency`` and parameters of network and joints, with a preset's defaults."""
         network, values = self.network, self._values(self.presets[preset].network)
         frequency = self._frequency(preset)
-        specs = {'frequency': Spec(1.0 if frequency is None else frequency,
-                                   "strides per second [Hz]; 0 runs in the model's own time, one "
-                                   'unit per second', 0.0, 10.0)}
+        specs = {'frequency': FREQUENCY if frequency is None else
+                 replace(FREQUENCY, default=frequency)}
         specs |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
                                                 allowed.high)
                   for key, allowed in network.ranges.items()}

@@ -88,7 +88,8 @@ def test_example_1_as_text(capsys):
                   '0.2852', '7.4772', '1.278271', 'supercritical',
                   'trot, jump, walk: stable with the symmetry lock only'):
         assert words in said
-    assert max(map(len, said.splitlines())) <= 160
+    # The paper's wrong coefficients are for JSON and reproduce.
+    assert "k1'" not in said and max(map(len, said.splitlines())) <= 160
 
 
 @pytest.mark.parametrize(('changes', 'name', 'gait'), [

@@ -15,6 +15,8 @@
 """Parameters that `ros2 param dump` and `load` can carry: dumped, nested, and given back."""
 
 from itertools import permutations
+import os
+import subprocess
 
 from cpg_ros.ros.feedback.switch import ENABLED, SWITCH
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
@@ -141,3 +143,17 @@ def test_feedback_that_the_robot_cannot_have_is_refused_at_run_time(running):
     answer, = watcher.set(**{ENABLED: True})
     assert not answer.successful and answer.reason.startswith('no feedback: ')
     assert watcher.get(ENABLED) == [False]
+
+
+@pytest.mark.parametrize('columns', ['60', '200'])
+def test_the_help_lists_ranges_and_examples_within_the_terminal(columns):
+    done = subprocess.run([EXECUTABLE, '--help'], env=dict(os.environ, COLUMNS=columns), text=True,
+                          capture_output=True, timeout=120, check=True)
+    usage, *lines = done.stdout.splitlines()
+    assert usage.startswith('usage: generator')
+    listed = lines[lines.index('parameters (* at the start only):') + 1:]
+    assert max(map(len, listed)) <= min(int(columns), 100)
+    words = ' '.join(' '.join(listed).split())
+    assert 'rate: messages per second on every output topic [Hz]; from 1 to 2000 (default' in words
+    assert 'frequency: strides per second' in words and 'exclusive*: refuse to start' in words
+    assert '  generator --ros-args -p gait:=walk -p rate:=500.0' in lines

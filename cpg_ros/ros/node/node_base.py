@@ -21,8 +21,10 @@ import gc
 import os
 from pathlib import Path
 import select
+from shutil import get_terminal_size
 import signal
 import sys
+import textwrap
 import threading
 import traceback
 from typing import Any
@@ -325,11 +327,20 @@ def _help_or_error(executable: str, text: str, specs: Mapping[str, Spec],
         return 2
     if not arguments:
         return None
-    parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
-                  for name, spec in specs.items())
     say('\n'.join((f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
-                   f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters)))
+                   f'--params-file FILE]\n\n{text}\n\nparameters (* at the start only):',
+                   *(_help_on(name, spec) for name, spec in specs.items()))))
     return 0
+
+
+def _help_on(name: str, spec: Spec) -> str:
+    """Return the help on a parameter: text, allowed values and default, as wide as a terminal."""
+    allowed = spec.constraints or (
+        '' if spec.low is None else f'from {spec.low:g} to {spec.high:g}')
+    text = f'{name}{"*" * spec.read_only}: {spec.text}{f"; {allowed}" * bool(allowed)} (default: '
+    return textwrap.fill(f'{text}{spec.default!r})', min(get_terminal_size().columns, 100),
+                         initial_indent='  ', subsequent_indent='      ',
+                         break_on_hyphens=False)
 
 
 def _first(error: Exception) -> str:

