@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
+"""Picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -56,7 +56,7 @@ ROOTS = 7
 
 @cache
 def colours(network: type[Network]) -> dict[str, str]:
-    """Return a colour for each of a network's gaits, no two of one colour."""
+    """Return distinct colours for a network's gaits."""
     hues = (to_hex(tuple(hsv_to_rgb((0.618 * n % 1.0, 0.7, 0.8)))) for n in count())
     spare = chain(FURTHER, hues)
     by_gait: dict[str, str] = {}
@@ -150,7 +150,8 @@ def _draw_roots(axes: Axes, analysis: Analysis) -> None:
         roots = block.roots(ROOTS)
         axes.plot(roots.real, roots.imag, 'o', color=_colour(analysis, block.gait), alpha=0.8,
                   markersize=5)
-    title = 'Characteristic roots of rest' if analysis.delay else 'Eigenvalues of the stand'
+    title = 'Characteristic roots of the equilibrium' if analysis.delay else (
+        'Eigenvalues of the equilibrium')
     axes.axvline(0.0, color='#718096', linewidth=1.0, zorder=0)
     axes.set_xlabel('real part [1/model time]')
     axes.set_ylabel('imaginary part [rad/model time]')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The report of ``analyze`` on a parameter set and its phase response: as text, and as JSON."""
+"""Report of ``analyze`` on a parameter set and its phase response, as text and as JSON."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ import numpy as np
 
 
 def _published_numbers(point: HopfPoint) -> dict[str, float]:
-    """Real parts of the normal form by the formulas of Liu & Zhang (2024)."""
+    """Return real parts of the normal form by the formulas of Liu & Zhang (2024)."""
     # Only a report of Hopf points needs the papers' modules.
     from cpg_ros.analysis.papers.liu_zhang import published_normal_form
     form = published_normal_form(point)
@@ -42,7 +42,7 @@ def _published_numbers(point: HopfPoint) -> dict[str, float]:
 
 
 def _theorem(point: HopfPoint) -> tuple[str, dict[str, Any]]:
-    """Verdict of theorem 4.2 of Buono & Golubitsky (2001)."""
+    """Return the verdict of theorem 4.2 of Buono & Golubitsky (2001)."""
     from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
     verdict = theorem_verdict(cast(Quadruped, point.network), point.gait)
     return str(verdict), {'theorem_4_2': {
@@ -93,12 +93,12 @@ def _yes(value: bool | None) -> str:
 
 
 def _which(verdict: GaitAssessment, meant: GaitAssessment) -> str:
-    """Return which of a gait's orbits is meant, if not the first."""
+    """Return which of a gait's orbits is meant, unless it is the first."""
     return '' if meant is verdict else f' (the orbit of period {meant.known_orbit.period:.6f})'
 
 
 def _kind(point: HopfPoint) -> tuple[str, str]:
-    """Return the type of a Hopf point, and on which side of it its orbits lie."""
+    """Return the type of a Hopf point, and the side on which its orbits lie."""
     if point.normal_form.degenerate:
         return 'degenerate', '-'
     return ('supercritical' if point.supercritical else 'subcritical',
@@ -110,7 +110,7 @@ def _degenerate(network: Network) -> list[str]:
     if not network.kinks:
         return ['degenerate: the term of third order vanishes, so the normal form does not tell '
                 'on which side', 'orbits lie, nor whether they attract.']
-    return ['degenerate: the rates are linear about the stand, up to their kinks where '
+    return ['degenerate: the rates are linear about the equilibrium, up to their kinks where '
             f'{" or ".join(network.kinks)} passes 0.', 'So there is no normal form: at the point '
             'itself waves of any size up to the kinks neither grow nor', 'decay, and orbits start '
             'with the size at which they reach a kink, not with size 0.']
@@ -167,7 +167,7 @@ class Analysis(ShortRepr):
 
     @property
     def hopf(self) -> list[HopfPoint]:
-        """Hopf points of the equilibrium, by rising parameter."""
+        """Hopf points of the equilibrium, by ascending parameter."""
         return self._equilibrium[0]
 
     @property
@@ -277,7 +277,7 @@ class Analysis(ShortRepr):
         return [*lines, *(self._points(where) if self.hopf else [f'No Hopf point {where}.'])]
 
     def _roots(self, blocks: tuple[Block, ...], rest: np.ndarray) -> list[str]:
-        """Return, with a delay, how many roots lie to the right, and the rightmost."""
+        """Return, with a delay, the number of unstable roots, and the rightmost root."""
         unstable = sum(len(block.right_of(0.0)) for block in blocks)
         block = max(blocks, key=lambda block: block.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'

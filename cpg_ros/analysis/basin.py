@@ -14,9 +14,9 @@
 
 """Basins: the fraction of random states from which a network returns to a gait.
 
-Every variable of every cell is drawn evenly over twice its range on the orbit, about the middle of
-the range; with a delay the history is constant. The final motion of the whole network is compared
-with the orbit and with the gaits' symmetries.
+Every variable of every cell is drawn uniformly over twice its range on the orbit, about the middle
+of the range; with a delay the history is constant. The final motion of the whole network is
+compared with the orbit and with the gaits' symmetries.
 """
 
 from collections import Counter
@@ -59,10 +59,11 @@ class Basin(ShortRepr):
         orbit: of the gait.
         gain: of the symmetry lock, 1/model time.
         states: number of states.
-        seed: with which they were drawn.
-        returned: number of them that return to the orbit, or to an image of it under a symmetry.
-        others: motion -> number of the others: another gait by name, 'another NAME' for another
-            orbit of the same gait, 'rest', 'runs away', or 'unknown' if it has not settled.
+        seed: of the draw.
+        returned: number of states that return to the orbit, or to its image under a symmetry.
+        others: motion -> number of states that end in it: another gait by name, 'another NAME' for
+            another orbit of the same gait, 'rest', 'runs away', or 'unknown' if it has not
+            settled.
 
     """
 
@@ -104,9 +105,9 @@ def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
     Args:
         orbit: of the gait.
         count: number of states.
-        seed: with which they are drawn.
+        seed: of the draw.
         gain: of a symmetry lock to that gait, 1/model time.
-        done: called with the number of states that are done.
+        done: called with the number of finished states.
 
     Raises:
         InputError: count is not positive.
@@ -169,7 +170,7 @@ def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
 
 
 def _named(cycle: LimitCycle, network: Network) -> str:
-    """Name the gait whose symmetry a cycle has, and no more; or unknown."""
+    """Name the gait whose symmetry a cycle has, and no more; or 'unknown'."""
     signals = cycle.signals[:, :network.cells]
     for gait in network.gaits():
         symmetry = network.symmetry(gait)
@@ -185,7 +186,7 @@ def _named(cycle: LimitCycle, network: Network) -> str:
 # The basins that ``analyze --basin N`` reports: as text, and as JSON.
 
 def basins(analysis: 'Analysis', count: int, seed: int) -> dict[str, Basin]:
-    """Find the basin of each gait that attracts by itself, or else with the default gain."""
+    """Compute the basin of each gait that attracts, without or else with the default gain."""
     gains = {verdict.gait: 0.0 if verdict.stable else verdict.default_gain
              for verdict in analysis.existing
              if verdict.stable or verdict.stable_with_default_gain}

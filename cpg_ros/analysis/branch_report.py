@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The branches of ``analyze --plot``, and how gaits lose their stability along them."""
+"""Branches of ``analyze --plot``, and how gaits lose their stability along them."""
 
 from dataclasses import dataclass, field
 
@@ -78,9 +78,9 @@ class JudgedBranch:
     Attributes:
         gait: name.
         branch: of its orbits.
-        kinds: of each point: 0 attracts, 1 does so with a symmetry lock, 2 does not.
+        kinds: of each point: 0 attracts, 1 attracts with a symmetry lock, 2 does not attract.
         crossings: points where a multiplier crosses the unit circle.
-        losses: those of them beside which the gait attracts.
+        losses: crossings next to which the gait attracts.
 
     """
 
@@ -138,7 +138,7 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
 
 
 def _span(analysis: Analysis) -> tuple[float, float]:
-    """Return from where to where branches are followed: delays are above 0."""
+    """Return the ends between which branches are followed; delays are above 0."""
     low, high = analysis.span
     if analysis.along.names == (analysis.delay,):
         low = max(low, type(analysis.network).ranges[analysis.delay].low)
@@ -161,7 +161,7 @@ def on_line(analysis: Analysis) -> list[HopfPoint]:
 
 
 def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
-    """Return the branch of a Hopf point; none where the first orbit cannot be found."""
+    """Return the branch of a Hopf point, or None if its first orbit cannot be found."""
     low, high = _span(analysis)
     try:
         return [continue_from_hopf(point, analysis.along, low, high, most=POINTS,

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Footfall (Hildebrand) diagrams of recorded runs and of gaits, and the executable for these.
+"""Footfall (Hildebrand) diagrams of recorded runs and of gaits, and their executable.
 
-A leg stands while the signal that drives it falls, from peak to trough; where cells drive muscles,
-a muscle is active while its cell is above the middle of its range.
+A leg is in stance while the signal that drives it falls, from peak to trough; where cells drive
+muscles, a muscle is active while its cell is above the middle of its range.
 """
 
 from collections.abc import Sequence
@@ -44,11 +44,11 @@ FORMATS = ('.png', '.svg', '.pdf')
 
 
 def stances(time: np.ndarray, standing: np.ndarray) -> list[tuple[float, float]]:
-    """Return the start and length of each stretch in which a foot stands, the bars of a diagram.
+    """Return start and length of each stance of a foot, the bars of a diagram.
 
     Args:
         time: of the samples, s or strides, shape (n,), evenly spaced.
-        standing: whether the foot stands at them, shape (n,).
+        standing: whether the foot is in stance, shape (n,).
 
     """
     step = _spacing(time)
@@ -80,11 +80,11 @@ def _spacing(time: np.ndarray) -> float:
 
 
 def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return the ground speed, m/s, shape (n,): of the path, smoothed over SMOOTHING.
+    """Return the ground speed, m/s, shape (n,), of the path smoothed over SMOOTHING.
 
     Args:
         time: of the samples, s, shape (n,), evenly spaced.
-        position: at them, m, shape (n, 2).
+        position: m, shape (n, 2).
 
     """
     wide = max(1, min(len(time) - 1, round(SMOOTHING / _spacing(time)))) // 2 + 1
@@ -167,12 +167,12 @@ def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.nda
 
 
 def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[float, float]]:
-    """Intervals (begin, length), in strides, of a row's bars.
+    """Return the intervals (begin, length), in strides, of a row's bars.
 
     Args:
         orbit: the gait.
         cell: from 1.
-        strides: how long.
+        strides: number of strides.
 
     """
     theta = np.linspace(0.0, strides, int(1000 * strides) + 1)

@@ -12,12 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""NSGA-II on islands, populations that exchange their best, and the verification of its result.
+"""NSGA-II on islands, which exchange their best sets, and the verification of the result.
 
-A set is verified by its exact orbit, its multipliers, and runs with noise.
-
-Each island runs its own NSGA-II with random numbers derived from the seed, its number and the
-epoch. The result depends on the number of islands, but not on the number of workers.
+A set is verified by its exact orbit, its multipliers, and runs with noise. Each island runs its
+own NSGA-II with random numbers derived from the seed, its number and the epoch. The result depends
+on the number of islands, but not on the number of workers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -69,9 +68,9 @@ class VerifiedGait(ShortRepr):
         preset: gait, parameters, a state on the orbit and its period, rounded.
         orbit: solved for from that preset.
         errors: phase errors at the end of the search's simulation, degrees.
-        leading: its leading Floquet multiplier.
-        differences: in shape of its two waveforms, strictly and plainly (see shape_difference);
-            0 for a gait with one.
+        leading: leading Floquet multiplier.
+        differences: of its two waveforms, strict and plain (see shape_difference); 0 for one
+            waveform.
 
     """
 
@@ -83,10 +82,10 @@ class VerifiedGait(ShortRepr):
 
 
 def exact_preset(preset: Preset) -> tuple[Preset, Orbit]:
-    """Move a preset's start onto its exact orbit, to where cell 1 peaks.
+    """Move a preset's start onto its exact orbit, to the peak of cell 1.
 
     Returns:
-        The preset with start and period rounded, and the orbit that is found from them.
+        The preset with rounded start and period, and the orbit that follows from them.
 
     Raises:
         NoOrbit: it has no such orbit.
@@ -176,7 +175,7 @@ EPOCH, MIGRANTS = 3, 0.1
 
 @dataclass(frozen=True)
 class SearchSetup:
-    """The space that all islands search, as arguments of search_space, which can be pickled."""
+    """Arguments of search_space for all islands; can be pickled."""
 
     network: str
     gait: str
@@ -185,7 +184,7 @@ class SearchSetup:
 
     @property
     def space(self) -> Space:
-        """The parameter sets among which the gait is looked for."""
+        """Parameter sets among which the gait is searched for."""
         return search_space(self.network, self.gait, self.bounds, self.fixed)
 
 
@@ -195,12 +194,12 @@ class Epoch(ShortRepr):
 
     Attributes:
         setup: of the search.
-        population: sets in a generation.
-        generations: how many.
+        population: number of sets in a generation.
+        generations: their number.
         random: seed of the island's random numbers.
-        seed: of the start states of the simulations, the same for all.
-        start: first generation, shape (population, free variables); at random if None.
-        judged: scores of sets that are not judged again.
+        seed: of the simulations' initial states, the same for all.
+        start: first generation, shape (population, free variables); None for a random one.
+        judged: known scores of sets.
 
     """
 
@@ -277,12 +276,12 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
 
     Args:
         setup: of the search.
-        population: sets in a generation of each.
+        population: number of sets in a generation of each.
         generations: of each.
-        seed: of everything random.
+        seed: of all random numbers.
         islands: number of islands in a ring; each sends its best to the next one.
         executor: any; None for this process.
-        progress: takes the number of generations done.
+        progress: takes the number of finished generations.
 
     """
     tried: dict[Network, Score] = {}
@@ -336,8 +335,8 @@ class Front:
 
     Attributes:
         space: of the varied weights.
-        scores: the Pareto front of all sets that were tried, best first.
-        tried: all of them, in the order in which they were tried.
+        scores: Pareto front of all sets that were tried, best first.
+        tried: all of them, in order.
         best: the first of them, with its exact orbit.
 
     """
@@ -357,18 +356,18 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
     Args:
         network_name: as search_space takes it.
         gait: one of the network's.
-        population: parameter sets in a generation.
-        generations: how many.
-        seed: of everything random; the same seed finds the same.
-        bounds: variable -> lower and upper bound, instead of the usual ones.
+        population: number of parameter sets in a generation.
+        generations: their number.
+        seed: of all random numbers; determines the result.
+        bounds: variable -> lower and upper bound, instead of the defaults.
         fixed: variable -> its value.
         progress: show a progress bar.
-        islands: populations that evolve separately and exchange their best; the result depends on
-            their number, but not on the number of workers.
-        executor: any, for the islands; None for this process.
+        islands: number of populations that evolve separately and exchange their best; the result
+            depends on it, but not on the number of workers.
+        executor: for the islands; None for this process.
 
     Raises:
-        InputError: an unknown network, gait or variable, or a bound that cannot be used.
+        InputError: an unknown network, gait or variable, or an unusable bound.
         MissingLibraryError: pymoo is missing.
         NoGaitFound: no set passed.
 
@@ -393,7 +392,7 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
 
 
 def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
-    """Choose from the front; a set that fails the verification is removed from it."""
+    """Select a set from the front; remove those that fail the verification."""
     left = [score for score in tried if score.exact and score.errors.max() <= LARGEST]
     if not left:
         best = min(tried, key=lambda score: (score.errors.max(), score.shortfall, score.stability))

@@ -15,8 +15,8 @@
 """Objectives of a search for parameters: phases, stability, and different waveforms.
 
 Phase errors are those of Rashidi et al. (2016), eqs. 6-9, with the cell numbers of their Table 5:
-the phase of every cell against the first one, compared with the gait's. Where a gait has two
-waveforms they are taken between the cells that share one. Stability is the leading Floquet
+the phase of every cell relative to the first one, compared with the gait's. With two waveforms,
+each cell is compared with the first cell of its waveform. Stability is the leading Floquet
 multiplier. All sets of a generation are simulated in one batch.
 """
 
@@ -44,12 +44,12 @@ DECIMALS = 4
 
 @dataclass(frozen=True)
 class Variable:
-    """A number to search for, or a given one where ``low`` and ``high`` agree.
+    """A number to search for, or a fixed one where ``low`` and ``high`` are equal.
 
     Attributes:
         name: by which it is fixed or bounded.
         low, high: bounds.
-        members: parameters of the network that take its value.
+        members: parameters of the network with its value.
 
     """
 
@@ -69,9 +69,9 @@ class Space:
     """Parameter sets of a network that have the symmetry of a gait.
 
     Attributes:
-        network: whose parameters.
+        network: class of the network.
         gait: one of its gaits.
-        variables: all of them, free or given.
+        variables: all, free or fixed.
 
     """
 
@@ -120,11 +120,11 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     """Return the parameter sets in which to search for a gait.
 
     Args:
-        network_name: of a network that states what may be looked for, or its file.
+        network_name: of a network that states what may be searched, or its file.
         gait: one of the network's.
-        bounds: variable, or any parameter that takes its value, -> lower and upper bound,
-            instead of the usual ones.
-        fixed: the same -> its value.
+        bounds: variable, or any of its parameters -> lower and upper bound, instead of the
+            defaults.
+        fixed: variable, or any of its parameters -> value.
 
     Raises:
         InputError: the network or gait is unknown, or a bound or value cannot be used.
@@ -192,14 +192,14 @@ class Score(ShortRepr):
     """A parameter set with its objectives, and a state on its gait.
 
     Attributes:
-        network: the parameters.
+        network: parameters.
         errors: phase errors in degrees, shape (3,) or (2,); see ``pairs``.
-        stability: leading Floquet multiplier; an estimate where ``exact`` is not set.
-        difference: in shape of the gait's two waveforms; None for a gait with one.
-        shortfall: by how much waveforms miss their requirements, 0 if they do not.
+        stability: leading Floquet multiplier; an estimate unless ``exact``.
+        difference: of the gait's two waveforms; None for one waveform.
+        shortfall: by how much waveforms miss their requirements, 0 if they meet them.
         exact: whether the orbit was solved for.
-        state: one on the exact orbit, shape (components,).
-        period: of that, model time.
+        state: on the exact orbit, shape (components,).
+        period: of the orbit, model time.
 
     """
 
@@ -214,15 +214,15 @@ class Score(ShortRepr):
 
     @property
     def objectives(self) -> np.ndarray:
-        """Values to minimise: phase errors, stability, and minus a difference of waveforms."""
+        """Values to minimise: phase errors, stability, and minus the difference of waveforms."""
         rest = [self.stability] + ([] if self.difference is None else [-self.difference])
         return np.array([*np.maximum(self.errors, RESOLUTION), *rest])
 
 
 def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
-    """Pairs of cells (from 0) behind each phase error: a cell, and the first one of its waveform.
+    """Return pairs of cells (from 0) for each phase error: a cell, and the first of its waveform.
 
-    At most three errors: with more than three pairs the last one is the largest of the rest.
+    There are at most three errors; the last one is the largest of all further pairs.
     """
     first = symmetry.first[symmetry.waves].tolist()
     partners = [(cell, partner) for cell, partner in enumerate(first) if cell != partner]
@@ -270,10 +270,10 @@ def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
 
 
 def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 1.0) -> float:
-    """Return by how much waveforms miss their requirements, relative to them; 0 if they do not.
+    """Return by how much waveforms miss their requirements, relative to them, or 0.
 
-    Every cell has a range and turns steadily, so that its phase can be read in spite of noise;
-    two waveforms differ in shape.
+    Every cell must have a range and rotate steadily, so that its phase can be read in spite of
+    noise; two waveforms must differ in shape.
     """
     cells, first = symmetry.group.cells, symmetry.first
     have = [(np.ptp(signals[:, wave]), LEAST_RANGE) for wave in first]
@@ -286,7 +286,7 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
 
 def _simulated(network: Network, gait: str, run: Trajectory
                ) -> tuple[Score, settling.LimitCycle | None]:
-    """Score a set by its simulation; also return its cycle if that is worth solving for."""
+    """Score a set by its simulation; also return its cycle if it is worth solving for."""
     symmetry, cells = network.symmetry(gait), network.cells
     first = symmetry.first
     two = len(first) == 2

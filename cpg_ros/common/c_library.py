@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""C libraries that the system's compiler builds at their first use, kept in the cache."""
+"""C libraries that the system's compiler builds on first use, kept in the cache."""
 
 from collections.abc import Callable, Mapping
 import ctypes
@@ -33,12 +33,11 @@ COMPILERS = ('cc', 'gcc', 'clang')
 
 
 class NoCompiler(CpgError):
-    """The system has no C compiler that works."""
+    """There is no working C compiler."""
 
 
 def compiler() -> list[str]:
-    """Return the command of the C compiler: that of the environment's ``CC``, or one of the usual
-    names, or that of the wheel ziglang.
+    """Return the command of the C compiler: ``CC``, a usual name, or the wheel ziglang.
 
     Raises:
         NoCompiler: there is none.
@@ -76,16 +75,16 @@ def _compile(sources: Mapping[str, str], library: Path, what: str) -> None:
 
 def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str
          ) -> ctypes.CDLL:
-    """Load a library, and compile it first if the cache does not have it.
+    """Load a library; compile it first if the cache does not have it.
 
     Args:
         folder: of the cache, see cache_folder; None if nothing can be kept.
-        name: of the library; it changes whenever the sources do.
+        name: of the library; changes whenever the sources do.
         sources: returns its files, name -> text.
         what: description for the error.
 
     Raises:
-        NoCompiler: there is no compiler, the compiler fails, or the library cannot be loaded.
+        NoCompiler: there is no compiler, it fails, or the library cannot be loaded.
 
     """
     try:

@@ -15,11 +15,11 @@
 
 """A cache whose folders are named after the inputs of their contents.
 
-Contents with other inputs are in another folder, so nothing in a folder is ever out of date.
-Folders that are no longer used are removed when a new one is made.
+Contents for other inputs have another folder, so nothing in a folder is ever out of date. Unused
+folders are removed when a new one is made.
 
-What is in the cache is executed. Only the user and root may have written it: a folder that others
-own or can write to, or that they could replace, is not used.
+The contents are executed. Therefore only the user and root may have written them: a folder that
+others own, can write to or could replace is not used.
 """
 
 from collections.abc import Iterator
@@ -48,14 +48,14 @@ _HELD: list[IO[bytes]] = []
 
 @cache
 def cache_folder(name: str) -> Path | None:
-    """Return a folder of the cache, which stays as long as this process runs.
+    """Return a folder of the cache, which is kept as long as this process runs.
 
     Args:
         name: identifies the inputs of the contents.
 
     Returns:
-        The folder, created if need be; None if nothing can be written, or if others than the
-        user and root may have written into it. A warning says so.
+        The folder, created if necessary; None, with a warning, if it cannot be written, or if
+            others than the user and root may have written into it.
 
     """
     root = _place()
@@ -79,7 +79,7 @@ def cache_folder(name: str) -> Path | None:
 
 @contextlib.contextmanager
 def writing() -> Iterator[None]:
-    """Write into a folder of the cache; a disk that is full ends nothing, and is logged once."""
+    """Write into a folder of the cache; a full disk is logged once and is no error."""
     try:
         yield
     except OSError as error:
@@ -115,9 +115,9 @@ def _untrusted(path: Path, status: os.stat_result, sticky: bool = False) -> str:
     """Return why others than the user and root may have written a file or folder, or ''.
 
     Args:
-        path: named in the reason.
+        path: for the reason.
         status: its status.
-        sticky: a folder in which others can only add what is theirs is trusted, too.
+        sticky: trust a folder in which others can only add their own entries.
 
     """
     if status.st_uid not in (os.getuid(), 0):
@@ -159,11 +159,11 @@ def _untrusted_contents(folder: Path) -> str:
 
 @cache
 def _place() -> Path | None:
-    """Return where the folders are, created if need be.
+    """Return the parent of the folders, created if necessary.
 
-    ``NUMBA_CACHE_DIR`` if it is set, else beside the package, else among the user's caches, else
-    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set, for child processes. One that
-    others than the user and root may have written into is passed over, with a warning.
+    It is ``NUMBA_CACHE_DIR`` if set, otherwise beside the package, among the user's caches, or a
+    temporary folder of the user, to which ``NUMBA_CACHE_DIR`` is then set for child processes. A
+    folder into which others than the user and root may have written is skipped, with a warning.
     """
     caches = Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser()
     candidates = [Path(__file__).resolve().parents[1] / '__pycache__' / 'compiled',
@@ -209,7 +209,7 @@ def _temporary() -> Path:
 
 
 def _use(folder: Path) -> None:
-    """Create a folder if need be, and lock it against removal while this process runs."""
+    """Create a folder if necessary, and lock it against removal while this process runs."""
     while True:
         folder.mkdir(mode=0o700, exist_ok=True)
         try:
@@ -228,7 +228,7 @@ def _use(folder: Path) -> None:
 
 
 def _remove_unused(folder: Path) -> None:
-    """Remove all folders but the last used ones and those that a process has locked."""
+    """Remove all folders except the last used ones and those that a process has locked."""
     locks = sorted(folder.glob(f'*/{_LOCK}'), key=_last_used)
     for path in locks[:-KEPT]:
         # Folders stay that are in use, or whose users cannot be determined.

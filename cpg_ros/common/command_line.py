@@ -75,11 +75,11 @@ def interval(text: str) -> tuple[float, float]:
 
 
 def named_interval(text: str, name: str = 'name') -> tuple[str, tuple[float, float]]:
-    """Read ``name=low:high``, where the name may be a line of parameters, as ``alpha=beta``.
+    """Read ``name=low:high``, where the name may be a line of parameters, such as ``alpha=beta``.
 
     Args:
         text: to read.
-        name: what the message calls the name.
+        name: of the name, for the message.
 
     Raises:
         argparse.ArgumentTypeError: it is not of this form.
@@ -95,7 +95,7 @@ def refuse_repeated(option: str, names: Sequence[str]) -> None:
     """Refuse names that an option gives twice.
 
     Raises:
-        InputError: one is; the message begins with the option.
+        InputError: a name is repeated; the message begins with the option.
 
     """
     if name := next((name for name in names if names.count(name) > 1), ''):
@@ -109,13 +109,13 @@ _BYTE = re.compile('[\udc80-\udcff]')
 
 
 def printable(text: str) -> str:
-    r"""Return a text as UTF-8 has it: bytes of names of files that are not stand as \xff."""
+    r"""Return a text that UTF-8 can encode; undecodable bytes are written as \xff."""
     text = _BYTE.sub(lambda byte: f'\\x{ord(byte[0]) - 0xdc00:02x}', text)
     return text.encode(errors='backslashreplace').decode()
 
 
 def finite(tree: Any) -> Any:
-    """Return the tree with None for numbers that JSON does not know."""
+    """Return the tree with None for numbers that JSON does not have."""
     if isinstance(tree, dict):
         return {key: finite(value) for key, value in tree.items()}
     if isinstance(tree, list | tuple):
@@ -129,11 +129,11 @@ def as_json(tree: Any) -> str:
 
 
 def table(rows: Sequence[tuple[str, ...]], right: str = '') -> list[str]:
-    """Align rows in columns, the first row being the head.
+    """Align rows in columns; the first row is the head.
 
     Args:
         rows: texts.
-        right: for each column '<' or '>', '<' for those not given.
+        right: '<' or '>' for each column, '<' by default.
 
     """
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
@@ -150,9 +150,9 @@ WIDTH = 30
 
 @contextmanager
 def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callable[[int], None]]:
-    """Yield a function that takes the amount done so far.
+    """Yield a function that takes the finished amount.
 
-    On a terminal the bar is redrawn in place; elsewhere (a log) it is one line every tenth.
+    On a terminal the bar is redrawn in place; elsewhere (a log) it is a line every tenth.
     """
     started = time.monotonic()
     live = sys.stderr.isatty()
@@ -186,7 +186,7 @@ INTERRUPTED = 130
 
 
 class Parser(argparse.ArgumentParser):
-    """Keeps the line breaks of its texts, and reports an error in one line, with code 2."""
+    """Parser that keeps line breaks, and reports an error in one line, with exit code 2."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(**{'formatter_class': argparse.RawDescriptionHelpFormatter, **options})
@@ -206,10 +206,9 @@ def run(parser: Parser, work: Callable[[argparse.Namespace], int],
 
     Args:
         parser: of the tool, whose name begins every message.
-        work: takes the parsed arguments, and ``command``, the command line as one string; prints
-            the result and returns the exit code. A CpgError or OSError that it raises becomes one
-            line on stderr.
-        arguments: default: those of the process.
+        work: takes the parsed arguments, with the command line in ``command``; prints the result
+            and returns the exit code. A CpgError or OSError becomes one line on stderr.
+        arguments: by default those of the process.
         stopped: message after Ctrl-C, unless the KeyboardInterrupt has one; '' prints nothing.
 
     """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The errors of the package, whose messages tell users what is wrong with their input.
+"""Errors of the package, whose messages tell users what is wrong with their input.
 
 Any other exception, such as a ValueError of numpy for arrays of a wrong shape, is a bug in the
-calling program: the package does not catch it, so it is never reported as the user's mistake.
+calling program: the package does not catch it and does not report it as the user's mistake.
 """
 
 from collections.abc import Mapping, Sequence
@@ -76,8 +76,8 @@ class CpgError(ValueError):
     Subclasses are defined beside the functions that raise them.
 
     Attributes:
-        exit_code: of a tool that it ends: 2 for unusable input; 1 for a negative result, such as
-            a recording without a gait.
+        exit_code: of a tool that it ends: 2 for unusable input; 1 for a negative result, such as a
+            recording without a gait.
 
     """
 
@@ -85,7 +85,7 @@ class CpgError(ValueError):
 
 
 class InputError(CpgError):
-    """A name, a number or data that cannot be used; the message says which, and what can be."""
+    """A name, a number or data cannot be used; the message says which, and what can be."""
 
 
 class MissingLibraryError(CpgError, ImportError):
@@ -93,7 +93,7 @@ class MissingLibraryError(CpgError, ImportError):
 
 
 def needed(library: str, part: str = '') -> None:
-    """Check that a library can be imported, and a part of it that old versions lack.
+    """Check that a library is installed, with a part that old versions lack.
 
     Raises:
         MissingLibraryError: it is not installed; uncaught, it prints one line.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Opening files named by users: regular files of a bounded size, and nothing that can block.
+"""Files named by users: regular files of a bounded size, and nothing that can block.
 
 A FIFO blocks its reader, ``/dev/zero`` never ends, and files below ``/proc`` state a size of 0.
 None of them is a robot, a mesh or a recording.
@@ -36,10 +36,10 @@ from cpg_ros.common.errors import CpgError
 # Atomic writing: a file is written under another name and then renamed.
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
-    """Write a file; until it is complete, the old file remains.
+    """Write a file; the old one remains until the new one is complete.
 
     Raises:
-        OSError: it cannot be written; the error has the file's name, also where a disk is full.
+        OSError: it cannot be written; the error names the file, also if the disk is full.
 
     """
     try:
@@ -71,7 +71,7 @@ def stored_json(path: Path) -> Any:
 # Paths of the package's shipped files, installed or in a source tree.
 
 def resource_folder(kind: str) -> Path:
-    """Return a folder of files that the package ships: in the sources, or in share/cpg_ros.
+    """Return a folder of files that the package ships, in the sources or in share/cpg_ros.
 
     Args:
         kind: ``config``, ``urdf``, ``rviz`` or ``models``.
@@ -98,15 +98,15 @@ MOST = 1_000_000
 
 
 def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
-    """Return the root of a document; names keep their prefixes, which need not be declared.
+    """Return the root of an XML document; names keep their prefixes, which need no declaration.
 
     Args:
         data: the file.
-        fail: makes the error out of its reason.
+        fail: reason -> error.
 
     Raises:
-        CpgError: as ``fail`` makes it: it is no XML, declares an entity, is nested too deep,
-            or has too many elements.
+        CpgError: made by ``fail``: it is no XML, declares an entity, is nested too deep, or has
+            too many elements.
 
     """
     builder, parser, depth, count = TreeBuilder(), expat.ParserCreate(), 0, 0

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Simulated robots in MuJoCo, tuning of gaits and gains, and set-up of one's own robot.
+"""Simulated robots in MuJoCo, tuning of gaits and gains, and set-up of a user's own robot.
 
 Imports ``analysis``, ``feedback`` and the rooms below them; knows nothing of ROS.
 """

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bodies of one robot that take steps of physics together, each on its own ground.
+"""Bodies of one robot that step the physics together, each on its own ground.
 
-Physics is MuJoCo's own ``rollout``, native threads.
+The physics is MuJoCo's ``rollout``, with native threads.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,18 +35,18 @@ import numpy as np
 
 
 class BatchPhysics:
-    """Any number of bodies, all of which begin in the stand.
+    """Bodies of one robot, all of which begin in the stand.
 
     Attributes:
         body: one of them, for its model and its stand.
-        parts: where its parts are in the model.
+        parts: indices of its parts in the model.
         timestep: s.
         start: state in the stand, as of mjSTATE_FULLPHYSICS, shape (states,).
 
     """
 
     def __init__(self, body: Body, threads: int) -> None:
-        """Be ready to step bodies like this one on some threads, 0 for all cores."""
+        """Prepare to step bodies like this one on some threads, 0 for all cores."""
         mujoco = engine()
         from mujoco import rollout
         self.body, self.parts, self.timestep = body, Anatomy(body), body.model.opt.timestep
@@ -65,9 +65,9 @@ class BatchPhysics:
         """Return the control inputs of bodies, all zero, and views of two parts of them.
 
         Returns:
-            For ``rollout``, shape (runs, steps, numbers); the joints' targets, rad, shape (runs,
-            steps, joints); the force on the base forward and to the left, N, shape (runs, steps,
-            2).
+            Inputs for ``rollout``, shape (runs, steps, numbers); targets of the joints, rad, shape
+                (runs, steps, joints); force on the base forward and to the left, N, shape (runs,
+                steps, 2).
 
         """
         model = self.body.model
@@ -82,7 +82,7 @@ class BatchPhysics:
                                   initial_warmstart=warmstart)
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
-        """Return the model of a body that meets a scenario, its servos' kp scaled."""
+        """Return the model of a body in a scenario, with the servos' kp scaled."""
         key = (scenario.friction, scenario.mass, scenario.payload, scenario.terrain, kp_scale)
         if key not in self._models:
             mujoco, model = engine(), copy.copy(self.body.model)
@@ -110,18 +110,18 @@ TOGETHER = 12
 
 def targets(plan: GaitPlan, duration: float, timestep: float,
             strides: Sequence[float] = (), pace: float = 1.0, ramp: float = 1.0) -> np.ndarray:
-    """Return the angles that a generator publishes from the stand on.
+    """Return the angles that a generator publishes from the stand.
 
     Args:
         plan: the gait.
         duration: s.
         timestep: of the generator, s.
-        strides: factor of each leg's stride; none for the gait as it is.
+        strides: factor of each leg's stride; empty for the gait's own.
         pace: factor of the frequency.
         ramp: from the stand into the gait, s.
 
     Returns:
-        Angles in rad in the order of the robot's controllers, shape (steps, joints).
+        Angles, rad, in the order of the robot's controllers, shape (steps, joints).
 
     """
     robot = plan.robot
@@ -138,7 +138,7 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
 
 
 class OpenLoopBatch(BatchPhysics):
-    """Bodies of one robot, of which as many run at once as there are cores."""
+    """Bodies of one robot without feedback, one for each core at a time."""
 
     def __init__(self, name: str, robot: Robot, kp: float | None = None,
                  kd: float | None = None, timestep: float = 0.002, threads: int = 0,
@@ -152,10 +152,11 @@ class OpenLoopBatch(BatchPhysics):
         super().__init__(Body(name, robot, kp, kd, timestep, say=say), threads)
 
     def run(self, runs: Sequence[tuple[np.ndarray, Scenario]]) -> list[RunMetrics]:
-        """Let bodies follow targets from the stand, and judge each run.
+        """Let bodies follow targets from the stand, and return the metrics of each run.
 
         Args:
-            runs: targets of the joints, rad, shape (steps, joints), and what is met; all as long.
+            runs: targets of the joints, rad, shape (steps, joints), and scenario of each run, all
+                of one length.
 
         """
         outcomes = []

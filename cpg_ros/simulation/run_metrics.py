@@ -35,25 +35,25 @@ AIRBORNE = 0.02
 
 @dataclass(frozen=True)
 class RunMetrics:
-    """One run's figures; those marked * leave out its first BEGINNING seconds.
+    """Metrics of one run; those marked * exclude its first BEGINNING seconds.
 
     Attributes:
-        distance: forward, along the heading at the start, m.
+        distance: forward, along the initial heading, m.
         drift: to the left of it, m.
         heading: at the end, positive to the left, degrees.
         speed: * mean over ground, along the body's own heading, m/s.
         turn: * mean yaw rate, rad/s.
         height: * mean of the base, m.
-        bob: * standard deviation of it, m.
+        bob: * standard deviation of the height, m.
         roll, pitch: * largest absolute angle, degrees.
         sway: * root mean square of roll and pitch together, degrees.
-        fell: when it fell, s; infinite if it did not.
-        hops: times that all feet left the floor.
+        fell: time of the fall, s; infinite if there was none.
+        hops: number of times that all feet left the floor.
         duty: * fraction of the time that a foot is on the floor, mean of all.
         cost: * of transport: mechanical work of the motors, none regained, per weight and metre.
-        saturation: fraction of time and motors at the limit of torque.
-        slip: * way that feet slide on the floor per metre that the body goes.
-        lift: * height that a foot exceeds for a tenth of the time, least of all legs, m.
+        saturation: fraction of time and motors at the torque limit.
+        slip: * distance that feet slide on the floor per metre that the body moves.
+        lift: * height that a foot exceeds for a tenth of the time, minimum over legs, m.
 
     """
 
@@ -77,7 +77,7 @@ class RunMetrics:
 
     @property
     def upright(self) -> bool:
-        """Whether it did not fall."""
+        """Whether the robot did not fall."""
         return math.isinf(self.fell)
 
 
@@ -86,10 +86,10 @@ def judge(body: Body, parts: Anatomy, target: np.ndarray, mass: float, states: n
     """Return the metrics of a run.
 
     Args:
-        body: whose model it was.
+        body: for its model.
         parts: of that model.
-        target: angles that the joints were driven to, rad, shape (steps, joints).
-        mass: factor on the model's.
+        target: target angles of the joints, rad, shape (steps, joints).
+        mass: factor of the model's.
         states: after each step, as of mjSTATE_FULLPHYSICS, shape (steps, states).
         sensors: after each step, as of ``model.load``, shape (steps, sensors).
 
@@ -145,13 +145,13 @@ def cost_of_transport(work: float | np.ndarray, weight: float, distance: float |
 
 def torques(model: Any, target: np.ndarray, angles: np.ndarray, speeds: np.ndarray,
             kp_scale: float | np.ndarray = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return the torques that servos would have, and those within their limits, N m.
+    """Return the torques that servos request, and those within their limits, N m.
 
     Args:
         model: of the body.
-        target: angles that the joints are driven to, rad, shape (n, joints), controllers' order.
-        angles: where they are, rad, the same shape.
-        speeds: rad/s, the same shape.
+        target: target angles of the joints, rad, shape (n, joints), controllers' order.
+        angles: of the joints, rad, the same shape.
+        speeds: of the joints, rad/s, the same shape.
         kp_scale: factor of the proportional gains, for each row if an array, shape (n,).
 
     """
@@ -180,6 +180,6 @@ def _feet(body: Body, parts: Anatomy, poses: np.ndarray) -> np.ndarray:
 
 
 def _slide(feet: np.ndarray, touching: np.ndarray) -> float:
-    """Sum the ways of the feet while they touch the floor, mean of all legs, m."""
+    """Sum the distances that feet slide while they touch the floor, mean of all legs, m."""
     ways = np.linalg.norm(np.diff(feet[:, :, :2], axis=0), axis=2)
     return float((ways * (touching[1:] & touching[:-1])).sum()) / feet.shape[1]

@@ -26,19 +26,19 @@ PUSH = 0.1
 
 @dataclass(frozen=True)
 class Scenario:
-    """Commands, ground and disturbances of a run; by default flat ground only.
+    """Commands, ground and disturbances of a run; flat ground only by default.
 
     Attributes:
         friction: between feet and ground.
-        mass: factor on the mass of every link.
-        pushes: each (s, N, N): when, and the force on the base forward and to the left for PUSH
+        mass: factor of the mass of every link.
+        pushes: each (s, N, N): time, and force on the base forward and to the left for PUSH
             seconds; see `impulse`.
-        terrain: ground that is not flat, of a closed loop only, as is what follows.
+        terrain: ground that is not flat; like all that follows, with feedback only.
         phase: of the first leg at the start of the gait, cycles.
-        speed: commanded, forward, m/s; ignored where the gait cannot be steered.
-        commands: later wishes, each (s, m/s forward, m/s to the left, rad/s of turning).
+        speed: commanded forward speed, m/s; ignored where the gait cannot be steered.
+        commands: later commands, each (s, m/s forward, m/s to the left, yaw rate in rad/s).
         switches: later gaits, each (s, name).
-        payload: on the base, where its own mass is, kg; less than 0 for a lighter base.
+        payload: mass on the base at its centre of mass, kg; negative for a lighter base.
         pose: of the body above its feet: height, m, roll, pitch and yaw, rad.
 
     """
@@ -55,7 +55,7 @@ class Scenario:
     pose: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def forces(self, steps: int, timestep: float) -> np.ndarray:
-        """Return the forces of the pushes in each step of some s, N, shape (steps, 2)."""
+        """Return the forces of the pushes in each step, N, shape (steps, 2)."""
         forces = np.zeros((steps, 2))
         for when, *force in self.pushes:
             begin = round(when / timestep)
@@ -64,7 +64,7 @@ class Scenario:
 
 
 def impulse(when: float, forward: float, left: float) -> tuple[float, float, float]:
-    """Return the push that begins at a time, s, and has this impulse, N s."""
+    """Return the push that begins at a time, s, with an impulse, N s."""
     return when, forward / PUSH, left / PUSH
 
 
@@ -73,11 +73,11 @@ class SensorNoise:
     """Errors of sensors; noise is a standard deviation.
 
     Attributes:
-        delay: of everything that is measured, s.
+        delay: of all measurements, s.
         force_bias, force_noise: of each foot's force, as fractions of it; the bias is drawn once.
         orientation_bias: of roll and pitch, rad; each run draws the signs once.
         gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
-        accelerometer_noise, accelerometer_bias: the same, m/s^2.
+        accelerometer_noise, accelerometer_bias: likewise, m/s^2.
         seed: of the random numbers.
 
     """
@@ -95,21 +95,21 @@ class SensorNoise:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Outcome(ShortRepr):
-    """Results of runs, and their signals after each step; the first axis is that of the runs.
+    """Results of runs, and their signals after each step; the first axis is the run.
 
-    What follows a run's end repeats its last value.
+    After a run's end its last value repeats.
 
     Attributes:
-        fell: when it fell, s, infinite if it did not, shape (runs,).
-        arrived: when it came as far as was asked for, s, infinite if it did not.
+        fell: time of the fall, s, infinite without one, shape (runs,).
+        arrived: time of arrival at the goal, s, infinite without one.
         place: of the base on the ground, m, shape (runs, steps, 2).
         rpy: roll, pitch and yaw, rad, shape (runs, steps, 3).
         velocity: true one of the base in its own frame, m/s, shape (runs, steps, 3).
-        estimated: the same as estimated.
-        angular_velocity: in its own frame, rad/s, shape (runs, steps, 3).
+        estimated: estimate of the velocity.
+        angular_velocity: in the base's frame, rad/s, shape (runs, steps, 3).
         phase: of the first leg, cycles, shape (runs, steps).
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
-        stiff: 1 while the feedback makes servos stiff, by gains or targets, else 0, the same.
+        stiff: 1 while the feedback stiffens servos, by gains or targets, else 0, the same.
         cost: of transport after BEGINNING, shape (runs,).
 
     """

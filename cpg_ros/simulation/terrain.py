@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ground that is not flat, flat at the origin: heights on a grid, or slabs.
+"""Ground that is flat at the origin only: heights on a grid, or slabs.
 
-Ramps and stairs are slabs, with true edges: on a grid a riser is a steep slope whose prisms catch
-feet and hold back robots that walk up real steps of that height.
+Ramps and stairs are slabs with exact edges: on a grid a riser is a steep slope whose prisms catch
+feet and stop robots that climb real steps of that height.
 """
 
 from dataclasses import dataclass
@@ -56,10 +56,10 @@ class Terrain:
 
     Attributes:
         kind: one of KINDS; a course has a height field, a ramp up and down, and boxes.
-        size: largest height, m, from 0 to HIGHEST, or that of a step; of a ramp its angle up,
-            degrees.
+        size: largest height, m, from 0 to HIGHEST, or height of a step; for a ramp its angle,
+            positive up, degrees.
         seed: of random heights.
-        across: of a ramp: whether it rises to the left instead of ahead.
+        across: whether a ramp rises to the left instead of ahead.
 
     Raises:
         SimulationError: there is no such kind, or it is too high.
@@ -82,7 +82,7 @@ class Terrain:
 
 
 def grid() -> tuple[np.ndarray, np.ndarray]:
-    """Return the places of rows (to the left) and of columns (ahead), m."""
+    """Return the coordinates of rows (to the left) and of columns (ahead), m."""
     return (np.linspace(-ASIDE, ASIDE, round(2.0 * ASIDE / GRID) + 1),
             np.linspace(-BEHIND, AHEAD, round((AHEAD + BEHIND) / GRID) + 1))
 

@@ -41,10 +41,10 @@ class CodimensionTwo(ShortRepr):
 
     Attributes:
         kind: one of LABELS.
-        gait: of the curve; gaits that share a curve have coefficients of their own.
+        gait: of the curve; each gait on a common curve has its own coefficients.
         values: on both axes.
         test: value of the test function: the first Lyapunov coefficient at a Bautin point, the
-            real part of the other root at a Hopf-Hopf or zero-Hopf point, else the largest
+            real part of the other root at a Hopf-Hopf or zero-Hopf point, otherwise the largest
             residual of the defining equations.
         omega: of the curve's critical root, rad per model time; nan on curves of orbits.
         other: gaits of the classes of the other roots, '' for a class without a gait.
@@ -130,9 +130,9 @@ class ParameterPlane:
 
     Attributes:
         network: name or file, as find_network takes it.
-        base: all parameters; those on the axes do not matter.
-        first: the axis along the rows of the grid.
-        second: the axis along which orbits are continued in a row.
+        base: all parameters; those on the axes are ignored.
+        first: axis along the rows of the grid.
+        second: axis along which orbits are continued in a row.
 
     """
 

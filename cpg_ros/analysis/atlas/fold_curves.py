@@ -125,7 +125,7 @@ def _pair(fold: CurvePoint) -> tuple[float, float]:
 
 
 def _extremum(point: CurvePoint, reach: float, sign: float) -> tuple[float, float]:
-    """Return the step from a point at which the rate times a sign is least, and that value."""
+    """Return the step from a point that minimises the rate times a sign, and the minimum."""
     rate = rate_along(point)
     extremum = minimize_scalar(lambda step: sign * rate(step), method='bounded',
                                bounds=(-reach, reach), options={'xatol': ALONG})
@@ -243,7 +243,7 @@ TRIED, MOST, SAME = 8, 80, 0.02
 
 
 def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
-    """Return edges of the coarse grid along the second axis at one end of which is no orbit."""
+    """Return edges of the coarse grid along the second axis with an orbit at one end only."""
     return [Edge(chart.fraction(at), chart.fraction(other), *sheet.waves[at])
             for axis, left, right in chart.neighbours() if axis == 1
             for at, other in ((left, right), (right, left))
@@ -251,7 +251,7 @@ def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
 
 
 def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
-    """Follow the folds at which a gait is lost over some edges, and its orbits of long period."""
+    """Follow the folds at which a gait is lost on some edges, and its orbits of long period."""
     chart, gait, edges = job
     curves: list[Boundary] = []
     for edge in edges[::max(1, len(edges) // TRIED)]:

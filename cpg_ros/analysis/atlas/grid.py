@@ -14,10 +14,9 @@
 
 """The grid of an atlas: rows as jobs, and refinement between neighbours that differ.
 
-In a row, orbits of one gait are continued from neighbour to neighbour.
-
-Between neighbours at which a gait exists, or not, with the same stability, points are interpolated
-bilinearly. The result does not depend on the workers.
+In a row, orbits of one gait are continued from neighbour to neighbour. Between neighbours that
+agree on existence and stability of a gait, points are interpolated bilinearly. The result does not
+depend on the workers.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -84,7 +83,7 @@ class AtlasRow:
 def assess_row(row: AtlasRow) -> list[dict[str, Any]]:
     """Assess the gait at the points of a row; return a dictionary of plain types for each.
 
-    Of several orbits the first counts that attracts, if only with a lock.
+    Of several orbits, the first that attracts, with or without a lock, counts.
     """
     finder = _Finder(row)
     return [finder.point(column) for column in row.columns]
@@ -261,7 +260,7 @@ class GaitMap(ShortRepr):
         self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
 
     def take(self, points: Iterable[dict[str, Any]]) -> None:
-        """Enter the points of a job where they are better than those before."""
+        """Enter the points of a job where they are better than previous ones."""
         for point in points:
             at = point['row'], point['column']
             if self.computed[at] and point['label'] <= self.label[at]:
@@ -307,7 +306,7 @@ def worse_points(chart: ParameterPlane, gait: str, sheet: GaitMap,
         chart: the plane.
         gait: of the map.
         sheet: the map.
-        before: labels at the previous call; only points that have changed since are used.
+        before: labels at the previous call; only points next to changed ones are used.
 
     """
     jobs = []
@@ -355,13 +354,13 @@ def refine_once(chart: ParameterPlane, gait: str, sheet: GaitMap, stride: int) -
 
 def uncrossed_edges(chart: ParameterPlane, gait: str, sheet: GaitMap, curves: Iterable[Boundary]
                     ) -> Iterator[ChartLine]:
-    """Yield edges of the coarse grid at whose ends labels differ and that no curve crosses.
+    """Yield edges of the coarse grid whose ends have different labels and that no curve crosses.
 
     Args:
         chart: the plane.
         gait: of the map.
         sheet: the map.
-        curves: boundaries that have been followed.
+        curves: known boundaries.
 
     """
     crossing = [curve for curve in curves if gait in curve.gaits]

@@ -14,9 +14,9 @@
 
 """Curves of torus points, period doublings and branch points of a gait in two parameters.
 
-On a curve the modulus of one multiplier is 1. Away from folds orbits are a function of both
-parameters, and so is its logarithm g: the curve g = 0 is followed by steps along its tangent and
-Newton's method normal to it.
+On a curve the modulus of one multiplier is 1. Away from folds, orbits are a function of both
+parameters, and so is the logarithm g of the modulus: the curve g = 0 is followed by steps along
+its tangent and Newton's method normal to it.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +42,7 @@ ACCURACY = Accuracy(4, 1e-12, 1e-8, 5)
 
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first; the class comes first, without 1."""
+    """Return the multipliers of each subspace, largest first; the class first, without 1."""
     return multipliers(orbit, accuracy=ACCURACY).subspaces
 
 
@@ -76,8 +76,8 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
                      curve: Sequence[tuple[np.ndarray, Orbit]]) -> Iterator[LossOnCurve]:
     """Yield the normal forms at evenly spaced points of a curve.
 
-    Points at which other multipliers are outside the unit circle are left out: there the gait is
-    unstable on both sides.
+    Points with other multipliers outside the unit circle are skipped: there the gait is unstable
+    on both sides.
 
     Args:
         plane: of the curve.
@@ -295,7 +295,7 @@ def _continue_edge(g: Distance, start: np.ndarray, direction: float) -> Iterator
 
 
 def _normal(vector: np.ndarray) -> np.ndarray:
-    """Return the unit vector a quarter turn ahead of one in the plane."""
+    """Return the unit vector perpendicular to one in the plane, to its left."""
     return np.array([-vector[1], vector[0]]) / np.linalg.norm(vector)
 
 

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped's own gains of the feedback in its walk, found by CMA-ES (Hansen) in simulation.
+"""Search for the gains of a biped's walk by CMA-ES (Hansen) in simulation.
 
 Sensors are noisy and late, the velocity is estimated, and links collide with one another. Every
-generation meets other pushes, noise and tiles; what was found is judged on seeds that no
-generation has seen.
+generation has new pushes, noise and tiles; the result is judged on seeds that no generation has
+used.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -69,7 +69,7 @@ class Walk:
         speed: forward, m/s.
         seed: of the noise, and of the tiles.
         push: as ``impulse`` makes it, or None.
-        tiles: their height, m; 0 for flat ground.
+        tiles: height of tiles, m; 0 for flat ground.
 
     """
 
@@ -86,7 +86,7 @@ class Walk:
 
 @dataclass(frozen=True)
 class WalkJob:
-    """Walks of a robot with some sets of gains, in a process of its own."""
+    """Walks of a robot with some sets of gains, as a job for another process."""
 
     robot: Robot
     model: str
@@ -133,7 +133,7 @@ def walked(job: WalkJob) -> list[list[BipedOutcome]]:
 
 
 def with_gains(robot: Robot, gains: Mapping[str, float]) -> Robot:
-    """Return a biped with some gains of its own changed."""
+    """Return a biped with some gains changed."""
     body = _body(robot)
     return replace(robot, biped=replace(body, gains={**body.gains, **gains}))
 
@@ -141,19 +141,19 @@ def with_gains(robot: Robot, gains: Mapping[str, float]) -> Robot:
 def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
                executor: Executor | None = None,
                update: Callable[[int], None] = lambda done: None) -> tuple[Robot, TunedBiped]:
-    """Search for a biped's gains in its walk.
+    """Search for the gains of a biped's walk.
 
     Args:
-        robot: whose file has the part ``biped``.
+        robot: with the part ``biped`` in its file.
         model: as of ``robot_model.load``.
-        evaluations: how many sets of gains to try, about.
-        seed: the same one finds the same, on whatever workers.
-        executor: that walks are computed by; None for this process.
+        evaluations: approximate number of sets of gains to try.
+        seed: determines the result, whatever the workers.
+        executor: computes the walks; None for this process.
         update: called with the number tried so far.
 
     Returns:
-        The robot whose file has the gains, and what fresh runs make of them; where they are no
-        better than those before, it keeps these.
+        The robot with the gains, or with those before if they are no better, and the results of
+            fresh runs.
 
     Raises:
         InputError: the robot is no biped with soles.

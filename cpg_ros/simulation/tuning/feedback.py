@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot's own gains of the feedback, found by CMA-ES (Hansen) in simulation.
+"""Search for the gains of a robot's feedback by CMA-ES (Hansen) in simulation.
 
-Every generation meets other pushes and other ground; what was found is judged on seeds that no
-generation has seen.
+Every generation has new pushes and ground; the result is judged on seeds that no generation has
+used.
 """
 
 from collections.abc import Callable, Sequence
@@ -65,7 +65,7 @@ class Benefit:
 
     Attributes:
         gait: its name.
-        upright: undisturbed runs with feedback that did not fall, of UNDISTURBED.
+        upright: number of undisturbed runs with feedback without a fall, of UNDISTURBED.
         pushes: survived without feedback (before) and with it (after).
 
     """
@@ -76,7 +76,7 @@ class Benefit:
 
     @property
     def helps(self) -> bool:
-        """Whether it fells no undisturbed robot, and significantly more pushes are survived."""
+        """Whether no undisturbed robot falls, and significantly more pushes are survived."""
         return self.upright == UNDISTURBED and self.pushes.better
 
     def __str__(self) -> str:
@@ -88,9 +88,9 @@ class Benefit:
 
 
 def judged_gaits(robot: Robot) -> list[str]:
-    """Return the gaits that feedback is judged in: those with an efference copy that do not hop.
+    """Return the gaits in which feedback is judged: those with an efference copy that do not hop.
 
-    Hops, whose left and right legs land together, have little use for it.
+    Feedback has little effect on hops, whose left and right legs land together.
     """
     if robot.geometry is None:
         return []
@@ -104,15 +104,15 @@ class FeedbackTrial:
     """Runs of one gait with any gains.
 
     Attributes:
-        loop: the bodies.
+        loop: bodies.
         length: of the legs, m.
-        speed: asked for, m/s.
+        speed: commanded, m/s.
 
     """
 
     def __init__(self, robot: Robot, model: str, gait: str, kp: float | None = None,
                  kd: float | None = None) -> None:
-        """Load the model; arguments as of tuning.tune, the robot with an efference copy.
+        """Load the model; arguments as of tuning.tune, with an efference copy in the robot.
 
         Raises:
             SimulationError: the model cannot be used.
@@ -144,11 +144,11 @@ class FeedbackTrial:
         return [Scenario(speed=self.speed, phase=k / UNDISTURBED) for k in range(UNDISTURBED)]
 
     def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
-        """Return which runs with pushes are survived; None for no feedback."""
+        """Return which runs with pushes are survived; None runs them without feedback."""
         return self._upright(gains, pushed, WATCHED)
 
     def upright(self, gains: Gains | None) -> int:
-        """Return how many undisturbed runs do not fall."""
+        """Return the number of undisturbed runs without a fall."""
         return int(self._upright(gains, self.calm(), WALKED).sum())
 
     def _upright(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
@@ -167,14 +167,14 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
                    kd: float | None = None, seed: int = 0) -> tuple[Robot, list[Benefit]]:
     """Return a robot whose file states whether its feedback helps in gaits, and the evidence.
 
-    Of the sets of laws in WITHOUT it gets the first that helps in every gait; where none does, its
-    feedback is off unless one asks for it. Laws and gains of its own stay.
+    It gets the first set of laws in WITHOUT that helps in every gait; if none does, its feedback
+    is off by default. Laws and gains of its own stay.
 
     Args:
         robot: with the geometry of its legs and an efference copy of each gait.
         model: as of ``robot_model.load``.
-        gaits: to be judged.
-        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        gaits: to judge.
+        kp: proportional gain of the joints, N m / rad; None for the default.
         kd: damping gain of the joints, N m s / rad; the same.
         seed: of the pushes.
 
@@ -235,11 +235,11 @@ JUDGED, FRESH = 64, 10_000_019
 
 @dataclass(frozen=True)
 class PriceJob:
-    """Prices of some gains.
+    """Job that computes the prices of some gains.
 
     Attributes:
-        robot, model, gaits: as the arguments of tune_feedback.
-        candidates: their gains.
+        robot, model, gaits: arguments of tune_feedback.
+        candidates: gains.
         seed: of pushes and ground.
         costs: of transport without feedback, by gait.
         kp, kd: gains of all joints, None for the robot's own.
@@ -283,9 +283,9 @@ class TunedFeedback:
     """Results of pushes on fresh seeds, in all gaits.
 
     Attributes:
-        pushes: survived with the gains before the search and with those that it found.
+        pushes: survived with the gains before the search and with the new ones.
         without: pushes survived without feedback.
-        fell: undisturbed runs that fell with the gains that it found.
+        fell: undisturbed runs that fell with the new gains.
 
     """
 
@@ -312,23 +312,22 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
                   executor: Executor | None = None, kp: float | None = None,
                   kd: float | None = None, update: Callable[[int], None] = lambda done: None
                   ) -> tuple[Robot, TunedFeedback]:
-    """Search for gains of a robot's feedback in all of some gaits.
+    """Search for gains of a robot's feedback in some gaits together.
 
     Args:
         robot: with the geometry of its legs and efference copies of the gaits.
         model: as of ``robot_model.load``.
-        gaits: that are judged together.
-        evaluations: how many sets of gains to try, about.
-        seed: the same one finds the same, on whatever workers.
-        executor: that prices are computed by; None for this process.
-        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        gaits: judged together.
+        evaluations: approximate number of sets of gains to try.
+        seed: determines the result, whatever the workers.
+        executor: computes the prices; None for this process.
+        kp: proportional gain of the joints, N m / rad; None for the default.
         kd: damping gain of the joints, N m s / rad; the same.
         update: called with the number tried so far.
 
     Returns:
-        The robot whose file has the gains, and what fresh pushes make of them; where they are no
-        better than those before, it keeps these. Whether its feedback is on is what
-        ``judge_feedback`` says of them.
+        The robot with the gains, or with those before if they are no better, and the results of
+            fresh pushes. ``judge_feedback`` decides whether its feedback is on.
 
     Raises:
         SimulationError: CMA-ES is missing, or the model cannot be used.

@@ -14,10 +14,10 @@
 
 """From a foot's path to a gait's readout: legs of a model, inverse kinematics, fit.
 
-A gait is described by a few lengths and times, the same for the left and right leg of a pair.
-Legs move in the plane of their last two joints, and the first ones hold still; or they reach to
-the side. What joints do in a cycle is fitted as if legs stood half of it, which
-a few harmonics can do; that they stand longer is the duty factor's.
+A few lengths and times describe a gait, the same for the left and right leg of a pair. Legs move
+in the plane of their last two joints, and the first ones are held; or they extend sideways. The
+joints' motion is fitted for a duty factor of one half, which a few harmonics can represent; the
+readout's duty factor makes the stance longer.
 """
 
 from dataclasses import dataclass, replace
@@ -43,7 +43,7 @@ CENTRED = 0.1
 def centre_ahead(body: Body, parts: Anatomy) -> float:
     """Return how far the centre of mass is ahead of the middle of the feet in the stand, m.
 
-    It is 0 where that is less than CENTRED of half the distance from hind to fore feet.
+    It is 0 if it is below CENTRED of half the distance from hind to fore feet.
     """
     body.reset()
     feet = parts.sole_positions(body.data)[:, 0]
@@ -61,17 +61,17 @@ DIGITS = 4
 
 @dataclass(frozen=True)
 class FootTrajectory:
-    """The way of a foot relative to its thigh joint; lengths in m.
+    """Path of a foot relative to its thigh joint; lengths in m.
 
     Attributes:
-        stride: way on the floor, 0 for steps in place.
-        duty: fraction of the cycle on the floor, from phase 0 on.
+        stride: distance on the floor, 0 for steps in place.
+        duty: fraction of the cycle on the floor, from phase 0.
         lift: largest height above the floor.
         height: of the joint above the foot on the floor.
-        ahead: of the joint, middle of the way on the floor.
-        push: by how much more the leg is stretched at most while it is on the floor.
-        late: 1 if that is in the middle of this time, more if later.
-        lead: by how much the command leads the foot, cycles.
+        ahead: of the joint, middle of the path on the floor.
+        push: largest additional stretch of the leg during stance.
+        late: time of that stretch: 1 in the middle of the stance, more if later.
+        lead: of the command on the foot, cycles.
 
     """
 
@@ -100,15 +100,15 @@ class FootTrajectory:
 
 
 class Leg:
-    """The joints of a leg that move its foot in a stride, by the robot's geometry.
+    """Joints of a leg that move its foot in a stride, from the robot's geometry.
 
     They are thigh and calf of a leg that moves in a vertical plane, or coxa, femur and tibia of
-    one that reaches to the side.
+    one that extends sideways.
 
     Attributes:
         joints: from the base outwards.
-        length: from the thigh joint to the foot in the stand, or the height of the femur's axis
-            above the foot, m.
+        length: from the thigh joint to the foot in the stand, or height of the femur's axis above
+            the foot, m.
 
     """
 
@@ -137,14 +137,14 @@ class Leg:
         self.length = math.hypot(x, z) if own.yaw is None else own.thigh[2] - z
 
     def angles(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the joints' angles that put the foot there, rad, shape (joints, n).
+        """Return the joints' angles for foot positions, rad, shape (joints, n).
 
         A point out of reach is moved to the nearest one along its line to the thigh joint.
 
         Args:
-            x: forward of the thigh joint, or of the foot in the stand if the leg reaches to the
-                side, m, shape (n,).
-            z: upward of the axis of the thigh or femur, m, shape (n,).
+            x: forward of the thigh joint, or of the foot in the stand if the leg extends sideways,
+                m, shape (n,).
+            z: above the axis of the thigh or femur, m, shape (n,).
 
         """
         forward, left, up = self._origin
@@ -158,8 +158,8 @@ def basis(orbit: Orbit, cell: int, harmonics: int, path: FootTrajectory) -> np.n
     Args:
         orbit: the gait.
         cell: from 0.
-        harmonics: of a cell with two variables that joints follow.
-        path: whose duty the leg is to have.
+        harmonics: number of harmonics of a relaxation oscillator's waveform that joints follow.
+        path: with the leg's duty factor.
 
     """
     cells = np.array([cell])
@@ -180,8 +180,7 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
         psi: the monomials, shape (6, POINTS).
 
     Returns:
-        The offset, the weights of both curves, shape (2, 6), and what is left, rad, shape
-        (2, POINTS).
+        Offset, weights of both curves, shape (2, 6), and residuals, rad, shape (2, POINTS).
 
     """
     ones, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
@@ -192,10 +191,10 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
 
 
 class FootTrajectoryFit:
-    """The motions of a robot's joints that move its feet along given trajectories."""
+    """Motions of a robot's joints that move its feet along given trajectories."""
 
     def __init__(self, robot: Robot, model: str) -> None:
-        """Read all legs, by the robot file or else by the model; errors as of Leg."""
+        """Read all legs, from the robot file or else from the model; errors as of Leg."""
         self.robot = robot
         geometry = robot.geometry or geometry_from(robot, load_description(model))
         self.legs = {leg: Leg(robot, geometry, leg) for leg in robot.legs}

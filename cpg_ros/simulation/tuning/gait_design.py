@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The design of a gait in a few numbers, and the target of each gait for a knee-high robot.
+"""Design of a gait in a few numbers, and the target of each gait for a knee-high robot.
 
 All figures are for a leg of LENGTH from thigh joint to foot in the stand; for other robots lengths
-go with that length, times and speeds with its square root, as for pendulums.
+scale with the leg length, times and speeds with its square root, as for pendulums.
 """
 
 from collections.abc import Callable
@@ -55,10 +55,10 @@ RISE_FRACTION, TURN_FRACTION = 0.05, 0.5
 
 def measure(batch: OpenLoopBatch, plan: GaitPlan,
             update: Callable[[int], None] = lambda done: None) -> SteeringTable | None:
-    """Measure a gait at several strides; None if its speed does not rise with them.
+    """Measure a gait at several strides; None if its speed does not increase with them.
 
-    Rows are left out at the ends, where the robot falls or its speed does not rise any more.
-    ``update`` takes the number of strides measured so far.
+    Rows are dropped at the ends where the robot falls or its speed does not increase. ``update``
+    takes the number of strides measured so far.
     """
     left = plan.robot.left
     tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
@@ -84,7 +84,7 @@ def measure(batch: OpenLoopBatch, plan: GaitPlan,
 
 
 def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTable | None:
-    """Keep the rows about the stride of 0 as far as speeds rise."""
+    """Keep the rows around the stride of 0 as far as speeds increase."""
     zero = STRIDES.index(0.0)
     first = last = zero
     top = max(rows[len(STRIDES) - 1][0], 0.0)
@@ -112,13 +112,13 @@ CLEAR = 0.02
 
 @dataclass(frozen=True)
 class Design:
-    """A gait.
+    """Design of a gait.
 
     Attributes:
         frequency: Hz.
         stride, lift, height: as of FootTrajectory.
         duty, lead, late: as of FootTrajectory.
-        fore, hind: how far ahead of the joint fore and hind feet are, m.
+        fore, hind: distance of fore and hind feet ahead of the joint, m.
         push_fore, push_hind: of fore and hind legs, as of FootTrajectory.
 
     """
@@ -136,7 +136,7 @@ class Design:
     late: float
 
     def path(self, girdle: str, scale: float) -> FootTrajectory:
-        """Return the way of a fore, middle or hind foot of a robot this much larger."""
+        """Return the path of a fore, middle or hind foot of a robot scaled by a factor."""
         hind = {'hind': 1.0, 'middle': 0.5}.get(girdle, 0.0)
         ahead = self.fore + hind * (self.hind - self.fore)
         push = self.push_fore + hind * (self.push_hind - self.push_fore)
@@ -147,11 +147,11 @@ class Design:
 
 @dataclass(frozen=True)
 class GaitTarget:
-    """The target of a gait, and where to search for its design.
+    """Target of a gait, and where to search for its design.
 
     Attributes:
-        speed: steady, m/s; more is worth nothing, and much more is a fault.
-        hops: a second; 0 if it need not leave the floor.
+        speed: steady, m/s; more has no value, and much more counts as a fault.
+        hops: per second; 0 if the robot need not leave the floor.
         low, start, high: designs.
 
     """
@@ -179,14 +179,14 @@ class GaitTarget:
             height=start.height + fraction * (low.height - start.height)))
 
     def slower(self, fraction: float) -> 'GaitTarget':
-        """Return the same at this fraction of all frequencies, and of the speed that follows."""
+        """Return the same with this fraction of all frequencies, and of the resulting speed."""
         low, start, high = (replace(design, frequency=fraction * design.frequency)
                             for design in (self.low, self.start, self.high))
         return GaitTarget(fraction * self.speed, self.hops, low, start, high)
 
     @property
     def start_point(self) -> np.ndarray:
-        """The start in the unit cube, shape (11,)."""
+        """Start in the unit cube, shape (11,)."""
         low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
         return (np.array(astuple(self.start)) - low) / (high - low)
 
@@ -237,11 +237,11 @@ AIMS |= {f'reverse_{gait}': AIMS[gait] for gait in ('ripple', 'wave')}
 
 
 def price(trial: RunMetrics, aim: GaitTarget, duration: float, scale: float = 1.0) -> float:
-    """Return the cost of a run by its figures; 0 would be perfect.
+    """Return the cost of a run from its metrics; 0 would be perfect.
 
-    Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
-    leaning, dragging feet, drifting, sliding, torques at their limit and work all add to it; a
-    fall adds most. Lengths are divided by the robot's scale.
+    It rises if the robot is slower or much faster than wanted, hops too rarely or, where it should
+    not hop, bobs, turns, leans, drags its feet, drifts or slides, and with saturated torques and
+    work; a fall costs most. Lengths are divided by the robot's scale.
     """
     fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
     fraction = trial.speed / aim.speed

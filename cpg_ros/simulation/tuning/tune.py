@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``tune``: a robot's gaits, found by optimisation in simulation.
+"""Executable ``tune``: search for a robot's gaits in simulation.
 
 ``tune --robot my_robot.yaml --model go2 --out tuned.yaml`` searches for foot paths that walk far
-and upright, measures how to steer them, and writes the robot file with its part ``gaits``.
+and upright, measures steering tables, and writes the robot file with its part ``gaits``.
 """
 
 import argparse
