@@ -300,7 +300,7 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain],
     for leg, chain in chains.items():
         for moved in (*combinations(chain.joints, 3), *combinations(chain.joints, 2)):
             geometry = _leg_geometry(chain.holding({name: stand[name] for name in chain.joints
-                                                 if name not in moved}))
+                                                 if name not in moved}), stand)
             if geometry is not None:
                 legs[leg] = geometry
                 break
@@ -308,11 +308,14 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain],
     return BodyGeometry(round(mass, 6), round(radius, 6), legs)
 
 
-def _leg_geometry(chain: LegChain) -> LegGeometry | None:
+def _leg_geometry(chain: LegChain, stand: Mapping[str, float]) -> LegGeometry | None:
     axes, anchors, yaw, roll = chain.axes, chain.anchors, None, None
-    if sprawls(axes):
-        out = outward(axes[1], chain.foot - anchors[0])
-        yaw = round(float(np.arctan2(out[1], out[0])), 6)
+    standing, points, _ = chain.posed([stand[name] for name in chain.joints])
+    if sprawls(standing):
+        # Back from the stand to where its first joint is at 0.
+        out = outward(standing[1], points[-1] - points[0])
+        yaw = math.atan2(out[1], out[0]) - stand[chain.joints[0]] * float(np.sign(axes[0, 2]))
+        yaw = round(math.remainder(yaw, 2.0 * math.pi), 6)
     elif len(axes) == 3 and abs(axes[1, 1]) < 1.0 - 1e-6:
         roll = round(math.atan2(axes[1, 2], axes[1, 1]), 6)
         roll -= math.copysign(round(math.pi, 6), roll) if axes[1, 1] < 0.0 else 0.0

@@ -52,6 +52,7 @@ class BodyPose:
     ``go_to`` may be called from another thread than the ticks.
 
     Attributes:
+        obstacle: why the body cannot be moved, '' if it can.
         now: present pose.
         target: pose to reach.
         address: of its struct in the core.
@@ -59,25 +60,21 @@ class BodyPose:
     """
 
     def __init__(self, robot: Robot) -> None:
-        """Begin in the stand.
-
-        Raises:
-            InputError: the robot file lacks the geometry of a leg, or the robot balances on soles.
-
-        """
-        if robot.biped is not None:
-            raise InputError(f"robot '{robot.name}' balances on its soles: its feedback moves the "
-                             'body')
+        """Begin in the stand."""
         legs = robot.geometry.legs if robot.geometry is not None else {}
-        if missing := [leg for leg in robot.legs if leg not in legs]:
-            raise InputError(f"robot file '{robot.name}' has no geometry of the leg {missing[0]} "
-                             '(part geometry: check_robot --make writes it, and tune)')
+        self.obstacle = (
+            f"robot '{robot.name}' balances on its soles: its feedback moves the body"
+            if robot.biped is not None else
+            next((f"robot file '{robot.name}' has no geometry of the leg {leg} (part geometry: "
+                  'check_robot --make writes it, and tune)' for leg in robot.legs
+                  if leg not in legs), ''))
+        legs = {} if self.obstacle else {leg: legs[leg] for leg in robot.legs}
         self._robot, self._stand = robot, robot.column('offset')
         self._low, self._high, self._fast = (robot.column(key)
                                              for key in ('lower', 'upper', 'velocity'))
         names = [joint.name for joint in robot.joints]
         joints, limbs = np.full((len(legs), 3), -1, np.int16), np.zeros((len(legs), 8, 3))
-        for row, limb, leg in zip(joints, limbs, map(legs.__getitem__, robot.legs), strict=True):
+        for row, limb, leg in zip(joints, limbs, legs.values(), strict=True):
             count = len(leg.joints)
             row[:count] = [names.index(name) for name in leg.joints]
             limb[:count] = (leg_axes(leg.yaw, leg.roll).T[[0, 1, 1][-count:]]
@@ -92,14 +89,9 @@ class BodyPose:
                             1.0, self._kept[0].ctypes.data, joints.ctypes.data,
                             limbs.ctypes.data, len(legs), 0)
         self.address = ctypes.addressof(self._struct)
-        for limb, place in zip(limbs, self._feet(self._stand), strict=True):
-            limb[7] = place
-
-    def _feet(self, angles: np.ndarray) -> np.ndarray:
-        """Return the places of the feet, m, shape (legs, 3), for angles in rad, (joints,)."""
-        feet = np.empty((self._struct.legs, 3))
-        core().cpg_feet(self.address, angles.ctypes.data, feet.ctypes.data)
-        return feet
+        feet = np.empty((len(legs), 3))
+        core().cpg_feet(self.address, self._stand.ctypes.data, feet.ctypes.data)
+        limbs[:, 7] = feet
 
     @property
     def moving(self) -> bool:
@@ -111,42 +103,34 @@ class BodyPose:
         """Whether the robot sits, or is about to."""
         return bool(self.target[0] < 0.0 and (self.target == self.seat).all())
 
-    def angles(self, pose: Sequence[float] | np.ndarray) -> np.ndarray:
+    def angles(self, pose: Sequence[float] | np.ndarray, plan: GaitPlan | None = None
+               ) -> np.ndarray:
         """Return the angles of the joints in a pose, rad, shape (joints,).
 
         Raises:
-            InputError: a foot does not reach the ground, or a joint would leave its limits.
+            InputError: the body cannot be moved, a foot does not reach the ground, or a joint
+                would leave its limits in the pose, or in the gait of ``plan`` about it.
 
         """
+        if self.obstacle:
+            raise InputError(self.obstacle)
         angles, far = self._stand.copy(), 0.0
         for share in np.arange(1, WAYPOINTS + 1) / WAYPOINTS:
             wanted = share * np.asarray(pose, dtype=float)
             far = core().cpg_pose(self.address, wanted.ctypes.data, angles.ctypes.data, STEPS)
         if not far < REACHED:
             raise InputError(f'{_text(pose)}: the feet do not reach their places on the ground')
-        for joint, angle in zip(self._robot.joints, angles, strict=True):
-            if message := beyond_limits(joint, angle, angle):
-                raise InputError(f'{_text(pose)} takes {message}')
+        spans = np.zeros((2, len(angles))) if plan is None else plan.span
+        gait = '' if plan is None else f" in the gait '{plan.name}'"
+        for joint, angle, low, high in zip(self._robot.joints, angles, *spans, strict=True):
+            if message := beyond_limits(joint, angle + min(low, 0.0), angle + max(high, 0.0)):
+                raise InputError(f'{_text(pose)}{gait} takes {message}')
         return angles
-
-    def check(self, pose: Sequence[float] | np.ndarray, plan: GaitPlan) -> None:
-        """Check that a robot can stand in a pose and walk in it by a plan.
-
-        Raises:
-            InputError: it cannot; the message names the joint and the figure.
-
-        """
-        if not any(pose):
-            return
-        for joint, angle, low, high in zip(self._robot.joints, self.angles(pose), *plan.span,
-                                           strict=True):
-            if message := beyond_limits(joint, angle + low, angle + high):
-                raise InputError(f"{_text(pose)} in the gait '{plan.name}' takes {message}")
 
     @cached_property
     def seat(self) -> np.ndarray:
         """Pose in which the robot sits: as low as its joints allow, down to SEATED."""
-        stand = -float(self._feet(self._stand)[:, 2].mean())
+        stand = -float(self._kept[3][:, 7, 2].mean())
         low, high = -(1.0 - SEATED) * stand, 0.0
         tried = low
         while high - low > 1e-3:

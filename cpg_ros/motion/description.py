@@ -30,6 +30,9 @@ import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
+#: Limits of commands in a ros2_control part, by interface and parameter.
+COMMANDED = {('position', 'min'): 'lower', ('position', 'max'): 'upper',
+             ('velocity', 'max'): 'velocity'}
 #: END: fraction of the reach of a leg's last link beyond which its points belong to the foot.
 END = 0.97
 #: SLOW, FASTEST: speed limits, rad/s, below and above which a model's limit is doubted; SERVOS:
@@ -373,19 +376,15 @@ def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]
 
 def _controlled(element: Element, joint: JointDescription) -> JointDescription:
     """Narrow a joint's limits to those of its command interfaces in the ros2_control part."""
-    limits = {'lower': joint.lower, 'upper': joint.upper, 'velocity': joint.velocity}
+    limits = {key: getattr(joint, key) for key in COMMANDED.values()}
     for interface in element.iterfind('command_interface'):
         for param in interface.iterfind('param'):
             value = numbers(param.text or '', 1)
-            key = interface.get('name', ''), param.get('name', '')
-            if value and key == ('position', 'min'):
-                limits['lower'] = max(limits['lower'], *value)
-            elif value and key == ('position', 'max'):
-                limits['upper'] = min(limits['upper'], *value)
-            elif value and key == ('velocity', 'max'):
-                limits['velocity'] = min(limits['velocity'], *value)
-    return replace(joint, lower=limits['lower'], upper=limits['upper'],
-                   velocity=limits['velocity'])
+            key = COMMANDED.get((interface.get('name', ''), param.get('name', '')))
+            if value and key:
+                narrower = max if key == 'lower' else min
+                limits[key] = narrower(limits[key], *value)
+    return replace(joint, **limits)
 
 
 def mesh_folder(tree: Element) -> str:

@@ -25,7 +25,6 @@ import ctypes
 import math
 from typing import Any, NamedTuple
 
-from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.body_pose import BodyPose
 from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS
@@ -195,7 +194,7 @@ class Pattern:
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
         correct: takes and returns angles before limits hold them; None for the gait as it is.
-        body: the pose of the body, None for a robot of unknown geometry.
+        body: the pose of the body.
         frequency_scale: factor of the pattern's clock.
         substep: longest part of a tick while gaits fade or the ramp moves, s.
 
@@ -239,11 +238,8 @@ class Pattern:
             self._struct.limits[k] = row.ctypes.data
         self._run([GaitRunner(plan, 0.0, strides)])
         self.strides = strides
-        try:
-            self.body: BodyPose | None = BodyPose(robot)
-            self._struct.body = self.body.address
-        except InputError:
-            self.body = None
+        self.body = BodyPose(robot)
+        self._struct.body = self.body.address
         self.restart(ramp, enabled)
 
     def _run(self, tracks: list[GaitRunner]) -> None:

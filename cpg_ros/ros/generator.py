@@ -161,7 +161,7 @@ class Diagnostics:
         if self._ticker.waiting:
             return f'waiting for {self._awaited()}'
         if pattern.standing:
-            return 'sitting' if pattern.body is not None and pattern.body.seated else 'standing'
+            return 'sitting' if pattern.body.seated else 'standing'
         if pattern.level < 1.0:
             return 'ramping up' if pattern.enabled else 'ramping down'
         return 'changing gait' if pattern.in_transition else 'running'

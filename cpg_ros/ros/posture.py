@@ -14,11 +14,12 @@
 
 """The pose of a generator's body: parameters, topic ``body_pose``, ``~/sit`` and ``~/stand``."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import math
+from typing import Any
 
 from cpg_ros.common.errors import InputError
-from cpg_ros.motion.body_pose import BodyPose, POSE
+from cpg_ros.motion.body_pose import POSE
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.rotations import rpy_of
@@ -30,7 +31,6 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
-from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 PREFIX = 'body.'
@@ -39,10 +39,8 @@ ENDS = 'stand', 'sit'
 SPECS = {
     f'{PREFIX}height': Spec(0.0, 'height of the body above its stand [m]; feet stay where they '
                             'are', -1.0, 1.0),
-    f'{PREFIX}roll': Spec(0.0, 'roll of the body against its feet [rad]', -0.8, 0.8),
-    f'{PREFIX}pitch': Spec(0.0, 'pitch of the body against its feet, positive with the nose down '
-                           '[rad]', -0.8, 0.8),
-    f'{PREFIX}yaw': Spec(0.0, 'yaw of the body against its feet [rad]', -0.8, 0.8),
+    **{f'{PREFIX}{name}': Spec(0.0, f'{name} of the body against its feet{sense} [rad]', -0.8, 0.8)
+       for name, sense in (('roll', ''), ('pitch', ', positive with the nose down'), ('yaw', ''))},
     'end': Spec('stand', 'pose in which the robot is left when the node ends; sit needs up to 3 s '
                 'more', constraints=one_of(ENDS))}
 #: LOOK: period in which the node looks whether the robot has stopped, or risen, s.
@@ -80,58 +78,38 @@ class Posture:
 
         """
         self._node, self._pattern, self._plan = node, pattern, plan
-        self._walk, self._refusal = walk, refusal
+        self._walk, self._refusal, self._body = walk, refusal, pattern.body
         self.seated = self.walks = self._rises = False
-        self._timer: Timer | None = None
-        self._pose = self._asked([])
+        self._timer = node.create_timer(LOOK, self._go_on, clock=STEADY, autostart=False)
+        self._pose = self._asked({})
         if reason := self.judge([], plan()):
             raise InputError(reason)
         if any(self._pose):
-            self._move(self._pose)
+            self._aim(self._pose)
         node.create_subscription(Pose, 'body_pose', self._take, QoSProfile(depth=1),
                                  qos_overriding_options=OVERRIDABLE)
-        node.create_service(Trigger, '~/sit', self._sit)
-        node.create_service(Trigger, '~/stand', self._stand)
+        self._serve('sit', 'sitting down', self._sit)
+        self._serve('stand', 'standing up: ~/enable walks', lambda: self.rise(False))
 
-    @property
-    def obstacle(self) -> str:
-        """Why the body cannot be moved, or ''."""
-        if self._pattern.body is None:
-            try:
-                BodyPose(self._pattern.robot)
-            except InputError as error:
-                return str(error)
-        return ''
-
-    @property
-    def _body(self) -> BodyPose:
-        assert self._pattern.body is not None
-        return self._pattern.body
-
-    def _asked(self, parameters: Sequence[Parameter]) -> tuple[float, ...]:
+    def _asked(self, changes: Mapping[str, Any]) -> tuple[float, ...]:
         """Return the pose of the parameters after a batch of changes."""
-        values = {f'{PREFIX}{name}': self._node.get_parameter(f'{PREFIX}{name}').value
-                  for name in POSE}
-        values |= {p.name: p.value for p in parameters if p.name in values}
-        return tuple(values.values())
+        return tuple(changes.get(name, self._node.get_parameter(name).value)
+                     for name in (f'{PREFIX}{number}' for number in POSE))
 
     def judge(self, parameters: Sequence[Parameter], plan: GaitPlan) -> str:
         """Return why a batch of changes, or a plan, is rejected, or ''."""
-        end = {'end': self._node.get_parameter('end').value, **{p.name: p.value
-                                                                for p in parameters}}['end']
-        if end == 'sit' and (obstacle := self.obstacle):
-            return f'end: {obstacle}'
-        changed = any(parameter.name.startswith(PREFIX) for parameter in parameters)
-        return self._reason(self._asked(parameters) if changed else self._pose, plan)
+        changes = {parameter.name: parameter.value for parameter in parameters}
+        end = changes.get('end', self._node.get_parameter('end').value)
+        if end == 'sit' and self._body.obstacle:
+            return f'end: {self._body.obstacle}'
+        changed = any(name.startswith(PREFIX) for name in changes)
+        return self._reason(self._asked(changes) if changed else self._pose, plan)
 
     def _reason(self, pose: Sequence[float], plan: GaitPlan) -> str:
         """Return why the robot cannot stand in a pose, or walk in it by a plan, or ''."""
-        if not any(pose):
-            return ''
-        if obstacle := self.obstacle:
-            return f'{PREFIX}*: {obstacle}'
         try:
-            self._body.check(pose, plan)
+            if any(pose):
+                self._body.angles(pose, plan)
         except InputError as error:
             return str(error)
         return ''
@@ -139,9 +117,13 @@ class Posture:
     def apply(self, parameters: Sequence[Parameter]) -> None:
         """Apply a batch that has been accepted and stored."""
         if any(parameter.name.startswith(PREFIX) for parameter in parameters):
-            self._pose = self._asked([])
-            if not self.seated and not self.obstacle:
-                self._move(self._pose)
+            self._aim(self._asked({}))
+
+    def _aim(self, pose: tuple[float, ...]) -> None:
+        """Go to a pose, or keep it for when the robot has risen."""
+        self._pose = pose
+        if not (self.seated or self._body.obstacle):
+            self._move(pose)
 
     def _move(self, pose: Sequence[float] | np.ndarray) -> None:
         self._body.go_to(pose, self._node.get_parameter('ramp').value)
@@ -164,31 +146,25 @@ class Posture:
         if reason := self._reason(pose, self._plan()):
             log.warning(f'body_pose ignored: {reason}', throttle_duration_sec=QUIET)
             return
-        self._pose = pose
-        if not self.seated and not self.obstacle:
-            self._move(pose)
+        self._aim(pose)
 
     # -- sitting ---------------------------------------------------------------------------
 
-    def _answer(self, response: Trigger.Response, text: str) -> Trigger.Response:
-        response.message = self.obstacle or self._refusal()
-        response.success = not response.message
-        if response.success:
-            response.message = text
-            self._timer = self._timer or self._node.create_timer(LOOK, self._go_on, clock=STEADY)
-        self._node.get_logger().info(response.message)
-        return response
+    def _serve(self, name: str, text: str, act: Callable[[], None]) -> None:
+        def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            refusal = self._body.obstacle or self._refusal()
+            response.success, response.message = not refusal, refusal or text
+            if not refusal:
+                act()
+            self._node.get_logger().info(response.message)
+            return response
 
-    def _sit(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._answer(response, 'sitting down').success:
-            self._walk(False)
-            self.seated, self._rises = True, False
-        return response
+        self._node.create_service(Trigger, f'~/{name}', answer)
 
-    def _stand(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        if self._answer(response, 'standing up: ~/enable walks').success:
-            self.rise(False)
-        return response
+    def _sit(self) -> None:
+        self._walk(False)
+        self.seated, self._rises = True, False
+        self._timer.reset()
 
     def rise(self, walks: bool) -> None:
         """Stand up from sitting, and then walk, if requested."""
@@ -196,23 +172,21 @@ class Posture:
         if self.seated:
             self._rises = True
             self._move(self._pose)
-            self._timer = self._timer or self._node.create_timer(LOOK, self._go_on, clock=STEADY)
+            self._timer.reset()
 
     def _go_on(self) -> None:
         """Sit down once the robot stands, or walk once it is up."""
-        if self.seated and self._rises:
+        if self._rises:
             if np.abs(self._body.now - self._pose).max() > NEAR:
                 return
             self.seated = self._rises = False
             if self.walks:
                 self._walk(True)
-        elif self.seated:
-            if not self._pattern.standing:
-                return
+        elif self._pattern.standing:
             self._move(self._body.seat)
-        if self._timer is not None:
-            self._timer.destroy()
-            self._timer = None
+        else:
+            return
+        self._timer.cancel()
 
     def end(self) -> bool:
         """Sit down for the last time; return whether the robot sits."""

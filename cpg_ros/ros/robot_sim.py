@@ -33,7 +33,7 @@ from cpg_ros.ros.node.polled import latched
 from cpg_ros.ros.node.ticker import Ticker, TickThread
 from cpg_ros.simulation.body import Approach, Body
 from cpg_ros.simulation.recorder import RunLog, summary, without_opengl
-from cpg_ros.simulation.robot_model import legs, SimulationError
+from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.sensors import SimulatedSensors
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
@@ -63,7 +63,7 @@ class Measurements:
         self._body, self._sensors, self._holds = body, sensors, bool(body.robot.held)
         self._delay = round(1e9 * delay)
         self._late: deque[tuple[int, list[np.ndarray]]] = deque()
-        names, feet = body.robot.order, legs(body.robot)
+        names, feet = body.robot.order, tuple(body.robot.legs)
         n = len(names)
         held = tuple(body.robot.held)
         sizes = n, n, n, len(feet), 3, 4, 6, *(3 * [len(held)] if held else [])

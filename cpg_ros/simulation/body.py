@@ -21,7 +21,7 @@ from typing import Any
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.motion.strides import smoothstep
-from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
+from cpg_ros.simulation.robot_model import engine, load, SimulationError
 import numpy as np
 
 #: FALLEN: lean of the base above which the robot has fallen, rad.
@@ -65,7 +65,7 @@ class Body:
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.places]
         self._kp, self._kp_scale = self.model.actuator_gainprm[:, 0].copy(), 1.0
-        count, n = len(legs(robot)), len(robot.order)
+        count, n = len(robot.legs), len(robot.order)
         joints = self.model.actuator_trnid[:n, 0]
         self._held = list(robot.held.values())
         self._held_angles = self.model.jnt_qposadr[self.model.actuator_trnid[n:, 0]]
@@ -119,8 +119,7 @@ class Body:
                and (model.geom_contype[geom] or model.geom_conaffinity[geom])]
         if not planes or not own:
             raise SimulationError(f"the model of '{self.robot.name}' has no "
-                                  + ('shapes that could touch the floor (a URDF needs '
-                                     '<collision>)' if planes else 'floor'))
+                                  + ('shapes that could touch the floor' if planes else 'floor'))
         return min(mujoco.mj_geomDistance(model, self.data, plane, geom, 100.0, None)
                    for plane in planes for geom in own)
 
@@ -259,7 +258,7 @@ class Anatomy:
         pose: the base's position and quaternion in qpos.
         angles: joints in qpos, in the order of controllers, shape (joints,).
         speeds: joints in qvel.
-        feet: the geom of each leg that is lowest in the stand, legs as of ``robot_model.legs``.
+        feet: the geom of each leg that is lowest in the stand, as the file orders legs.
         bodies: of these geoms, shape (legs,).
         soles: the middle of a foot that is a ball, else its lowest point in the stand, m, in the
             frames of these bodies, shape (legs, 3).
@@ -277,7 +276,7 @@ class Anatomy:
         body.reset()
         floor = int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0])
         self.feet, soles = [], []
-        for leg in legs(body.robot):
+        for leg in body.robot.legs:
             own = {model.joint(joint.name).bodyid[0] for joint in body.robot.legs[leg]}
             geoms = [geom for geom in range(model.ngeom)
                      if (model.geom_contype[geom] or model.geom_conaffinity[geom])

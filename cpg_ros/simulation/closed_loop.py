@@ -70,7 +70,7 @@ class Patterns:
         self._position = self.planned.angles.copy()
         for run, (pattern, one) in enumerate(zip(self._patterns, scenarios, strict=True)):
             pattern.begin_at(one.phase)
-            if pattern.body is not None and any(one.pose):
+            if any(one.pose):
                 pattern.body.go_to(one.pose, RAMP)
             if trimmed and pattern.strides is not None:
                 pattern.strides.trim = feedback.memory.stride[run]
@@ -112,8 +112,7 @@ class Patterns:
                 pattern.frequency_scale = feedback.memory.frequency_scale[run]
             planned.angles[run] = pattern.plan_tick(self._dt)
             planned.phase[run] = pattern.phases[0]
-            if pattern.body is not None:
-                planned.lean[run] = pattern.body.now[1:]
+            planned.lean[run] = pattern.body.now[1:]
             old, new, planned.mix[run] = pattern.fading
             planned.gaits[run] = feedback.slot(old), feedback.slot(new)
 

@@ -30,7 +30,7 @@ from cpg_ros.common.command_line import progress_bar
 from cpg_ros.motion.rotations import rpy_of
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
+from cpg_ros.simulation.robot_model import engine, load, SimulationError
 from cpg_ros.simulation.terrain import add_ground, lay, Terrain
 import numpy as np
 from PIL import Image
@@ -109,7 +109,8 @@ class RunLog:
             gaits = [(max(float(times[0]), when), gait) for when, gait in
                      begun + [gait for gait in self._gaits if gait[0] > times[0]]]
             robot = self._body.robot
-            measured, shown = legs(robot), footfall_order(robot.legs, robot.sides, robot.girdles)
+            measured = tuple(robot.legs)
+            shown = footfall_order(measured, robot.sides, robot.girdles)
             plot_footfalls(self._footfalls, shown, times,
                            forces[:, [measured.index(leg) for leg in shown]], positions, gaits)
             written.append(self._footfalls)

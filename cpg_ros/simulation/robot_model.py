@@ -29,7 +29,7 @@ from cpg_ros.common import files
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import resource_folder
 from cpg_ros.motion.body_file import BipedLink
-from cpg_ros.motion.description import DescriptionError
+from cpg_ros.motion.description import DescriptionError, load_urdf
 from cpg_ros.motion.meshes import merged, Mesh
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.urdf_model import part_touching, read_urdf
@@ -103,6 +103,8 @@ G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
 SQUARE = 0.25
 #: GRAIN: smallest feature of a mesh that is drawn, m; less than a pixel, and far fewer faces.
 GRAIN = 0.004
+#: BALL: radius of a foot in place of a missing one, as a share of the leg's length.
+BALL = 0.04
 
 
 class SimulationError(CpgError):
@@ -137,7 +139,7 @@ def find_model(name: str) -> Path:
         SimulationError: there is no such file or robot.
 
     """
-    if name.endswith(('.xml', '.urdf')) or '/' in name:
+    if name.lower().endswith(('.xml', '.urdf')) or '/' in name:
         path = Path(name).expanduser()
         if not path.is_file():
             raise SimulationError(f'model {path}: no such file')
@@ -172,11 +174,6 @@ def _of_mjlab(name: str) -> Path:
                           'install --no-deps mjlab==1.6.0')
 
 
-def legs(robot: Robot) -> tuple[str, ...]:
-    """Return a robot's legs in the order of its file, as sensor data have them."""
-    return tuple(robot.legs)
-
-
 def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = None,
          timestep: float = 0.002, visual: bool = False,
          add: Callable[[Any], None] | None = None,
@@ -186,7 +183,7 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
     Actuators are the joints in ``robot.order``, then those that the robot file holds: torque =
     kp (control - angle) - kd speed, within the limits of the file's motors or of the robot file's
     part ``biped``. Sensors: ``foot_LEG``, the force in N (x y z, world frame) on the floor from
-    all that is moved by the last joint of each leg in the order of ``legs``, then ``trunk``, the
+    all that is moved by the last joint of each leg, in the file's order, then ``trunk``, the
     number of contacts of the base with the floor.
 
     Args:
@@ -206,7 +203,7 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
     """
     mujoco, path = engine(), find_model(name)
     try:
-        if urdf := path.suffix == '.urdf':
+        if urdf := path.suffix.lower() == '.urdf':
             spec = read_urdf(path, robot.order, visual, say)
             _free(spec, path)
         else:
@@ -215,6 +212,8 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
         joints = {joint.name: joint for joint in spec.joints}
         base = _base(spec, path)
         _check(robot, joints, path)
+        if urdf and len(robot.legs) > 2:
+            _give_feet(path, robot, joints, say)
         _drive(spec, robot, say)
         _sense(spec, robot, joints, base)
         _surround(spec, base)
@@ -319,6 +318,30 @@ def _limit(motor: Any) -> list[float] | None:
     return sorted((float(low), float(high)))
 
 
+def _give_feet(path: Path, robot: Robot, joints: dict[str, Any], say: Callable[[str], None]
+               ) -> None:
+    """Add a ball where the foot of a leg is if nothing there collides, as without meshes."""
+    last = {leg: max((joints[one.name] for one in robot.legs[leg]),
+                     key=lambda joint: _depth(joint.parent)) for leg in robot.legs}
+    bare = [leg for leg, joint in last.items()
+            if not any(geom.contype or geom.conaffinity for geom in joint.parent.geoms)]
+    if not bare:
+        return
+    known = load_urdf(path)
+    for leg in bare:
+        chain, name = known.leg(one.name for one in robot.legs[leg]), last[leg].name
+        place, axes = known.frame(name)
+        foot, radius = (chain.foot - place) @ axes, chain.radius
+        if not radius:
+            # The ball ends where the leg does.
+            radius = BALL * float(sum(chain.lengths))
+            foot *= max(1.0 - radius / max(float(np.linalg.norm(foot)), radius), 0.0)
+        last[leg].parent.add_geom(type=engine().mjtGeom.mjGEOM_SPHERE, pos=foot, mass=0.0,
+                                  size=[radius, 0.0, 0.0])
+    say('nothing below the last joint can touch the ground: a ball takes the place of the foot of '
+        f'{", ".join(bare)}')
+
+
 def _sense(spec: Any, robot: Robot, joints: dict[str, Any], base: Any) -> None:
     mujoco = engine()
     field, net = mujoco.mjtConDataField, 3
@@ -330,7 +353,7 @@ def _sense(spec: Any, robot: Robot, joints: dict[str, Any], base: Any) -> None:
             reftype=mujoco.mjtObj.mjOBJ_BODY, refname='world')
         sensor.intprm[:3] = 1 << int(data), net, 1
 
-    for leg in legs(robot):
+    for leg in robot.legs:
         last = max((joints[joint.name].parent for joint in robot.legs[leg]), key=_depth)
         touching(f'foot_{leg}', mujoco.mjtObj.mjOBJ_XBODY, last, field.mjCONDATA_FORCE)
     touching('trunk', mujoco.mjtObj.mjOBJ_BODY, base, field.mjCONDATA_FOUND)

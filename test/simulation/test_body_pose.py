@@ -130,7 +130,7 @@ def test_slow_joints_set_the_pace():
 def test_what_joints_do_not_reach_is_refused(pose, text):
     plan = plan_gait(load_robot('unitree_go2'), 'trot')
     with pytest.raises(InputError, match=text):
-        BodyPose(plan.robot).check(pose, plan)
+        BodyPose(plan.robot).angles(pose, plan)
 
 
 @pytest.mark.parametrize(('name', 'text'), [
@@ -138,7 +138,7 @@ def test_what_joints_do_not_reach_is_refused(pose, text):
     ('goat', "'goat' has no geometry of the leg")])
 def test_robots_that_have_no_pose_are_refused(name, text):
     with pytest.raises(InputError, match=text):
-        BodyPose(load_robot(name))
+        BodyPose(load_robot(name)).angles((0.0, 0.0, 0.0, 0.0))
 
 
 def test_a_closed_robot_that_walks_low_or_leans_survives_pushes():

@@ -37,7 +37,7 @@ mujoco = pytest.importorskip('mujoco')
 
 from cpg_ros.simulation.body import Anatomy, Body  # noqa: E402
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch  # noqa: E402
-from cpg_ros.simulation.robot_model import find_model, legs  # noqa: E402
+from cpg_ros.simulation.robot_model import find_model  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
@@ -81,7 +81,7 @@ def test_legs_of_the_physics_set_down_in_the_order_of_the_gait():
     walked(pattern, body, 6.0, standing)
     stood = np.array(standing, dtype=float)
     turn = np.exp(-2j * np.pi * gait_plan('wave').frequency * DT * np.arange(len(stood)))
-    phases = dict(zip(legs(HEXAPOD), np.angle(turn @ stood) / (2.0 * np.pi), strict=True))
+    phases = dict(zip(HEXAPOD.legs, np.angle(turn @ stood) / (2.0 * np.pi), strict=True))
     # From hind to fore on each side, a sixth of a stride apart, and then the other side.
     for before, after in (('lh', 'lm'), ('lm', 'lf'), ('lf', 'rh'), ('rh', 'rm'), ('rm', 'rf')):
         late = (phases[before] - phases[after]) % 1.0
@@ -155,7 +155,7 @@ def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, caps
         return parts.sole_positions(body.data) - body.data.xpos[parts.base]
 
     stand = feet(0.0, 0)
-    side = np.array([1.0 if leg[0] == 'l' else -1.0 for leg in legs(robot)])
+    side = np.array([1.0 if leg[0] == 'l' else -1.0 for leg in robot.legs])
     # All feet on one level below the trunk's belly, outside of it; x forward, y up in swing.
     assert np.ptp(stand[:, 2]) < 1e-3 and stand[0, 2] < -0.05 - 0.035
     assert (stand[:, 1] * side > 0.12).all()

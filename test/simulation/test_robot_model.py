@@ -27,7 +27,8 @@ import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
-from cpg_ros.simulation.body import Body  # noqa: E402, I100
+from cpg_ros.motion.description import load_urdf  # noqa: E402, I100
+from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.robot_model import load, usual_gains  # noqa: E402
 from cpg_ros.simulation.urdf_model import possible  # noqa: E402
 
@@ -200,6 +201,15 @@ def test_the_inertia_of_a_point(tmp_path):
     assert 'is that of a point' in said[0]
 
 
+def test_an_inertia_far_beyond_the_robots_size(tmp_path):
+    """Half a kilogram has 0.4 kg m^2 if its parts are a metre away; links are 0.22 m long."""
+    model, said = loaded(changed(tmp_path, 'FL_thigh', inertial(0.5, (0.4, 0.4, 0.4))))
+    assert model.body_inertia[model.body('FL_thigh').id] == pytest.approx(0.4 * 0.5 * 0.04924**2,
+                                                                          rel=1e-3)
+    assert said[0].startswith("link 'FL_thigh': its inertia needs parts 1.1 m away, beside links "
+                              'of up to 0.22 m; it gets ixx 0.000485')
+
+
 @examples(100)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6))
 def test_any_inertia_becomes_one_that_a_body_can_have(numbers):
@@ -221,6 +231,29 @@ def test_a_robot_without_any_mass_weighs_what_its_shapes_do(tmp_path):
     assert model.body_mass.sum() == pytest.approx(13 * 500.0 * 4.0 / 3.0 * np.pi * 0.03**3,
                                                   rel=1e-3)
     assert 'no link has a mass' in said[0]
+
+
+def test_feet_whose_meshes_are_missing_are_balls_that_end_where_feedback_has_them(tmp_path):
+    path = Path(urdf(tmp_path / 'own.urdf'))
+    frames = ''.join(f'<link name="{leg}_foot"/><joint name="{leg}_end" type="fixed"><parent '
+                     f'link="{leg}_calf"/><child link="{leg}_foot"/><origin xyz="0 0 -0.22"/>'
+                     '</joint>' for leg in ('FL', 'FR', 'RL', 'RR'))
+    path.write_text(re.sub(r'(_calf">.*?)<sphere radius="0.03"/>', r'\1<mesh filename="no.stl"/>',
+                           path.read_text(), flags=re.DOTALL).replace('</robot>',
+                                                                      f'{frames}</robot>'))
+    model, said = loaded(path)
+    assert said[-1].endswith('a ball takes the place of the foot of lh, rh, lf, rf')
+    data, known = mujoco.MjData(model), load_urdf(path)
+    data.qpos[:] = 0.0
+    data.qpos[3] = 1.0
+    mujoco.mj_kinematics(model, data)
+    for joints in ROBOT.legs.values():
+        chain = known.leg(joint.name for joint in joints)
+        (ball,) = np.flatnonzero(model.geom_bodyid == model.joint(chain.joints[-1]).bodyid[0])
+        low = data.geom_xpos[ball] - [0.0, 0.0, model.geom_size[ball, 0]]
+        assert low == pytest.approx(chain.foot)
+    assert model.body_mass.sum() == pytest.approx(11.0, abs=1e-3)
+    assert not stood(Body(str(path), ROBOT)).fallen
 
 
 def test_joints_that_no_leg_has_are_held(tmp_path):

@@ -25,7 +25,6 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.feedback import sensor_input
 from cpg_ros.ros.feedback.loop import BalanceLoop
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.robot_model import legs
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.sensors import SimulatedSensors
 from cpg_ros.simulation.terrain import set_friction
@@ -73,7 +72,6 @@ class HumanoidUnderFault:
         self.loop.wanted = True
         # As many as the robot has, with the names of what it holds.
         self._names = (*robot.order, *robot.held)
-        assert legs(robot) == tuple(robot.legs)
         self.faults = FaultySensors(fault, seed, begins)
         self._unit = SimulatedSensors(body, DT, SensorNoise(**{**vars(NOISE), 'seed': seed}))
         self._rng = np.random.default_rng(seed + 1)

@@ -38,11 +38,12 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
          'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
          'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh',
          'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
-#: OTHER: words of joints of no leg; UPPER: words of a biped's arms, which a quadruped's fore legs
-#: have as well.
-OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
-         'thumb', 'hand', 'pelvis', 'thorax', 'progress', 'wheel', 'caster', 'rotor', 'eye', 'ear',
-         'camera', 'antenna'}
+#: Words of joints of no leg. ARMS: of arms; APPENDAGES: of neither; OTHER: of both, and of the
+#: body; UPPER: of a biped's arms, which a quadruped's fore legs have as well.
+ARMS = {'arm', 'gripper', 'finger', 'thumb', 'hand'}
+APPENDAGES = {'neck', 'head', 'tail', 'wheel', 'caster', 'rotor', 'eye', 'ear', 'camera',
+              'antenna'}
+OTHER = {*ARMS, *APPENDAGES, 'torso', 'waist', 'trunk', 'spine', 'pelvis', 'thorax', 'progress'}
 UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 #: JOINTS: names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
@@ -128,7 +129,7 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
     return (sides.pop() if len(sides) == 1 else '', ends.pop() if len(ends) == 1 else '')
 
 
-def no_leg(joints: Sequence[str], words: Collection[str] = OTHER) -> bool:
+def no_leg(joints: Sequence[str], words: Collection[str]) -> bool:
     """Return whether a limb's joints, but the last, have words of an arm, a head and so on."""
     return any(not set(words).isdisjoint(_moved(words_of(name))) for name in joints[:-1] or joints)
 

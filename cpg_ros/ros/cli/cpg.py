@@ -120,6 +120,7 @@ examples:
   cpg param set frequency 2
   cpg topic hz joint_states
   cpg disable
+  cpg sit
   cpg call /unitree_bridge/stop
   cpg record walk_bag
   cpg run inversion --bag walk_bag --out fitted.yaml
@@ -167,8 +168,10 @@ def parser() -> Parser:
     gait = add(actions, 'gait', 'switch the gait')
     gait.add_argument('gait', metavar='NAME').completer = values
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
+                       ('sit', 'ramp down to the stand, then sit down'),
+                       ('stand', 'stand up from where the robot sits'),
                        ('reset', 'reset robot_sim to its start (--node /robot_sim)')):
-        add(actions, name, text).set_defaults(service='reset')
+        add(actions, name, text).set_defaults(service=name)
     add(actions, 'call', 'call a service of the type std_srvs/Trigger').add_argument(
         'service', metavar='SERVICE', help="such as /unitree_bridge/stop; one of the node's own "
         'has no slash in front')
@@ -259,7 +262,7 @@ async def _call(args: Namespace, other: 'NodeClient') -> str:
     if args.action in ('enable', 'disable'):
         return await other.command(SetBool, 'enable', ANSWER,
                                    data=args.action == 'enable')
-    if args.action in ('reset', 'call'):
+    if 'service' in args:
         return await other.command(Trigger, args.service, ANSWER)
     if args.action == 'play-schedule':
         from cpg_ros.ros.cli.graph import play_schedule

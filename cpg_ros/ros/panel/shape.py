@@ -342,8 +342,9 @@ def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
 #: LARGEST: largest text on ``robot_description``, bytes; TRIANGLES: most triangles that are drawn;
 #: MESHES: most bytes of all meshes.
 LARGEST, TRIANGLES, MESHES = 4_000_000, 100_000, 500_000_000
-#: Nothing that is drawn is longer or further away, m.
-FURTHEST = 1e4
+#: FURTHEST: nothing that is drawn is longer or further away, m; THIN: half the least width of a
+#: box in place of what is missing, m.
+FURTHEST, THIN = 1e4, 0.01
 
 
 def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
@@ -376,25 +377,34 @@ def from_file(path: Path, report: Callable[[str], None]) -> Shape:
 def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[str], None]
            ) -> Shape:
     description = describe(tree, source)
-    joints = description.joints
-    drawing = _Drawing(tree, path)
-    visuals = {link.get('name', ''): link.findall('visual') for link in tree.findall('link')}
+    joints, drawing = description.joints, _Drawing(tree, path)
+    parts = {link.get('name', ''): link for link in tree.findall('link')}
     shape = Shape(source, [Link(description.root(), -1)])
     shape.limits = {joint.name: (joint.lower, joint.upper) for joint in joints.values()
                     if joint.kind != 'fixed'}
     below: dict[str, list[JointDescription]] = {}
     for joint in joints.values():
         below.setdefault(joint.parent, []).append(joint)
+    errors, replaced = [], []
     for index, link in enumerate(shape.links):  # which grows
         if len(shape.links) > len(joints) + 1:
             raise DescriptionError(f'URDF {source}: the links form a loop')
         for joint in below.get(link.name, ()):
             shape.links.append(_held(joint, index))
-        for visual in visuals.get(link.name, ()):
-            try:
-                drawing.add(link, visual)
-            except MeshError as error:
-                report(f'not drawn: {error}')
+        part = parts.get(link.name, Xml.Element('link'))
+        failed = drawing.add_all(link, part.findall('visual'))
+        if failed and not link.vertices:
+            replaced.append(link.name)
+            drawing.add_all(link, part.findall('collision'))
+            if not link.vertices:
+                ends = np.array([np.zeros(3), *(one.xyz for one in below.get(link.name, ()))])
+                half = np.maximum(0.5 * np.ptp(ends, axis=0), THIN)
+                link.add(box(half), GREY, 0.5 * (ends.min(axis=0) + ends.max(axis=0)))
+        errors += failed
+    if errors:
+        more = f' (and {len(errors) - 1} more like it)' if len(errors) > 1 else ''
+        instead = '; drawn by their collision shapes or as boxes: ' + ', '.join(replaced)
+        report(f'not drawn: {errors[0]}{more}{instead if replaced else ""}')
     return shape
 
 
@@ -425,13 +435,17 @@ class _Drawing:
         self._meshes: dict[Path, np.ndarray] = {}
         self._bytes, self._remaining = 0, TRIANGLES
 
-    def add(self, link: Link, visual: Xml.Element) -> None:
-        """Add a visual to its link.
+    def add_all(self, link: Link, visuals: Sequence[Xml.Element]) -> list[str]:
+        """Add visuals to their link; return why some cannot be drawn."""
+        errors = []
+        for visual in visuals:
+            try:
+                self._add(link, visual)
+            except MeshError as error:
+                errors.append(str(error))
+        return errors
 
-        Raises:
-            MeshError: it cannot be drawn.
-
-        """
+    def _add(self, link: Link, visual: Xml.Element) -> None:
         origin, material = visual.find('origin'), visual.find('material')
         position = _numbers(None if origin is None else origin.get('xyz'), '0 0 0')
         pose = rotation(tuple(_numbers(None if origin is None else origin.get('rpy'), '0 0 0')))

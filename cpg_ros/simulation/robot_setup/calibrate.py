@@ -211,12 +211,6 @@ def _parser() -> Parser:
     return parser
 
 
-def _simulated(robot: Robot, args: argparse.Namespace) -> Robot:
-    from cpg_ros.simulation.robot_setup.walk_recording import calibrated
-    gaits = args.gaits or list(robot.motions)
-    return calibrated(robot, args.model, gaits, partial(note, 'calibrate'))
-
-
 def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
     topics = {key: getattr(args, key) for key in TYPES}
     gaits = args.gaits * len(args.bags) if len(args.gaits) < 2 else args.gaits
@@ -249,14 +243,16 @@ def _calibrate(args: argparse.Namespace) -> int:
     robot = load_robot(args.robot)
     rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
     if args.model:
-        robot = _simulated(robot, args)
+        from cpg_ros.simulation.robot_setup.walk_recording import calibrated
+        gaits = args.gaits or list(robot.motions)
+        robot = calibrated(robot, args.model, gaits, partial(note, 'calibrate'))
         rows += [(args.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
-                  '') for gait in args.gaits or robot.motions
+                  '') for gait in gaits
                  if (measured := robot.motions[gait].efference) is not None]
     else:
-        robot, calibrated = _recorded(robot, args)
-        rows += [(recording.source, recording.gait, f'{recording.speed:.3f}',
-                  str(recording.cycles)) for recording in calibrated]
+        robot, walks = _recorded(robot, args)
+        rows += [(walk.source, walk.gait, f'{walk.speed:.3f}', str(walk.cycles))
+                 for walk in walks]
     write_robot(out, robot, _comment(Path(args.robot)))
     say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
     return 0

@@ -124,7 +124,6 @@ class RobotCheck:
     format: str
     joints: tuple[JointCheck, ...]
     gaits: tuple[GaitCheck, ...]
-    lopsided: tuple[str, ...]
     shape: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -132,8 +131,8 @@ class RobotCheck:
     def faults(self) -> list[str]:
         """Differences, one line each."""
         return [f'{joint.joint.name}: {fault}' for joint in self.joints for fault in joint.faults
-                ] + [*self.lopsided, *self.shape] + [f'{gait.network} {gait.name}: {fault}'
-                                        for gait in self.gaits for fault in gait.faults]
+                ] + [*self.shape, *(f'{gait.network} {gait.name}: {fault}'
+                                  for gait in self.gaits for fault in gait.faults)]
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
@@ -141,8 +140,7 @@ class RobotCheck:
         return {'robot': self.robot, source: self.source, 'matches': not self.faults,
                 'joints': [joint.as_dict(source) for joint in self.joints],
                 'gaits': [gait.as_dict() for gait in self.gaits],
-                'lopsided': list(self.lopsided), 'shape': list(self.shape),
-                'notes': list(self.notes)}
+                'shape': list(self.shape), 'notes': list(self.notes)}
 
     def text(self) -> str:
         """Return tables, then the differences, then notes."""
@@ -193,14 +191,13 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
         _faults(joint, description, near.get(joint.name, '')))) for joint in robot.joints)
     pairs = [(network, name) for network in robot.networks for name in
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
-    shape = list(_implausible(robot, description))
+    shape = [*_lopsided(robot), *_implausible(robot, description)]
     if robot.geometry is not None and geometry is not None:
         shape += _differing(robot.geometry, geometry, description.format)
     shape += walking_faults(robot, description, pairs)
     return RobotCheck(*names, description.format, joints, tuple(
         _gait(robot, description, network, name, frequency, amplitude) for network, name in pairs),
-        tuple(_lopsided(robot)), tuple(shape),
-        tuple(_notes(robot, description)))
+        tuple(shape), tuple(_notes(robot, description)))
 
 
 def walking_faults(robot: Robot, known: RobotDescription,

@@ -20,7 +20,15 @@ are found from these alone. Names decide only which way a robot faces and what i
 
 from collections.abc import Mapping, Sequence
 
-from cpg_ros.fitting.gaits.leg_names import Legs, LegsError, no_leg, place_of, UPPER
+from cpg_ros.fitting.gaits.leg_names import (
+    APPENDAGES,
+    ARMS,
+    Legs,
+    LegsError,
+    no_leg,
+    place_of,
+    UPPER,
+)
 from cpg_ros.motion.description import (
     DescriptionError,
     JointDescription,
@@ -46,6 +54,8 @@ UNLIKE = 0.2
 SHORTER, HIGHER = 0.35, 0.4
 #: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
 CROSSWISE = 1.3
+#: FLAT: share of the axes' directions up to which they lie in a plane.
+FLAT = 0.05
 #: ENDLESS: range of a joint from which on it counts as unlimited, rad.
 ENDLESS = 100.0
 #: MOST_JOINTS: largest number of driven joints of a leg.
@@ -115,9 +125,14 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
     """Return the legs of a robot that faces a direction, from behind; nothing without pairs."""
     ahead = np.round([np.cos(quarter * np.pi / 2), np.sin(quarter * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
-    legs = [pair for pair in _pairs(_limbs(description, paths, left), left) if not any(
-        no_leg(limb.joints) or sum(not description.joints[name].flaw for name in limb.joints)
-        > MOST_JOINTS for limb in pair)]
+    pairs = [pair for pair in _pairs(_limbs(description, paths, left), left) if all(
+        not no_leg(limb.joints, APPENDAGES) and 1 < sum(
+            not description.joints[name].flaw for name in limb.joints) <= MOST_JOINTS
+        for limb in pair)]
+    legs = [pair for pair in pairs if not any(no_leg(limb.joints, ARMS) for limb in pair)]
+    if not legs and len(pairs) > 1:
+        # Some call the links of a fore leg arm and hand.
+        legs = pairs
     if not legs:
         return {}
     lowest = min((pair[0] for pair in legs), key=_bottom)
@@ -161,9 +176,10 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
             continue
         mirrored = limb.anchors[0] - 2.0 * (limb.anchors[0] @ left) * left
         nearest = min(free, key=lambda other: float(np.linalg.norm(other.anchors[0] - mirrored)))
-        lengths = [float(sum(one.lengths)) for one in (limb, nearest)]
-        if max(float(np.linalg.norm(nearest.anchors[0] - mirrored)),
-               max(lengths) - min(lengths)) <= UNLIKE * max(lengths):
+        # Between joints: the meshes of feet may be missing on one side.
+        unlike = abs(float(sum(limb.lengths[:-1]) - sum(nearest.lengths[:-1])))
+        if max(float(np.linalg.norm(nearest.anchors[0] - mirrored)), unlike) <= UNLIKE * max(
+                float(sum(one.lengths)) for one in (limb, nearest)):
             pairs.append((limb, nearest))
             free.remove(nearest)
     return pairs
@@ -171,14 +187,22 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
 
 def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
     """Ask which limbs are legs, with the option that says so."""
-    limbs = [limb for limb in _limbs(description, paths, np.array([0.0, 1.0, 0.0]))
-             if 1 < len(limb.joints) <= MOST_JOINTS]
+    axes = np.array([description.direction(name) for path in paths for name in path
+                     if description.joints[name].kind in TURNING]).reshape(-1, 3)
+    spread, ways = np.linalg.eigh(axes.T @ axes / max(len(axes), 1))
+    if len(paths) > 3 and spread[0] < FLAT < spread[1] and abs(ways[2, 0]) < FLAT:
+        # Legs roll and pitch about level axes, and what is across both is up.
+        return ('no legs are found: the axes of the joints say that '
+                f'{"xyz"[int(np.abs(ways[:, 0]).argmax())]} is up, and z is to be (REP 103): turn '
+                'the description')
+    limbs = _limbs(description, paths, np.array([0.0, 1.0, 0.0]))
     why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
            'images of each other')
-    lowest = min(_limbs(description, paths, np.array([0.0, 1.0, 0.0])), key=_bottom, default=None)
+    lowest = min(limbs, key=_bottom, default=None)
     if lowest is not None and len(lowest.joints) > MOST_JOINTS:
         why += f' (the lowest limb, from {lowest.joints[0]} on, has {len(lowest.joints)})'
-    limbs.sort(key=lambda limb: float(limb.anchors[0, 0]))
+    limbs = sorted((limb for limb in limbs if 1 < len(limb.joints) <= MOST_JOINTS),
+                   key=lambda limb: float(limb.anchors[0, 0]))
     left, right = ([limb for limb in limbs if sign * limb.anchors[0, 1] > 0.0]
                    for sign in (1.0, -1.0))
     if not 1 <= len(left) == len(right) <= 3:

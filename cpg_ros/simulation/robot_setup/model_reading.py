@@ -41,8 +41,6 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.robot_model import engine, find_model, load, SimulationError
 import numpy as np
 
-UNLIMITED = -math.inf, math.inf
-
 
 class SolesError(InputError):
     """A biped's leg has nothing to stand on."""
@@ -51,7 +49,7 @@ class SolesError(InputError):
 def load_description(name: str) -> RobotDescription:
     """Read a URDF or MJCF file; name as ``find_model`` takes it, errors as of both readers."""
     path = find_model(name)
-    return load_urdf(path) if path.suffix == '.urdf' else load_mjcf(name)
+    return load_urdf(path) if path.suffix.lower() == '.urdf' else load_mjcf(name)
 
 
 def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
@@ -77,7 +75,7 @@ def load_mjcf(name: str) -> RobotDescription:
 
     """
     mujoco, path = engine(), find_model(name)
-    if path.suffix == '.urdf':
+    if path.suffix.lower() == '.urdf':
         raise SimulationError(f'model {path}: is a URDF, not an MJCF file')
     try:
         with opened(path, SimulationError, 'model'):
@@ -174,7 +172,7 @@ def _kind(mujoco: Any, model: Any, k: int) -> str:
 
 def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
     """Return the least and the largest angle, rad (m of a slide), and velocity of a joint."""
-    lower, upper = model.jnt_range[k] if model.jnt_limited[k] else UNLIMITED
+    lower, upper = _range(model, k)
     velocity = math.inf
     for motor in range(model.nu):
         if (model.actuator_trntype[motor] != mujoco.mjtTrn.mjTRN_JOINT
@@ -252,7 +250,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
             1.0, 0.0, effort, float(model.dof_armature[model.jnt_dofadr[k]]), angle)
     soles, sizes = {}, []
     for leg in robot.legs:
-        last = model.joint(_outwards(model, robot, leg)[-1].name).id
+        last = max(model.joint(joint.name).id for joint in robot.legs[leg])
         middle, size = _sole(model, data, [body for body in range(model.nbody)
                                            if mover[body] == last], leg)
         soles[leg] = _rounded(middle)
@@ -304,10 +302,6 @@ def _before(model: Any, mover: dict[int, int], k: int) -> int:
     """Return the joint before a joint, -1 for the base."""
     body = int(model.jnt_bodyid[k])
     return k - 1 if k > model.body_jntadr[body] else mover[int(model.body_parentid[body])]
-
-
-def _outwards(model: Any, robot: Robot, leg: str) -> list[Any]:
-    return sorted(robot.legs[leg], key=lambda joint: model.joint(joint.name).id)
 
 
 def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarray, np.ndarray]:

@@ -223,15 +223,13 @@ def _joined(path: Path, robot: Robot,
         phase = to_imu('phase', np.unwrap(first_leg, axis=0), by_leg['phase'][1])[:, 0] / (
             2.0 * np.pi)
 
-    def vectors(part: str) -> np.ndarray:
-        return np.array([[getattr(one, part).x, getattr(one, part).y, getattr(one, part).z]
+    def vectors(part: str, axes: str = 'xyz') -> np.ndarray:
+        return np.array([[getattr(getattr(one, part), axis) for axis in axes]
                          for one in messages])
 
-    turned = np.array([[one.orientation.w, one.orientation.x, one.orientation.y,
-                        one.orientation.z] for one in messages])
     senses = SensorData(to_imu('joint_states.position', angles, own),
                     to_imu('joint_states.velocity', rates, own),
-                    to_imu('foot_contacts', loads, at), rpy_of(turned),
+                    to_imu('foot_contacts', loads, at), rpy_of(vectors('orientation', 'wxyz')),
                     vectors('angular_velocity'), vectors('linear_acceleration'))
     return WalkRecording(str(path), joints, times, senses, phase)
 

@@ -90,6 +90,10 @@ def test_parameters_and_topics_of_a_running_generator(unhurried):
     assert 'lf_calf_joint' in message['name'] and len(message['velocity']) == 12
     assert list(message['header']) == ['stamp', 'frame_id']
     assert ask(domain, 'disable')[:2] == (0, 'ramping down over 1 s')
+    # As the generator answers: this robot's file has no geometry.
+    for action in ('sit', 'stand'):
+        code, _, why = ask(domain, action)
+        assert code == 1 and "robot file 'quadruped' has no geometry of the leg lh" in why
     assert ask(domain, 'enable')[:2] == (0, 'ramping up over 1 s')
     assert ask(domain, 'param', 'get', 'nothing')[::2] == (
         1, "cpg: /cpg_generator has no parameter 'nothing'")

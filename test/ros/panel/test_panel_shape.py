@@ -248,7 +248,27 @@ def test_a_description_draws_meshes_of_installed_packages_only(installed, name, 
     said = []
     text = URDF.format(mesh=name.format(shared=installed))
     shape = shapes.from_text(text, 'robot_description', said.append)
-    assert len(said) == 2 - drawn and bool(shape.links[0].vertices) is drawn
+    assert len(said) == 1 and ('1 more like it' in said[0]) is not drawn
+    assert any(len(part) == len(TETRAHEDRON) for part in shape.links[0].vertices) is drawn
+
+
+def test_links_without_their_meshes_are_drawn_by_collision_shapes_or_as_boxes():
+    """And one line says so; links that have no pictures are frames, and stay undrawn."""
+    text = URDF.format(mesh='lost.stl').replace('</visual></link>', (
+        '</visual><collision><origin xyz="0 0 1"/><geometry><box size="1 2 3"/></geometry>'
+        '</collision></link>')).replace('<link name="arm"/>', (
+            '<link name="arm"><visual><geometry><mesh filename="package://no/y.stl"/></geometry>'
+            '</visual></link><link name="hand"/><joint name="wrist" type="fixed"><parent '
+            'link="arm"/><child link="hand"/><origin xyz="0.4 0 0"/></joint>'))
+    said = []
+    base, arm, hand = shapes.from_text(text, 'robot_description', said.append).links
+    corners = np.concatenate(base.vertices)
+    assert np.ptp(corners, axis=(0, 1)) == pytest.approx([1.0, 2.0, 3.0])
+    assert corners.mean((0, 1)) == pytest.approx([0.0, 0.0, 1.0])
+    # Over the joints below.
+    assert np.concatenate(arm.vertices)[..., 0].max() == pytest.approx(0.4)
+    assert not hand.vertices and len(said) == 1
+    assert said[0].endswith('; drawn by their collision shapes or as boxes: base, arm')
 
 
 def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):

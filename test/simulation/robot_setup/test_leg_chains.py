@@ -14,6 +14,7 @@
 
 """Legs are found in the body: by chains, positions and axes; names only break ties."""
 
+import math
 from pathlib import Path
 import re
 
@@ -23,11 +24,11 @@ from cpg_ros.motion.description import describe, DescriptionError, load_urdf, pa
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.leg_numbers import leg_names
 from cpg_ros.simulation.robot_setup.check_robot import main
-from cpg_ros.simulation.robot_setup.first_robot import robot_from
 from cpg_ros.simulation.robot_setup.leg_chains import legs_in
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 INERTIAL = ('<inertial><mass value="1"/><inertia ixx=".01" iyy=".01" izz=".01" ixy="0" ixz="0" '
             'iyz="0"/></inertial>')
@@ -119,6 +120,41 @@ def test_arms_and_fingers_are_not_legs(urdf):
     ids=['wheels', 'arms alone'])
 def test_what_has_no_legs_is_refused(urdf):
     with pytest.raises(LegsError, match='--legs '):
+        legs_of(urdf)
+
+
+def test_fore_legs_whose_links_are_called_arm_and_hand_are_legs():
+    """And hips are, whatever they are called: words of arms count beside other limbs only."""
+    names = {leg: f'{word}_arm' for leg, word in WORDS.items()}
+    assert legs_of(quadruped(names))['lf'][0] == 'front_left_arm_hip'
+    legs = legs_of(humanoid(fingers=('middle_MCP',)).replace('hip_yaw', 'pelvis'))
+    assert legs['left'][:2] == ('left_pelvis', 'left_hip_roll')
+
+
+def test_legs_whose_feet_have_no_mesh_on_one_side_are_a_pair():
+    urdf = humanoid().replace('right_ankle_roll', 'right_ankle_r')
+    at = urdf.index('<link name="left_ankle_roll_l">')
+    urdf = urdf[:at] + urdf[at:].replace('0 0 -.02', '0 0 -.4', 1)
+    assert list(legs_of(urdf)) == ['left', 'right']
+
+
+def test_fingers_that_follow_one_motor_are_no_legs():
+    parts = [part for side, y in (('a', 0.02), ('b', -0.02)) for part in (
+        joint(f'{side}_base', 'base', (0, y, 0), (0, 1, 0)),
+        joint(f'{side}_tip', f'{side}_base_l', (0, 0, -0.1), (0, 1, 0),
+              more=f'<mimic joint="{side}_base"/>'))]
+    with pytest.raises(LegsError, match='no two limbs of two to six joints'):
+        legs_of(robot(*parts))
+
+
+def test_a_robot_whose_y_is_up_is_refused_with_the_axis():
+    urdf = quadruped({leg: f'q{k}' for k, leg in enumerate(QUADRUPED)})
+    joints = re.findall(r'<origin xyz="([^"]*)"/><axis xyz="([^"]*)"', urdf)
+    for xyz, axis in set(joints):
+        moved, about = (' '.join(text.split()[k] for k in (1, 2, 0)) for text in (xyz, axis))
+        urdf = urdf.replace(f'<origin xyz="{xyz}"/><axis xyz="{axis}"',
+                            f'<origin xyz="{moved}" /><axis xyz="{about}"')
+    with pytest.raises(LegsError, match=r'say that y is up, and z is to be \(REP 103\)'):
         legs_of(urdf)
 
 
@@ -283,7 +319,8 @@ def test_limits_of_0_and_0_are_none(tmp_path):
 # -- scrambled robots -----------------------------------------------------------------------------
 
 SPHERE = '<geometry><sphere radius=".02"/></geometry>'
-TURNS = {'x': (1, 0, 0), 'y': (0, 1, 0), 'z': (0, 0, 1)}
+AXES = {'x': (1.0, 0.0, 0.0), 'y': (0.0, 1.0, 0.0), 'z': (0.0, 0.0, 1.0),
+        'oblique': (0.0, math.cos(0.5), -math.sin(0.5))}
 #: Of each kind: joint, axis, limits and place of a left leg, outwards; the last is fixed.
 KINDS = {
     4: (('hip', 'x', (-0.8, 0.8), None), ('thigh', 'y', (-1.0, 2.5), (0, 0.05, 0)),
@@ -291,69 +328,97 @@ KINDS = {
     6: (('coxa', 'z', (-0.8, 0.8), None), ('femur', 'x', (-1.5, 1.5), (0, 0.05, 0)),
         ('tibia', 'x', (-2.0, 2.0), (0, 0.1, 0)), ('foot', '', None, (0, 0.15, 0))),
     2: tuple((name, 'xyz'[axis.index(1)], limits, (0, 0, down) if k else None)
-             for k, (name, axis, limits, down) in enumerate(LEG))}
+             for k, (name, axis, limits, down) in enumerate(LEG)),
+    # As a Fourier GR2: the hip pitches first, about an axis that is not level.
+    'tilted': tuple((name, axis, limits, (0, 0, down) if k else None)
+                    for k, (name, axis, limits, down) in enumerate((
+                        ('hip_pitch', 'oblique', (-1.5, 1.5), 0), ('hip_roll', 'x', (-1, 1), 0),
+                        ('hip_yaw', 'z', (-1, 1), 0), ('knee', 'y', (0, 2.3), -0.3),
+                        ('ankle_pitch', 'y', (-1, 1), -0.3), ('ankle_roll', 'x', (-1, 1), 0))))}
+#: Where hexapods' legs point: the corner legs ahead and behind.
+YAW = {'h': 0.7, 'f': -0.7}
 
 
-def scrambled(legs, draw=None):
-    """Return a robot of some legs; with draws, zeros, senses and names of its joints are any."""
+def origin(place, turn):
+    """Return the origin of a frame as a URDF has it: xyz and rpy."""
+    rpy = Rotation.from_matrix(turn).as_euler('xyz')
+    return f'<origin xyz="{" ".join(map(str, place))}" rpy="{" ".join(map(str, rpy))}"/>'
+
+
+def scrambled(kind, rng=None, quarters=0):
+    """Return a robot and its legs; with draws, frames, zeros, senses and names of joints are any.
+
+    The robot faces x turned by some quarters of a turn to the left.
+    """
     parts, names = [], {}
+    legs = 2 if kind == 'tilted' else kind
+    base = Rotation.from_euler('z', -0.5 * math.pi * quarters).as_matrix()
     for leg in leg_names(legs):
         side = 1.0 if leg[0] == 'l' else -1.0
+        mirror = np.diag([1.0, side, 1.0])
         row = {'h': -0.25, 'f': 0.25}.get(leg[1:], 0.0)
-        above = 'base'
-        for name, axis, limits, place in KINDS[legs]:
-            x, y, z = place or (row, 0.1, 0.0)
-            own = f'{leg}_{name}' if draw is None else f'j{draw.integers(10**9)}'
-            zero = 0.0 if draw is None else draw.uniform(-1.2, 1.2)
-            sense = 1.0 if draw is None else draw.choice([-1.0, 1.0])
-            if not axis:
-                parts.append(joint(own, above, (x, side * y, z), (1, 0, 0), kind='fixed',
-                                   shape=SPHERE).replace('0 0 -.02', '0 0 0'))
-                continue
-            # Mirrored, so that axes but y's turn the other way.
-            mirror = side if axis != 'y' else 1.0
-            low, high = sorted(sense * (bound - zero) for bound in limits)
-            rpy = ' '.join(str(mirror * zero * one) for one in TURNS[axis])
-            parts.append(joint(
-                own, above, (x, side * y, z), [sense * mirror * one for one in TURNS[axis]],
-                (low, high)).replace('"/><axis', f'" rpy="{rpy}"/><axis', 1))
-            names.setdefault(leg, []).append(own)
-            above = f'{own}_l'
+        mount = Rotation.from_euler('z', side * YAW.get(leg[1:], 0.0) * (legs == 6)).as_matrix()
+        above, frame = 'base', base
+        for name, axis, limits, place in KINDS[kind]:
+            own = f'{leg}_{name}' if rng is None else f'j{rng.integers(10**9)}'
+            zero, sense = (0.0, 1.0) if rng is None else (rng.uniform(-1.2, 1.2),
+                                                         rng.choice([-1.0, 1.0]))
+            at = np.array([row, 0.1 * side, 0.0]) if place is None else mount @ mirror @ place
+            inner = np.eye(3) if rng is None else Rotation.random(rng=rng).as_matrix()
+            # A turn is an axial vector: its mirror image turns the other way.
+            along = side * mount @ mirror @ AXES[axis or 'x']
+            bent = Rotation.from_rotvec(zero * along * bool(axis)).as_matrix()
+            low, high = sorted(sense * (bound - zero) for bound in limits or (0, 0))
+            part = joint(own, above, (0, 0, 0), sense * inner.T @ along, (low, high),
+                         kind='revolute' if axis else 'fixed', shape=BOX if axis else SPHERE)
+            down = (0.0, 0.0, -0.02 if axis else 0.0)
+            parts.append(part.replace('<origin xyz="0 0 0"/>', origin(
+                frame.T @ at, frame.T @ bent @ inner)).replace(
+                    '<origin xyz="0 0 -.02"/>', origin(inner.T @ down, inner.T)))
+            if axis:
+                names.setdefault(leg, []).append(own)
+            above, frame = f'{own}_l', inner
     return robot(*parts), names
 
 
-def postures(urdf):
+def postures(folder, urdf, facing='x'):
     """Return, of the robot that is made, where its joints and feet are in the stand and steps."""
-    known = describe(parse_tree(urdf.encode(), 'r'), 'r')
-    made, _ = robot_from(known, 'r', legs_in(known, True))
+    folder.mkdir()
+    path = folder / 'my.urdf'
+    made_one = made(folder, urdf, f'--forward={facing}')
+    known = load_urdf(path if facing == 'x' else folder / 'my_facing_x.urdf')
     found = {}
-    for leg, joints in made.legs.items():
+    for leg, joints in made_one.legs.items():
         chain = known.leg(one.name for one in joints)
         by_name = {one.name: one for one in joints}
         ordered = [by_name[name] for name in chain.joints]
         found[leg] = np.array([chain.posed([
             one.offset + x * one.weights[0] + y * (*one.weights, 0.0)[1] for one in ordered])[1][
-                :None if len(made.legs) > 2 else -1]
+                :None if len(made_one.legs) > 2 else -1]
             for x, y in ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1))])
-    return made, known, found
+    return made_one, known, found
 
 
-@pytest.mark.parametrize('legs', [4, 6, 2])
+@pytest.mark.parametrize('kind', [4, 6, 2, 'tilted'])
 @pytest.mark.parametrize('seed', range(3))
-def test_names_zeros_and_senses_do_not_change_what_feet_do(legs, seed):
+def test_frames_names_zeros_and_senses_do_not_change_what_feet_do(tmp_path, kind, seed):
     """And feedback has the feet of a scrambled robot where they are."""
-    _, _, plain = postures(scrambled(legs)[0])
-    urdf, names = scrambled(legs, np.random.default_rng([legs, seed]))
-    made, known, found = postures(urdf)
-    assert {leg: [one.name for one in joints] for leg, joints in made.legs.items()} == names
+    _, _, plain = postures(tmp_path / 'plain', scrambled(kind)[0])
+    rng = np.random.default_rng([list(KINDS).index(kind), seed])
+    quarters = int(rng.integers(4))
+    urdf, names = scrambled(kind, rng, quarters)
+    robot_made, known, found = postures(tmp_path / 'any', urdf, ('x', 'y', '-x', '-y')[quarters])
+    assert {leg: [one.name for one in joints]
+            for leg, joints in robot_made.legs.items()} == names
     for leg, points in found.items():
         assert points == pytest.approx(plain[leg], abs=4e-3), leg
-    if legs > 2:
-        geometry = geometry_from(made, known)
-        assert set(geometry.legs) == set(made.legs)
-        feet = forward(geometry_of(made, geometry), made.column('offset'))
+    if len(names) > 2:
+        geometry = geometry_from(robot_made, known)
+        assert set(geometry.legs) == set(robot_made.legs)
+        feet = forward(geometry_of(robot_made, geometry), robot_made.column('offset'))
+        # Lengths in the file are rounded to 1e-6 m, angles to 1e-6 rad.
         assert feet == pytest.approx(np.array([points[0, -1] for points in found.values()]),
-                                     abs=1e-5)
+                                     abs=5e-5)
 
 
 def test_a_fourth_joint_of_a_hexapods_legs_is_held(tmp_path):

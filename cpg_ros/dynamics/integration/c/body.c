@@ -116,7 +116,7 @@ double cpg_pose(const cpg_body *b, const cpg_real *pose, cpg_real *angles, int s
 static void move_body(cpg *c, cpg_real dt)
 {
     cpg_body *b = c->body;
-    if (!b || !(dt > 0.0) || !__atomic_load_n(&b->moving, __ATOMIC_ACQUIRE)) {
+    if (!(dt > 0.0) || !__atomic_load_n(&b->moving, __ATOMIC_ACQUIRE)) {
         return;
     }
     cpg_smoother *pose = &b->pose;
@@ -147,7 +147,7 @@ static void move_body(cpg *c, cpg_real dt)
 /* Add the rates of the stand's angles. */
 static void carry(const cpg *c, cpg_real *rate)
 {
-    for (int16_t joint = 0; c->body && joint < c->joints; joint++) {
+    for (int16_t joint = 0; joint < c->joints; joint++) {
         rate[joint] += c->body->rate[joint];
     }
 }

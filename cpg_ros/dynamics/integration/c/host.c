@@ -172,7 +172,7 @@ void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
     numbers[3] = c->frequency;
     numbers[4] = fades || newest->settling > 0.0;
     for (int16_t k = 0; k < 3; k++) {
-        numbers[5 + k] = c->body ? c->body->pose.now[1 + k] : 0.0;
+        numbers[5 + k] = c->body->pose.now[1 + k];
     }
     gaits[0] = (int64_t)(intptr_t)c->track[c->tracks - 1 - fades]->gait;
     gaits[1] = (int64_t)(intptr_t)newest->gait;
