@@ -14,7 +14,7 @@
 
 """Central pattern generators of legged locomotion, true to the theory and running on ROS 2.
 
-What is used most is here by name and loaded on first use; the rest is in the subpackages.
+Common names are available here and loaded on first use; all others are in the subpackages.
 """
 
 import os

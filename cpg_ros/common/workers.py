@@ -15,8 +15,8 @@
 """Executors of jobs: processes of this machine, or the workers of a dask cluster.
 
 A ``Fleet`` is a ``concurrent.futures.Executor`` over another one that is made anew when it breaks:
-a pool whose worker was killed, a cluster whose scheduler was restarted. What runs jobs takes any
-executor; on one that is no fleet a broken pool ends the work.
+a pool whose worker was killed, a cluster whose scheduler was restarted. All jobs run on any
+executor; on one that is no fleet, a broken pool ends the work.
 """
 
 from argparse import ArgumentParser, Namespace

@@ -216,8 +216,8 @@ def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
 #: BINS: bins of the stride in an efference table; SPEEDS: most speeds of a table.
 BINS, SPEEDS = 64, 10
 #: LEGS: text for messages on the legs that feedback can displace.
-LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
-        'hip about z, then two about one level axis; further joints are held')
+LEGS = ('a hip about x (optional) and two joints about y; or, if it extends sideways, a coxa '
+        'about z and two joints about one level axis; further joints are held')
 #: SIGNALS: signals of the table: velocities, m/s, rates, rad/s, and angles, rad, of the base in
 #: its own frame.
 SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')

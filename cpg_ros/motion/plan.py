@@ -276,8 +276,8 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
     except CpgError as error:
         return f'from its preset it is not found: {error}'
     if abs(reached.period / orbit.period - 1.0) > SAME:
-        return (f'from its preset another one is found, of a period of {reached.period:.6g} '
-                f'instead of {orbit.period:.6g}')
+        return (f'its preset leads to another orbit, of period {reached.period:.6g} instead of '
+                f'{orbit.period:.6g}')
     reason = obstacle(reached, judged, harmonics)
     return '' if reason is None else reason.aside
 

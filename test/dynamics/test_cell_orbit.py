@@ -181,7 +181,7 @@ def test_a_weight_that_breaks_the_symmetry_leaves_no_such_orbit(name, key):
 
 
 @pytest.mark.parametrize(('network', 'gait', 'words'), [
-    (Quadruped(0.0, 0.0, 0.0, 0.0), 'pronk', 'no pronk .* from its preset it ends at alpha 0.0'),
+    (Quadruped(0.0, 0.0, 0.0, 0.0), 'pronk', 'no pronk .* from its preset, it ends at alpha 0.0'),
     # Its branch folds back at 0.09433.
     (Biped.symmetric(0.0, 0.254, 0.39, -0.681, 0.489), 'walk', 'no walk .* current 0.094'),
     (Quadruped(0.2, 0.2, np.nan, 0.2), 'pronk', 'gamma is nan'),

@@ -457,8 +457,8 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             f'{name} {old + reached * (value - old):.4g}' for (name, value), old
             in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
             if value != old)
-        raise NoOrbit(f'no {gait} at these parameters: on the way to them from its preset it ends '
-                      f'at {changed}')
+        raise NoOrbit(f'no {gait} at these parameters: continued from its preset, it ends at '
+                      f'{changed}')
     raise NoOrbit(f'no {gait} at these parameters')
 
 

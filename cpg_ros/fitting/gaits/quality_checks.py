@@ -134,16 +134,16 @@ def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIss
     most = float(np.ptp(mean, axis=1).max())
     if most >= SWAY or any(abs((phase + 0.5) % 1.0 - 0.5) > TOGETHER for phase in phases.values()):
         return []
-    return [QualityIssue(f'all legs move together, and by no more than {most:.2g} rad: a body '
-                         'that stands and sways moves its joints so, too', 0.3)]
+    return [QualityIssue(f'all legs move together, by no more than {most:.2g} rad: this also '
+                         'happens when a standing body sways', 0.3)]
 
 
 def check_legs(vague: Sequence[str]) -> list[QualityIssue]:
     """Return an issue if the phases of some legs may be half a cycle off."""
     if not vague:
         return []
-    return [QualityIssue(f'nothing tells in which sense {", ".join(vague)} count angles: half a '
-                         f'cycle is uncertain', 0.5)]
+    return [QualityIssue(f'the sign convention of {", ".join(vague)} is unknown: half a cycle is '
+                         'uncertain', 0.5)]
 
 
 def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
@@ -211,8 +211,8 @@ def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[st
     """Return a line each on few cycles, a drift of the frequency, and samples left out."""
     notes = []
     if warp.cycles < SURE:
-        notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '
-                     'cycle of a joint, from what is there twice')
+        notes.append(f'only {warp.cycles:.1f} cycles: errors are approximate, one value for each '
+                     "joint's cycle, from the parts that occur twice")
     elif warp.knots.size > 4:
         middles = 0.5 * (warp.knots[1:] + warp.knots[:-1])
         slope = np.polyfit(middles, np.diff(warp.phases) / np.diff(warp.knots), 1)

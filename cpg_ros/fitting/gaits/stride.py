@@ -380,9 +380,9 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
     rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
     stretches = find_stretches(*resample_evenly(times, x, rate))
     if not stretches:
-        raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
-                           f'{reach.max():.2g} rad, but nowhere do they repeat that over '
-                           f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s' + _hint(
+        raise NoSteadyGait(f'{source}: no steady gait: the joints move by up to '
+                           f'{reach.max():.2g} rad, but no stride of up to '
+                           f'{times[-1] / CYCLES:.3g} s repeats for {CYCLES:g} cycles' + _hint(
                                times, x, reach))
     regions: list[tuple[RoughPhase, float]] = []
     largest = max(stretch.size for stretch in stretches)

@@ -428,8 +428,8 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         stride.contacts is not None and not recording.commanded, done)
     fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
     if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
-        read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
-                 'which, and parameters and intervals hold for that alone')
+        read += ("; joints are assigned to their leg's first cell, as there is no robot file: "
+                 'parameters and intervals hold for this assignment only')
     result = RecordingFit(recording, read, legs, stride, fit,
                           (*warnings, *fallbacks, *fit.warnings))
     return result if not result.poor else replace(result, warnings=(

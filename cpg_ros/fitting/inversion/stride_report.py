@@ -155,7 +155,7 @@ def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, fl
     # It is bent far for a short time; where it is bent evenly, its zero is where it is straight.
     skewness = float(np.mean((y - mean)**3)) / size**3 if size else 0.0
     if abs(skewness) < SKEWED and (abs(mean) < BENT * size or not size):
-        return joint, 1.0, f'nothing tells in which sense {bending} bends'
+        return joint, 1.0, f'the direction in which {bending} bends is unknown'
     bent = np.sign(skewness if abs(skewness) >= SKEWED else mean) * y
     # From its smallest to its largest angle the joint rises.
     least, largest = theta[np.argmin(x)], theta[np.argmax(x)]

@@ -109,4 +109,4 @@ def test_what_nothing_tells_is_not_told():
     recording.positions[:, [1, 3]] -= 0.8
     assert not any(one.why for one in found_in(recording))
     recording.positions[:, [1, 3]] = 0.2 * np.sin(2.0 * np.pi * recording.times / 0.9)[:, None]
-    assert all('in which sense' in one.why for one in found_in(recording))
+    assert all('bends is unknown' in one.why for one in found_in(recording))

@@ -52,7 +52,7 @@ def test_three_cycles_are_written(tmp_path, capsys):
     path = table_of(tmp_path / 'walk.csv', *walked(seconds=1.5, noise=0.01))
     said = said_of(capsys, '--csv', path, '--out', tmp_path / 'fitted.yaml')
     assert trot_found(said)
-    assert "each joint is taken to follow its leg's first cell" in said['read']
+    assert "joints are assigned to their leg's first cell" in said['read']
     tree = yaml.safe_load((tmp_path / 'fitted.yaml').read_text())['/**']['ros__parameters']
     assert len(read_robot(tree['robot']).joints) == 8
 
@@ -300,7 +300,7 @@ def test_legs_whose_sense_nothing_tells_are_doubted(tmp_path, capsys):
     names = ['lh_hip', 'rh_hip', 'lf_hip', 'rf_hip']
     said = said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, t, 0.3 * angles),
                    '--order', '1')
-    assert 'nothing tells in which sense rh, lf, rf count angles' in ' '.join(said['warnings'])
+    assert 'the sign convention of rh, lf, rf is unknown' in ' '.join(said['warnings'])
     assert said['confidence'] <= 0.5
 
 

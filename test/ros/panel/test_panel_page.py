@@ -197,7 +197,7 @@ def test_drawing_does_not_let_go(rig, open_page):
 
 def test_control_is_taken_over_by_a_click_that_both_pages_see(rig, open_page):
     one, other = open_page(), open_page()
-    until(lambda: holder(one) == 'Nobody has control: the first command takes it.', 'nobody')
+    until(lambda: holder(one) == 'No page has control. The first command takes it.', 'nobody')
     assert not one.locator('#take-over').is_visible()
     steered(rig, one)
     until(lambda: holder(one) == 'This page has control.', 'control without a click')
@@ -219,7 +219,7 @@ def test_control_is_taken_over_by_a_click_that_both_pages_see(rig, open_page):
     other.keyboard.up('ArrowDown')
     other.locator('#enable').click()
     other.locator('#release').click()
-    until(lambda: holder(one) == 'Nobody has control: the first command takes it.', 'nobody')
+    until(lambda: holder(one) == 'No page has control. The first command takes it.', 'nobody')
 
 
 def test_another_node_that_steers_is_shown_and_confirmed_by_a_click(rig, open_page):
@@ -260,7 +260,7 @@ def test_the_17th_page_can_only_stop(rig, open_page, browser):
         page.locator('#stop').click()
         page.locator('#said p.told', has_text='ramping down').wait_for()
         others.pop().end()
-        until(lambda: holder(page).startswith('Nobody has control'), 'full access')
+        until(lambda: holder(page).startswith('No page has control'), 'full access')
         until(lambda: page.evaluate('panel.frames > 0'), 'frames')
         page.locator('#enable').click()
         page.locator('#said p.told', has_text='enabled').wait_for()

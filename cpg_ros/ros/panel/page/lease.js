@@ -37,7 +37,7 @@ export class Lease {
     if (now.stop_only) return ['16 pages are already open: this one can only stop the robot. '
       + 'It gets full access when another page closes.'];
     if (now.yours) lines.push('This page has control.');
-    else if (!now.holder) lines.push('Nobody has control: the first command takes it.');
+    else if (!now.holder) lines.push('No page has control. The first command takes it.');
     else if (now.lost_to === now.holder) lines.push(`${holder} took over. This page only watches.`);
     else lines.push(`${holder} has control. This page only watches.`);
     if (now.others.length) {
