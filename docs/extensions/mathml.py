@@ -14,6 +14,7 @@
 
 """Formulas as MathML, which browsers draw themselves: pages need no script and no network."""
 
+import re
 from typing import Any
 
 from docutils import nodes
@@ -21,13 +22,19 @@ from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
 
+def _mathml(text: str, display: str) -> str:
+    # The converter sets no space about names of functions, such as tanh.
+    return re.sub('<mi>([a-z]{2,})</mi>', r'<mo lspace="0.17em" rspace="0.1em">\1</mo>',
+                  convert(text, display=display))
+
+
 def _inline(writer: Any, node: nodes.math) -> None:
-    writer.body.append(convert(node.astext()))
+    writer.body.append(_mathml(node.astext(), 'inline'))
     raise nodes.SkipNode
 
 
 def _display(writer: Any, node: nodes.math_block) -> None:
-    writer.body.append(f'<div class="math">{convert(node.astext(), display="block")}</div>')
+    writer.body.append(f'<div class="math">{_mathml(node.astext(), "block")}</div>')
     raise nodes.SkipNode
 
 
