@@ -123,6 +123,26 @@ def check_own(rows, dt, plan):
     assert (np.abs(step - mean) <= 0.005 * plan.speed + 1e-9).all()
 
 
+def test_steps_are_between_velocities_where_a_network_turns_within_a_tick():
+    """A delayed network that finds its own way to a gait passes close to its planes' origins."""
+    robot, rate, draws = load_robot('unitree_go2'), 500.0, np.random.default_rng(10)
+    gaits = [plan_gait(robot, gait, frequency, network='delayed')
+             for gait in PRESETS['delayed'] for frequency in (0.5, 1.3, 2.2)]
+    pattern, limit = Pattern(gaits[0], 0.2, drive=StrideCommand(4)), robot.column('velocity')
+    for _ in range(400):
+        draw = draws.random()
+        if draw < 0.4:
+            pattern.apply(gaits[draws.integers(len(gaits))], 0.0)
+        elif draw < 0.7:
+            pattern.enable(bool(draws.random() < 0.7), 0.2)
+        pattern.steer(draws.uniform(-1.0, 1.0, 4), draws.uniform(0.6, 1.3))
+        position, velocity = run(pattern, draws.uniform(0.01, 0.08), rate).swapaxes(0, 1)
+        step = np.diff(position, axis=0) * rate
+        beside = step - np.clip(step, np.minimum(velocity[:-1], velocity[1:]),
+                                np.maximum(velocity[:-1], velocity[1:]))
+        assert (np.abs(beside) <= 0.05 * limit).all()
+
+
 def test_where_strides_change_while_a_ramp_is_slowed():
     robot, rate = load_robot('unitree_go2'), 2000.0
     gaits = [plan_gait(robot, gait, frequency)

@@ -338,8 +338,12 @@ class PlainPattern:
         reach = fastest * dt * (1.0 + 1e-9)
         new = np.clip(np.clip(wanted, last - reach, last + reach), lower, upper)
         held = new != wanted
-        free = ~(held | (np.abs(rate) > fastest * (1.0 + 1e-9)) | self.behind)
-        self.velocity = np.clip(np.where(free, rate, (new - last) / dt), -fastest, fastest)
+        step = (new - last) / dt
+        beside = step - np.clip(step, np.minimum(rate, self.velocity),
+                                np.maximum(rate, self.velocity))
+        free = ~(held | (np.abs(rate) > fastest * (1.0 + 1e-9)) | self.behind
+                 | (np.abs(beside) > 0.05 * fastest))
+        self.velocity = np.clip(np.where(free, rate, step), -fastest, fastest)
         self.position, self.behind = new, held
 
     def cruise(self, dt):

@@ -41,8 +41,14 @@ QUANTILE = 1.959964
 #: component of a number in such a direction above which the number is not determined.
 ZERO, SHARE = 1e-7, 1e-3
 #: CURVED: half width of an interval, over the value, above which costs are not taken for
-#: quadratic; STEPS: most steps to the end of such an interval; CLOSE: relative tolerance there.
-CURVED, STEPS, CLOSE = 0.05, 8, 0.03
+#: quadratic; STEPS: most steps to the end of such an interval; CLOSE: relative tolerance there;
+#: FURTHER: length of a step over that of the last one, at most; SHORT: what a step that meets the
+#: edge of where there is an orbit misses of its length, at least; NEGLIGIBLE: distance from a
+#: bound, over the interval's quadratic half width, up to which a number is at the bound.
+CURVED, STEPS, CLOSE, FURTHER, SHORT, NEGLIGIBLE = 0.05, 10, 0.03, 3.0, 0.2, 1e-6
+#: Of a descent with one number given. TOLERANCE: at which it stops; MOST: most evaluations; DRAWN:
+#: width, over its size, of the residual that draws the number to its target.
+TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 #: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
 EXPLAINED = 1.1
 
@@ -211,22 +217,20 @@ def estimates(problem: CycleProblem, values: np.ndarray, uncertainty: Spread,
     curved = wide and not (straight or model.size)
     for k, (free, half) in enumerate(zip(problem.free, halves.tolist(), strict=True)):
         value = float(values[k])
-        ends = [value - half, value + half]
+        low, high = max(free.low, value - half), min(free.high, value + half)
+        bounded = free.low < low and high < free.high
         if curved and half < np.inf:
-            ends = [_end(problem, values, uncertainty, k, side * half) for side in (-1.0, 1.0)]
-        low, high = max(free.low, ends[0]), min(free.high, ends[1])
+            (low, below), (high, above) = (_end(problem, values, uncertainty, k, side * half)
+                                           for side in (-1.0, 1.0))
+            bounded = below and above
         result[free.name] = Estimate(
-            value, float(np.hypot(uncertainty.errors[k], model.errors[k])), low, high,
-            free.low < low and high < free.high)
+            value, float(np.hypot(uncertainty.errors[k], model.errors[k])), low, high, bounded)
     return result
 
 
 def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int, half: float
-         ) -> float:
-    """Return where the least cost for given values of number k has risen enough.
-
-    The other numbers take linear steps, a Gauss-Newton step each time; where that leads to no
-    orbit, the interval ends at the edge.
+         ) -> tuple[float, bool]:
+    """Follow the least cost for given values of number k to where it has risen enough.
 
     Args:
         problem: the fit.
@@ -235,30 +239,64 @@ def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int,
         k: index of the number.
         half: distance to begin with, its sign that of the side.
 
+    Returns:
+        Number k there, and whether the cost has risen enough: not at a bound of the number, nor at
+        the edge of where there is an orbit.
+
     """
-    free, least = problem.free[k], problem.cost(values)
-    begin, target, end = values, float(values[k]) + half, float(values[k])
+    limit = problem.free[k].high if half > 0.0 else problem.free[k].low
+    least, target = problem.cost(values), float(values[k]) + half
+    inside, outside = (0.0, values), (np.inf, values)
     for _ in range(STEPS):
-        target = float(np.clip(target, free.low, free.high))
-        try:
-            there = problem.rephased(problem.coordinates.moved(
-                begin, (target - begin[k]) * uncertainty.covariance[:, k]
-                / uncertainty.covariance[k, k]))
-            left, slopes = problem(there)
-        except NoOrbit:
-            target = 0.5 * (target + end)
-            continue
+        target = limit if half * (target - limit) >= 0.0 else target
+        at = inside[1]
+        if abs(target - at[k]) <= NEGLIGIBLE * abs(half):
+            return float(at[k]), False
+        there, cost = _least(problem, uncertainty, k, target, at)
+        rise = float(np.sqrt(max(0.0, 2.0 * (cost - least) / uncertainty.inflation)))
+        if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+            return float(there[k]), True
+        if rise > QUANTILE:
+            outside = rise, there
+        elif target == limit or abs(there[k] - target) > SHORT * abs(target - at[k]):
+            return float(there[k]), False
+        else:
+            further = (QUANTILE - rise) / max(rise - inside[0], 0.1 * (QUANTILE - rise))
+            target = float(there[k] + min(FURTHER, 1.05 * further) * (there[k] - at[k]))
+            inside = rise, there
+        if np.isfinite(outside[0]):
+            fraction = np.clip((QUANTILE - inside[0]) / (outside[0] - inside[0]), 0.1, 0.9)
+            target = float(inside[1][k] + fraction * (outside[1][k] - inside[1][k]))
+    return ((float(inside[1][k]), False) if np.isinf(outside[0])
+            else (float(outside[1][k]), True))
+
+
+def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at: np.ndarray
+           ) -> tuple[np.ndarray, float]:
+    """Return values of least cost with number k about at a target, and that cost; from values.
+
+    A residual of its own draws number k there, so that no step begins where there is no orbit.
+    """
+    row = (np.arange(at.size) == k) / (DRAWN * CLOSE * abs(target - at[k]))
+
+    def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        left, slopes = problem(values)
+        return np.append(left, row @ values - row[k] * target), np.vstack([slopes, row])
+
+    try:
+        begin = problem.rephased(problem.coordinates.moved(
+            at, (target - at[k]) * uncertainty.covariance[:, k] / uncertainty.covariance[k, k]))
+        left, slopes = problem(begin)
         others = np.delete(slopes * uncertainty.scale, k, axis=1)
-        step = np.linalg.lstsq(others, left, ZERO)[0]
-        rest = left - others @ step
-        rise = float(np.sqrt(max(float(rest @ rest) - 2.0 * least, 0.0) / uncertainty.inflation))
-        end = float(there[k])
-        if abs(rise - QUANTILE) <= CLOSE * QUANTILE or target in (free.low, free.high):
-            break
-        begin = there - np.insert(step, k, 0.0) * uncertainty.scale
-        target = float(values[k]) + (end - float(values[k])) * float(np.clip(
-            QUANTILE / max(rise, 1e-9), 0.5, 2.0))
-    return end
+        rest = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
+        cost, least = 0.5 * float(left @ left), 0.5 * float(rest @ rest)
+        # Where a linear step of the others gains little, none is taken.
+        if cost - least < CLOSE * uncertainty.inflation:
+            return begin, least
+    except NoOrbit:
+        begin = at
+    there = problem.coordinates.descend(evaluate, begin, TOLERANCE, MOST).values
+    return there, problem.cost(there)
 
 
 #: STANDS: range of the mean cycle below which a joint stands, rad.

@@ -142,6 +142,17 @@ def test_shipped_presets_are_found_again(robot, network, gait):
         assert abs(one.value - value) < 3.0 * max(one.stderr, one.high - one.low), name
 
 
+@pytest.mark.parametrize(('robot', 'network', 'gait', 'name'), [
+    ('goat', 'delayed', 'walk', 'tau'), ('goat', 'delayed', 'pace', 'tau'),
+    ('hexapod', 'delayed6', 'lurch', 'c')])
+def test_wide_intervals_hold_the_truth_where_costs_are_not_quadratic(robot, network, gait, name):
+    found = fit_recording(generated(robot, network, gait, 21), load_robot(robot), network, gait)
+    estimate = found.fit.parameters[name]
+    truth = NETWORKS[network].presets()[gait].network.as_dict()[name]
+    assert estimate.low <= estimate.value <= estimate.high
+    assert estimate.low <= truth <= estimate.high
+
+
 def test_a_start_that_leads_nowhere_is_left(monkeypatch):
     """Two of them took 200 orbits of 270."""
     solved = []

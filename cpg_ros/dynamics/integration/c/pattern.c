@@ -3,10 +3,12 @@
  * mean.
  * SHORT_OF: fraction of the speed bound up to which the clock lets joints go.
  * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
+ * BESIDE: how far a step may be outside of the velocities at its ends, over the speed limit.
  * FADES: whether two gaits can fade into each other. */
 #define SHIFTING R(2.0)
 #define SHORT_OF R(0.997)
 #define ABOVE R(1.000000001)
+#define BESIDE R(0.05)
 #define FADES (CPG_TRACKS > 1)
 
 /* Smooth step from 0 to 1, 3 s^2 - 2 s^3, and its derivative. */
@@ -205,8 +207,9 @@ static uint8_t cruise(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
     return 1;
 }
 
-/* Move joints to where they are wanted within their limits. Where a limit bites, and where a joint
- * catches up, velocity is the difference quotient: it stays the derivative of the position. */
+/* Move joints to where they are wanted within their limits. Where a limit bites, where a joint
+ * catches up, and where a step is outside of the velocities at both its ends, since a network turns
+ * within a tick, velocity is the difference quotient: it stays the derivative of the position. */
 static void confine(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *wanted_rate)
 {
     c->held = 0;
@@ -219,8 +222,15 @@ static void confine(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real 
         /* NaN is held back, too. */
         const uint8_t held = !(position <= wanted[joint] && position >= wanted[joint]);
         const uint8_t fast = F(fabs)(rate) > fastest * ABOVE;
-        if (held || fast || c->behind[joint]) {
-            rate = dt > R(0.0) ? (position - last) / dt : R(0.0);
+        const cpg_real step = dt > R(0.0) ? (position - last) / dt : R(0.0);
+        uint8_t turned = 0;
+#ifdef CPG_HOST
+        const cpg_real before = c->velocity[joint];
+        turned = fabs(step - within(step, least(rate, before), most(rate, before)))
+               > BESIDE * fastest;
+#endif
+        if (held || fast || turned || c->behind[joint]) {
+            rate = step;
             c->held = (uint8_t)(c->held + (held || fast));
         }
         c->behind[joint] = held;
