@@ -29,7 +29,7 @@ import secrets
 import time
 
 from common import emit, log, ROOT
-from cpg_ros.feedback.estimate import Odometry, SensorData
+from cpg_ros.feedback.estimate import advance_odometry, Odometry, SensorData
 from cpg_ros.feedback.gains import LENGTH, scaled_gains
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import read_robot
@@ -104,12 +104,12 @@ def _follow(loop: ClosedLoopBatch, ran: Outcome, k: int, how: tuple[float, ...],
     """Return the odometry at the end of one run's way, and where the base is then, m, (2,)."""
     legs, joints = len(loop.plan.robot.legs), len(loop.plan.robot.joints)
     sensors, nothing = SensorData.zeros(1, legs, joints), np.zeros(legs, dtype=bool)
-    made = Odometry(loop.geometry, *how)
+    made, legs_of = Odometry.begin(*how), loop.geometry.arrays
     off = HEADING * math.sqrt(loop.timestep) * np.cumsum(rng.standard_normal(len(ran.rpy[k])))
     step = 0
     while step < len(ran.rpy[k]) - 1 and made.pose[5] < WAY:
         sensors.rpy[0] = ran.rpy[k, step] + [0.0, 0.0, off[step]]
-        made.advance(sensors, ran.estimated[k, step], nothing, loop.timestep)
+        advance_odometry(made, legs_of, sensors, ran.estimated[k, step], nothing, loop.timestep)
         step += 1
     return made, ran.place[k, step]
 

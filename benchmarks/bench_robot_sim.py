@@ -39,11 +39,11 @@ MEASURED = """
 import sys
 from cpg_ros.ros.node import ticker
 from cpg_ros.ros.robot_sim import main
-delays, stalled = [], ticker.Ticker._stalled
-def noted(self, behind, period):
-    delays.append(behind)
-    return stalled(self, behind, period)
-ticker.Ticker._stalled = noted
+delays, handle = [], ticker.Ticker._handle
+def noted(self, event):
+    delays.append(self.loop.behind)
+    handle(self, event)
+ticker.Ticker._handle = noted
 code = main(sys.argv[1:])
 import numpy
 print('late', *numpy.percentile(numpy.array(delays[500:]) * 1e-3, [50, 99, 99.9]), flush=True)

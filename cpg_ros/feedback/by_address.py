@@ -24,6 +24,7 @@ from cpg_ros.dynamics.integration.machine_code import machine_function
 from cpg_ros.feedback.closed_loop import (
     close,
     closing_arguments,
+    finish,
     Instant,
     STATE,
     warm_up_senses,
@@ -47,17 +48,30 @@ _loaded: Any = intrinsic(_load)
 
 
 def _close(arguments):
-    return close(*_loaded(arguments))
+    return close(*_loaded(arguments)[:11])
 
 
-def compiled(arguments: tuple) -> Any:
+def _finish(arguments):
+    (legs, _, gains, memory, senses, sensors, _, _, instant, state, _, odometry, position,
+     sent) = _loaded(arguments)
+    finish(legs, gains, memory, sensors, instant, state, odometry,
+           (senses.limits, position, sent))
+    return 0
+
+
+def closing_function(arguments: tuple) -> Any:
     """Compile ``close`` as a function of C, ``int64_t f(const void *)``, at its ``address``.
 
     Args:
-        arguments: of close.
+        arguments: of close, then the last three of finish.
 
     """
     return machine_function(_close, arguments)
+
+
+def finishing_function(arguments: tuple) -> Any:
+    """Compile ``finish`` as closing_function does ``close``, of the same arguments."""
+    return machine_function(_finish, arguments)
 
 
 def memory_of(value: Any) -> Any:
@@ -78,11 +92,11 @@ def memory_of(value: Any) -> Any:
 
 
 def warm_up(geometry: Geometry, joints: int) -> None:
-    """Run each kernel once, on the types that a generator uses; joints is their number."""
+    """Compile what a generator uses; joints is their number."""
     feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
     senses, sensors = warm_up_senses(legs, joints)
-    arguments = closing_arguments(feedback, senses, sensors, Instant.empty(legs, np.zeros(1)),
-                                  np.zeros(STATE), np.zeros((1, joints)), np.zeros(joints))
-    close(*arguments)
-    compiled(arguments)
-    Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)
+    arguments = (*closing_arguments(
+        feedback, senses, sensors, Instant.empty(legs, np.zeros(1)), np.zeros(STATE),
+        np.zeros((1, joints)), np.zeros(joints)), Odometry.begin(), *np.zeros((2, 1, joints)))
+    closing_function(arguments)
+    finishing_function(arguments)

@@ -18,7 +18,13 @@ import math
 from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
-from cpg_ros.feedback.estimate import loads_of, SensorData, TOUCH
+from cpg_ros.feedback.estimate import (
+    advance_odometry,
+    loads_of,
+    lose_odometry,
+    SensorData,
+    TOUCH,
+)
 from cpg_ros.feedback.gait_tables import POINTS
 from cpg_ros.feedback.input_checks import (
     AGE,
@@ -36,6 +42,7 @@ from cpg_ros.feedback.input_checks import (
     note,
 )
 from cpg_ros.feedback.kinematics import LegArrays
+from cpg_ros.feedback.laws import virtual_stiffness
 from cpg_ros.feedback.leg_rates import compare_rates, rates_memory
 from cpg_ros.feedback.tick import PlannedMotion, tick
 import numpy as np
@@ -293,6 +300,33 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
          (dt, state[FRACTION] * level, level, math.inf if math.isnan(age) else age), out)
     instant.scale[0], trim[:], state[CLOSED] = memory.frequency_scale[0], memory.stride[0], 1.0
     return 1
+
+
+@jit_entry
+def finish(legs, gains, memory, sensors, instant, state, odometry, angles):
+    """Finish a corrected tick, once limits hold its angles: odometry, and the angles to send.
+
+    Args:
+        legs: as of close, like all up to state.
+        gains: of the laws.
+        memory: of one run.
+        sensors: of one run.
+        instant: Instant.
+        state: see WANTED.
+        odometry: Odometry, advanced in place.
+        angles: limits of the joints, as of Senses, target angles within these, rad, shape
+            (1, joints), and the angles to send, which virtual stiffness moves, filled.
+
+    """
+    limits, position, sent = angles
+    if state[CLOSED] > 0.0:
+        advance_odometry(odometry, legs, sensors, memory.velocity[0], memory.contact[0],
+                         instant.numbers[DT])
+    else:
+        lose_odometry(odometry, instant.numbers[DT])
+    sent[:] = position
+    if gains.virtual_stiffness:
+        virtual_stiffness.stretch(sent, sensors.joint_positions, memory.stiff, gains, limits)
 
 
 def closing_arguments(feedback: Any, senses: Senses, sensors: SensorData, instant: Instant,

@@ -14,11 +14,10 @@
 
 """Estimates from sensor data: loads on the feet, contacts, velocity over ground and odometry."""
 
-from collections.abc import Callable
 import math
 from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import jit, jit_entry, specialised
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.kinematics import (
     cross,
     foot_of,
@@ -253,15 +252,108 @@ UNSEEN = 0.5
 STATES = 6
 
 
+class Odometry(NamedTuple):
+    """Pose of one robot's base relative to its first pose, and the covariance of that.
+
+    The x axis of its frame is the base's heading at the start. Height is that above the feet which
+    stand: going up a slope is not seen.
+
+    Attributes:
+        pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
+        covariance: of x, y, heading, the slow velocity error forward and to the left, and the
+            share by which velocities are wrong, in m, rad and m/s, shape (6, 6).
+        twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
+        orientation: in the odometry's frame, w x y z.
+        pose_covariance: of x, y, z, roll, pitch and yaw, m and rad, shape (6, 6), as in ROS.
+        tilt: roll and pitch, rad, shape (2,).
+        scale: by which estimated velocities are multiplied (true by estimated distance), and its
+            standard deviation, shape (2,).
+        unseen: time without measurements, s, below 0 before the first ones, shape (1,).
+        scratch: shape (2, 6, 6).
+
+    """
+
+    pose: np.ndarray
+    covariance: np.ndarray
+    twist: np.ndarray
+    orientation: np.ndarray
+    pose_covariance: np.ndarray
+    tilt: np.ndarray
+    scale: np.ndarray
+    unseen: np.ndarray
+    scratch: np.ndarray
+
+    @classmethod
+    def begin(cls, scale: float = 1.0, scale_error: float = SCALE) -> 'Odometry':
+        """Return one that begins where the base is; arguments as in ``scale``."""
+        square = STATES, STATES
+        return cls(np.zeros(6), np.zeros(square), np.zeros(6), np.zeros(4), np.zeros((6, 6)),
+                   np.zeros(2), np.array([scale, scale_error]), np.full(1, -1.0),
+                   np.zeros((2, *square)))
+
+    def restart(self) -> None:
+        """Start again where the base is now."""
+        self.pose[:] = self.covariance[:] = 0.0
+        self.twist[:] = self.pose_covariance[:] = 0.0
+        self.unseen[0] = -1.0
+
+
+_quaternion = jit(fill_quaternion)
+
+
+@jit
+def _report(odometry):
+    """Fill the orientation and the covariance of the pose."""
+    pose, covariance, out = odometry.pose, odometry.covariance, odometry.pose_covariance
+    _quaternion(odometry.tilt[0], odometry.tilt[1], pose[3], odometry.orientation)
+    for row in range(3):
+        for column in range(3):
+            # The heading is the last of the six.
+            out[row + 3 * (row == 2), column + 3 * (column == 2)] = covariance[row, column]
+    out[2, 2] = HEIGHT**2 + (LEVEL * pose[5])**2
+    out[3, 3] = out[4, 4] = TILT**2
+
+
+@jit
+def _multiply(left, right, out):
+    """Fill a product of matrices, shape (STATES, STATES); BLAS takes the interpreter's lock."""
+    for row in range(STATES):
+        for column in range(STATES):
+            total = 0.0
+            for k in range(STATES):
+                total += left[row, k] * right[k, column]
+            out[row, column] = total
+
+
 @jit_entry
-def _advance(legs, joints, contact, motion, pose, covariance, scratch):
-    """Advance a pose, x, y, z and heading, and the covariance of its states, in place."""
-    velocity, rpy, dt = motion
+def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
+    """Take a step of odometry, in place.
+
+    Args:
+        odometry: Odometry.
+        legs: LegArrays of the robot.
+        sensors: present SensorData of one run.
+        velocity: of the base in its own frame, as estimated, m/s, shape (3,).
+        contact: whether each foot is on the ground, shape (legs,).
+        dt: s.
+
+    """
+    pose, covariance, rpy = odometry.pose, odometry.covariance, sensors.rpy[0]
+    joints, scale, factor = sensors.joint_positions[0], odometry.scale[0], odometry.scratch[0]
+    if odometry.unseen[0] < 0.0:
+        pose[4] = rpy[2]
+        covariance[3, 3] = covariance[4, 4] = STILL**2
+        covariance[5, 5] = odometry.scale[1]**2
+    odometry.unseen[0], odometry.tilt[0], odometry.tilt[1] = 0.0, rpy[0], rpy[1]
+    for k in range(3):
+        odometry.twist[k], odometry.twist[3 + k] = (scale * velocity[k],
+                                                    sensors.angular_velocity[0, k])
+    vx, vy, vz = odometry.twist[0], odometry.twist[1], odometry.twist[2]
     yaw = rpy[2] - pose[4]
     cr, sr, cp, sp = math.cos(rpy[0]), math.sin(rpy[0]), math.cos(rpy[1]), math.sin(rpy[1])
     cy, sy = math.cos(yaw), math.sin(yaw)
-    forward = cp * velocity[0] + sp * (sr * velocity[1] + cr * velocity[2])
-    left = cr * velocity[1] - sr * velocity[2]
+    forward = cp * vx + sp * (sr * vy + cr * vz)
+    left = cr * vy - sr * vz
     east, north = cy * forward - sy * left, sy * forward + cy * left
     pose[0] += dt * east
     pose[1] += dt * north
@@ -275,113 +367,42 @@ def _advance(legs, joints, contact, motion, pose, covariance, scratch):
             high += sp * x - cp * (sr * y + cr * z) + legs.radius
             standing += 1
     pose[2] = (high / standing if standing else
-               pose[2] + dt * (cp * (sr * velocity[1] + cr * velocity[2]) - sp * velocity[0]))
+               pose[2] + dt * (cp * (sr * vy + cr * vz) - sp * vx))
 
-    # P <- F P F' + Q, where F differs from one in the rows of x and y, and in the slow errors.
+    # P <- F P F' + Q, as F (F P)', for P is symmetric; F differs from one in the rows of x and y,
+    # and in the slow errors.
     stays = math.exp(-dt / SLOWLY)
-    scratch[:] = 0.0
+    factor[:] = 0.0
     for k in range(STATES):
-        scratch[k, k] = stays if k in (3, 4) else 1.0
-    scratch[0, 2], scratch[1, 2] = -dt * north, dt * east
-    scratch[0, 3], scratch[0, 4] = dt * cy, -dt * sy
-    scratch[1, 3], scratch[1, 4] = dt * sy, dt * cy
-    scratch[0, 5], scratch[1, 5] = dt * east, dt * north
-    covariance[:] = scratch @ covariance @ scratch.T
+        factor[k, k] = stays if k in (3, 4) else 1.0
+    factor[0, 2], factor[1, 2] = -dt * north, dt * east
+    factor[0, 3], factor[0, 4] = dt * cy, -dt * sy
+    factor[1, 3], factor[1, 4] = dt * sy, dt * cy
+    factor[0, 5], factor[1, 5] = dt * east, dt * north
+    _multiply(factor, covariance, odometry.scratch[1])
+    _multiply(factor, odometry.scratch[1].T, covariance)
     slow = STILL**2 + SHARE**2 * (forward**2 + left**2)
     for k, added in enumerate((dt * PLACE**2, dt * PLACE**2, dt * HEADING**2,
                                (1.0 - stays**2) * slow, (1.0 - stays**2) * slow)):
         covariance[k, k] += added
     pose[5] += dt * math.hypot(forward, left)
+    _report(odometry)
 
 
-class Odometry:
-    """Pose of one robot's base relative to its first pose, and the covariance of that.
+@jit_entry
+def lose_odometry(odometry, dt):
+    """Take a step of dt in s without measurements.
 
-    The x axis of its frame is the base's heading at the start. Height is that above the feet which
-    stand: going up a slope is not seen.
-
-    Attributes:
-        pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
-        covariance: of x, y, heading, the slow velocity error forward and to the left, and the
-            share by which velocities are wrong, in m, rad and m/s, shape (6, 6).
-        twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
-
+    The base may have kept any constant velocity since the last one, of which UNSEEN and the last
+    speed are standard deviations: the error grows with the time, its variance with the square of
+    that.
     """
-
-    def __init__(self, geometry: Geometry, scale: float = 1.0, scale_error: float = SCALE) -> None:
-        """Begin where the base is.
-
-        Args:
-            geometry: of the legs.
-            scale: by which estimated velocities are multiplied: true by estimated distance.
-            scale_error: its standard deviation.
-
-        """
-        self._legs, self._scale, self._velocity = geometry.arrays, scale, np.zeros(3)
-        self._scale_error = scale_error
-        self.pose = np.zeros(6)
-        self.covariance = np.zeros((STATES, STATES))
-        self._scratch = np.zeros((STATES, STATES))
-        self._tilt, self.twist = np.zeros(3), np.zeros(6)
-        self._kernel: Callable | None = None
-        self._started, self._unseen = False, 0.0
-
-    def restart(self) -> None:
-        """Start again where the base is now."""
-        self.pose[:] = self.covariance[:] = 0.0
-        self._started, self._unseen = False, 0.0
-        self.twist[:] = 0.0
-
-    def advance(self, sensors: SensorData, velocity: np.ndarray, contact: np.ndarray, dt: float
-                ) -> None:
-        """Take a step.
-
-        Args:
-            sensors: present measurements of one run.
-            velocity: of the base in its own frame, as estimated, m/s, shape (3,).
-            contact: whether each foot is on the ground, shape (legs,).
-            dt: s.
-
-        """
-        rpy, self._unseen = sensors.rpy[0], 0.0
-        if not self._started:
-            self.pose[4], self._started = rpy[2], True
-            self.covariance[3, 3] = self.covariance[4, 4] = STILL**2
-            self.covariance[5, 5] = self._scale_error**2
-        np.multiply(velocity, self._scale, out=self._velocity)
-        arguments = (self._legs, sensors.joint_positions[0], contact, (self._velocity, rpy, dt),
-                     self.pose, self.covariance, self._scratch)
-        if self._kernel is None:
-            self._kernel = specialised(_advance, *arguments)
-        self._kernel(*arguments)
-        self._tilt = rpy
-        self.twist[:3], self.twist[3:] = self._velocity, sensors.angular_velocity[0]
-
-    def lose(self, dt: float) -> None:
-        """Take a step of dt in s without measurements.
-
-        The base may have kept any constant velocity since the last one, of which UNSEEN and the
-        last speed are standard deviations: the error grows with the time, its variance with the
-        square of that.
-        """
-        if not self._started:
-            return
-        before = self._unseen
-        self._unseen += dt
-        added = (UNSEEN**2 + self.twist[0]**2 + self.twist[1]**2) * (self._unseen**2 - before**2)
-        for k in range(2):
-            self.covariance[k, k] += added
-
-    def orientation(self, out: np.ndarray) -> None:
-        """Fill the orientation in the odometry's frame, w x y z."""
-        fill_quaternion(self._tilt[0], self._tilt[1], self.pose[3], out)
-
-    def pose_covariance(self, out: np.ndarray) -> np.ndarray:
-        """Fill the covariance of x, y, z, roll, pitch and yaw, m and rad, (6, 6), as in ROS."""
-        out[:] = 0.0
-        for row, k in enumerate((0, 1, 5)):
-            for column, other in enumerate((0, 1, 5)):
-                out[k, other] = self.covariance[row, column]
-        out[2, 2] = HEIGHT**2 + (LEVEL * self.pose[5])**2
-        out[3, 3] = out[4, 4] = TILT**2
-        return out
+    before = odometry.unseen[0]
+    if before < 0.0:
+        return
+    odometry.unseen[0] = before + dt
+    added = ((UNSEEN**2 + odometry.twist[0]**2 + odometry.twist[1]**2)
+             * (odometry.unseen[0]**2 - before**2))
+    for k in range(2):
+        odometry.covariance[k, k] += added
+    _report(odometry)

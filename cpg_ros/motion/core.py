@@ -127,6 +127,7 @@ def precompile(name: str) -> None:
     """
     network = find_network(name)
     core()
+    generated.equations_of(network).derive()
     library_of(network)
     if not network.delay_parameter:
         solver()

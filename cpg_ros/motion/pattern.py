@@ -23,7 +23,7 @@ from collections import deque
 from collections.abc import Callable
 import ctypes
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.body_pose import BodyPose
@@ -39,35 +39,6 @@ SETTLING = 40.0
 #: KICK: least amplitude of the new gait in the state when such a transition starts, as a share of
 #: the full gait's.
 KICK = 0.05
-
-
-class Machine(NamedTuple):
-    """Addresses by which compiled code advances a pattern.
-
-    Attributes:
-        advance: function that computes a tick: plan, then follow.
-        resume: function that resumes after a stall.
-        plan: function that computes the wanted angles, which may then be corrected.
-        follow: function that moves the joints to the wanted angles within their limits.
-        report: function that fills numbers and gaits, see Pattern.report.
-        what: address of the core's struct, first argument of all functions; the second argument
-            is a time in s, a double.
-        asked: address of a 32-bit integer that is not 0 if the next tick needs Python.
-        position, velocity, phases, state: addresses of the pointers to Pattern's arrays.
-
-    """
-
-    advance: int | None
-    resume: int | None
-    plan: int | None
-    follow: int | None
-    report: int | None
-    what: int
-    asked: int
-    position: int
-    velocity: int
-    phases: int
-    state: int
 
 
 def _shared(name: str) -> Any:
@@ -193,7 +164,6 @@ class Pattern:
         position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
-        correct: takes and returns angles before limits hold them; None for the gait as it is.
         body: the pose of the body.
         frequency_scale: factor of the pattern's clock.
         substep: longest part of a tick while gaits fade or the ramp moves, s.
@@ -209,7 +179,6 @@ class Pattern:
         """Begin in the stand and, if enabled, ramp into the gait in ``ramp`` s."""
         robot = plan.robot
         self.robot = robot
-        self.correct: Callable[[np.ndarray], np.ndarray] | None = None
         self._core, self._struct = core(), Core(joints=len(robot.joints), substep=SUBSTEP,
                                                 frequency_scale=1.0)
         self._address = ctypes.addressof(self._struct)
@@ -249,6 +218,7 @@ class Pattern:
             self._struct.track[k] = track.address
         self._struct.tracks = len(tracks)
         self._struct.legs = tracks[-1].legs.ctypes.data
+        self._struct.state = tracks[-1].stepper.now.ctypes.data
 
     @property
     def _tracks(self) -> list[GaitRunner]:
@@ -397,17 +367,20 @@ class Pattern:
         return bool(self._struct.recovering)
 
     @property
-    def machine(self) -> Machine | None:
-        """Addresses by which compiled code advances the pattern, None if a tick needs Python."""
-        if self._drift or type(self).advance is not Pattern.advance:
-            return None
-        addresses: list[Any] = [ctypes.cast(function, ctypes.c_void_p).value for function in (
-            self._core.cpg_advance, self._core.cpg_resume, self._core.cpg_plan,
-            self._core.cpg_follow, self._core.cpg_report)]
-        addresses += [self._address, ctypes.addressof(self._asked)]
-        addresses += [self._address + getattr(Core, name).offset
-                      for name in ('position', 'velocity', 'legs', 'state')]
-        return Machine(*addresses)
+    def addresses(self) -> dict[str, Any]:
+        """The addresses by which C advances the pattern.
+
+        They are the core's functions of a pattern and a time in s: advance (plan, then follow),
+        resume after a stall, plan (compute the wanted angles, which may then be corrected), follow
+        (move the joints to them within limits); report, which fills Instant.numbers and gaits;
+        what, the pattern; asked, a 32-bit integer that is not 0 if take_drift is to be called; and
+        the pointers to the arrays position, velocity, legs (phases) and state.
+        """
+        functions = {name: ctypes.cast(getattr(self._core, f'cpg_{name}'), ctypes.c_void_p).value
+                     for name in ('advance', 'resume', 'plan', 'follow', 'report')}
+        return {**functions, 'what': self._address, 'asked': ctypes.addressof(self._asked),
+                **{name: self._address + getattr(Core, name).offset
+                   for name in ('position', 'velocity', 'legs', 'state')}}
 
     @property
     def planned(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -415,31 +388,16 @@ class Pattern:
         return self._wanted, self._goal, np.ndarray(
             1, float, memoryview(self._struct).cast('B'), Core.frequency_scale.offset)
 
-    def report(self, numbers: np.ndarray, gaits: np.ndarray) -> None:
-        """Fill the inputs of a correction.
-
-        Args:
-            numbers: level, phase of the first leg, share of the gait that is entered, strides per
-                second (Hz), whether the gait changes, roll, pitch and yaw of the body (rad),
-                shape (8,).
-            gaits: addresses of GaitPlan.core of the gait left and of the entered one, (2,).
-
-        """
-        self._core.cpg_report(self._address, numbers.ctypes.data, gaits.ctypes.data)
-
     # -- the tick --------------------------------------------------------------------------
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s and fill position, velocity and phases."""
-        if self.correct is not None:
-            self.follow(dt, self.correct(self.plan_tick(dt)))
-            return
-        self._take_drift()
+        self.take_drift()
         self._core.cpg_advance(self._address, dt)
 
     def plan_tick(self, dt: float) -> np.ndarray:
         """Begin to advance by dt in s; return where joints are wanted, rad, to be corrected."""
-        self._take_drift()
+        self.take_drift()
         self._core.cpg_plan(self._address, dt)
         return self._wanted
 
@@ -448,7 +406,8 @@ class Pattern:
         self._goal[:] = goal
         self._core.cpg_follow(self._address, dt, 1)
 
-    def _take_drift(self) -> None:
+    def take_drift(self) -> None:
+        """Change to a plan without a transition, if one has been asked for."""
         if self._asked.value:
             self._asked.value = 0
             while self._drift:

@@ -151,6 +151,10 @@ class Equations:
     def _higher(self) -> ModuleType:
         return load(self.key, 'higher', lambda: _derivation().higher(self))
 
+    def derive(self) -> ModuleType:
+        """Return the code of the rates and their derivatives, written first if need be."""
+        return self._first
+
     def rates(self, x: Sequence[Any], p: Sequence[Any]) -> list[Any]:
         """Return the rate of each variable.
 

@@ -42,31 +42,12 @@ REPEAT, STALE = 0.02, 0.1
 LARGEST_SCALE = LAW.gains['stiffen_kp'].high
 
 
-class KpScalePublisher:
-    """Publishes the factor when it changes, and repeats it while it is not 1.
-
-    Attributes:
-        block: the message.
-
-    """
-
-    def __init__(self, node: Node) -> None:
-        message = Float64()
-        self.block = MessageBlock(node, [1], [(KP_SCALE_TOPIC, Template(
-            message, numbers=[(message, 'data', np.arange(1))]))])
-        self._last, self._elapsed = 1.0, 0.0
-
-    def publish(self, dt: float, scale: float) -> None:
-        """Publish the factor if it is time; dt since the last call, s."""
-        self._elapsed += dt
-        if scale != self._last or (scale != 1.0 and self._elapsed >= REPEAT):
-            self._last, self._elapsed = scale, 0.0
-            self.block.publish(0, (np.array([scale]),))
-
-    def output(self, scale: np.ndarray, rate: float) -> int:
-        """Return MessageBlock.output of a factor, shape (1,), at a rate of ticks, Hz."""
-        self._from = np.array([scale.ctypes.data], dtype=np.uint64)
-        return self.block.output((self._from.ctypes.data,), round(rate * REPEAT), quiet=True)
+def kp_scale_block(node: Node, scale: np.ndarray) -> MessageBlock:
+    """Return the message of a factor, shape (1,), as it changes and again while it is not 1."""
+    message = Float64()
+    return MessageBlock(node, [1], [(KP_SCALE_TOPIC, Template(
+        message, numbers=[(message, 'data', np.arange(1))]))]).feed(
+            scale, period=REPEAT, quiet=True)
 
 
 class KpScaleSubscription:

@@ -14,7 +14,8 @@
 
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, ExitStack
 import ctypes
 from functools import partial
 import sys
@@ -32,7 +33,7 @@ from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.ros.feedback import switch
 from cpg_ros.ros.feedback.sensor_input import CONTACTS
 from cpg_ros.ros.feedback.switch import default_enabled, ENABLED, FeedbackSwitch, FORMER, PREFIX
-from cpg_ros.ros.generator_io import CellsPublisher, CmdVel, FASTEST, MeasuredPose, Outputs
+from cpg_ros.ros.generator_io import cells_block, CmdVel, MeasuredPose, Outputs
 from cpg_ros.ros.generator_parameters import (
     COMMANDS,
     exclusive,
@@ -199,7 +200,7 @@ class Generator(StartedNode):
         self._create_pattern(network, self._first_plan(network, robot))
         self._measured = self._measured_pose(robot)
         #: Angles that the last tick sent, rad.
-        self._sent: np.ndarray | None = None
+        self._sent = self.pattern.position
         self._tracking = JointTracking(self, robot, self._measured, self._commanded,
                                        self._lag) if self._measured else None
         #: Searches for the pose to begin from, and why it has not begun.
@@ -213,7 +214,7 @@ class Generator(StartedNode):
         real_time = RealTime.of(*map(self._value, SPECS))
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
                              self.pattern.resume, partial(real_time.request, self.get_logger()),
-                             self._steadily)
+                             self._prepare)
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
                                         self._cmd_vel, self._feedback, lambda: self._awaited,
@@ -287,7 +288,7 @@ class Generator(StartedNode):
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                 self._value('command'))
         self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
-        self._cells = CellsPublisher(self, network)
+        self._cells = cells_block(self, network, self.pattern.addresses['state'])
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -490,7 +491,7 @@ class Generator(StartedNode):
         """Return the angles that joints should be at, rad, or None while there are none."""
         # The balance of a biped sends torques as angles, q + tau / kp.
         torques = isinstance(self.pattern, BalancedPattern) and self.pattern.balancing
-        if self.ticker.waiting or self._sent is None or torques or self._feedback.recovering:
+        if self.ticker.waiting or not self.ticker.ticks or torques or self._feedback.recovering:
             return None
         return self._sent.copy()
 
@@ -503,42 +504,37 @@ class Generator(StartedNode):
             self.get_logger().info('all joints follow again')
 
     def _tick(self, dt: float, stamp: int) -> None:
+        """Tick in the interpreter, where robots with soles balance."""
         if self.ticker.paused:
             return
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
-        self._sent = self._feedback.targets(self.pattern.position)
-        self._outputs.publish(stamp, dt, self._sent, self.pattern.velocity, self.pattern.phases)
-        self._feedback.publish(dt, stamp)
-        self._cells.publish(dt, self.pattern.state)
-        if self.ticker.stopping and self.pattern.standing:
-            self.ticker.stopping = False
+        self.ticker.publish()
+        self._feedback.publish(stamp)
 
-    def _steadily(self, run: Callable[..., tuple[int, int]], deadline: int, period: int
-                  ) -> tuple[int, int] | None:
-        """Tick outside the interpreter as long as a tick needs nothing of it; see Ticker.
-
-        What the pattern is asked for is taken there; what else there is calls ``Ticker.attend``.
-        """
-        pattern, ticker, feedback = self.pattern, self.ticker, self._feedback
-        machine = pattern.machine
-        if ticker.paused or machine is None:
-            return None
-        loop = native.Loop(**{name: getattr(machine, name)
-                              for name in ('asked', 'advance', 'resume', 'what')})
-        outputs, cells = self._outputs.block, self._cells.block
-        found = [outputs.output((machine.position, machine.velocity, machine.phases), 1),
-                 cells.output((machine.state,), max(1, round(ticker.rate / FASTEST)))]
-        if feedback.loop is not None:
-            correction = feedback.machine(machine)
-            if correction is None:
-                return None
-            loop.correct = ctypes.addressof(correction)
-            found.append(feedback.output(ticker.rate))
-        loop.outputs[:len(found)] = found
-        self._sent = pattern.position
-        with outputs.held(), cells.held(), feedback.held():
-            return run(loop, deadline, period)
+    @contextmanager
+    def _prepare(self, loop: native.Loop) -> Iterator[None]:
+        """Give ``tick.c`` all that its ticks need until ``Ticker.attend``; see Ticker."""
+        pattern, feedback = self.pattern.addresses, self._feedback.loop
+        self.pattern.take_drift()
+        loop.asked = loop.advance = loop.resume = loop.correct = None
+        loop.outputs[:] = [None] * len(loop.outputs)
+        with ExitStack() as kept:
+            if not self.ticker.paused:
+                self._sent = self.pattern.position
+                if self.pattern.robot.biped is None:
+                    for name in ('asked', 'advance', 'resume', 'what'):
+                        setattr(loop, name, pattern[name])
+                    if feedback is not None:
+                        self._sent = feedback.target
+                        loop.correct = ctypes.addressof(feedback.compiled())
+                        kept.enter_context(feedback.inputs.held())
+                self._outputs.block.feed(self._sent, pattern['velocity'], pattern['legs'])
+                blocks = [self._outputs.block, self._cells, *self._feedback.blocks]
+                for k, block in enumerate(blocks):
+                    kept.enter_context(block.held())
+                    loop.outputs[k] = block.output(self.ticker.rate)
+            yield
 
     def _restart(self) -> None:
         """Start again where simulated time jumped back, which the diagnostics log."""
@@ -566,9 +562,11 @@ class Generator(StartedNode):
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
     def look(self) -> float:
-        """Let ticks outside the interpreter know what motion is wanted."""
+        """Let ticks outside the interpreter know what motion is wanted, and whether it rests."""
         self._feedback.renew()
-        return 0.02 if self._feedback.active else 0.1
+        if self.ticker.stopping and self.pattern.standing:
+            self.ticker.stopping = False
+        return 0.02 if self._feedback.active or self.ticker.stopping else 0.1
 
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.

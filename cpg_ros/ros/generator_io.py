@@ -41,8 +41,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 #: COMMAND_TOPICS: kind of command -> topic on which ros2_control's controllers listen by default.
 COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',
                   'forward_position': 'forward_position_controller/commands'}
-#: FASTEST: largest rate at which the cells are published, Hz; more than people can see.
-FASTEST = 50.0
+#: CELLS: period in which the cells are published, s; shorter than people can see.
+CELLS = 0.02
 
 
 class Outputs:
@@ -97,41 +97,21 @@ class Outputs:
         phase = node.resolve_topic_name('~/phase')
         self.topics = [topic for topic in self.block.topics if topic != phase]
 
-    def publish(self, stamp: int, dt: float, position: np.ndarray, velocity: np.ndarray,
-                phases: np.ndarray) -> None:
-        """Publish everything: stamp in ns, dt in s, rad and rad/s by joint, phases in cycles."""
-        self.block.publish(stamp, (position, velocity, phases), round(1e9 * dt))
 
+def cells_block(node: Node, network: type[Network], state: int) -> MessageBlock:
+    """Return the message ``~/cells``: a row for each variable of a cell, one for each rate.
 
-class CellsPublisher:
-    """Publishes the network on ``~/cells``: a row for each variable of a cell, one for each rate.
-
-    Rates are in model time.
+    Rates are in model time; state is the address of a pointer to the numbers.
     """
-
-    def __init__(self, node: Node, network: type[Network]) -> None:
-        rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
-        count = len(rows) * network.cells
-        message = Float64MultiArray()
-        message.layout.dim = [
-            MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
-            MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
-        self.block = MessageBlock(node, [count], [
-            ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))])
-        self._elapsed = 1.0 / FASTEST
-
-    def publish(self, dt: float, state: np.ndarray) -> None:
-        """Publish a state and its rate, if one is due.
-
-        Args:
-            dt: since the last call, s.
-            state: and its rate, shape (2, variables * cells).
-
-        """
-        self._elapsed += dt
-        if self._elapsed >= (1.0 - 1e-6) / FASTEST:
-            self._elapsed = 0.0
-            self.block.publish(0, (state.ravel(),))
+    rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
+    count = len(rows) * network.cells
+    message = Float64MultiArray()
+    message.layout.dim = [
+        MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
+        MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
+    return MessageBlock(node, [count], [
+        ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))]).feed(
+            state, period=CELLS)
 
 
 def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:

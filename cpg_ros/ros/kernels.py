@@ -22,10 +22,11 @@ import threading
 import time
 from typing import Any
 
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
+from cpg_ros.dynamics.integration.c_kernel import c_kernels, is_missing
 from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
 from cpg_ros.dynamics.integration.simulate import use
-from cpg_ros.motion.core import precompile
+from cpg_ros.motion.core import core, precompile
+from cpg_ros.networks.registry import find_network
 from cpg_ros.ros.node.health import START
 from cpg_ros.ros.node.node_base import StartError
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -70,14 +71,16 @@ class StartProgress:
 
 
 #: Durations of compilation on one core of 2023, s. FEEDBACK: the kernels of the feedback; BALANCE:
-#: those of a biped's balance.
-FEEDBACK, BALANCE = 25.0, 15.0
+#: those of a biped's balance; NETWORK: a network in C.
+FEEDBACK, BALANCE, NETWORK = 25.0, 15.0, 2.0
 #: How often it is seen whether a compiling process has ended, s.
 LOOK = 0.05
 
 
 def compile_kernels(network: str, node: Node) -> None:
     """Compile or load what runs a network, named as for find_network: in C.
+
+    Its equations are derived in another process: sympy takes 35 MB, which would stay.
 
     Raises:
         CpgError: there is no C compiler.
@@ -86,6 +89,10 @@ def compile_kernels(network: str, node: Node) -> None:
     use(c_kernels)
     if not COMPILED:
         node.get_logger().info('numba is not installed: there is no feedback')
+    # Without a compiler it ends here.
+    core()
+    if is_missing(find_network(network)):
+        compile_apart(node, network, f"network '{network}'", NETWORK)
     precompile(network)
 
 
@@ -112,32 +119,39 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
             progress.end()
 
 
-def compile_apart(node: Any, part: str, seconds: float) -> None:
+def compile_apart(node: Any, part: str, what: str, seconds: float, moving: bool = False) -> None:
     """Compile a part of ``precompile`` in another process; this one then loads it.
 
-    The compiler keeps the interpreter's lock for up to seconds, for which a tick would wait. It
-    takes about ``seconds`` the first time.
+    A compiler keeps the interpreter's lock for up to seconds, for which Python's ticks would wait.
+
+    Args:
+        node: that waits for it.
+        part: as ``precompile`` takes it.
+        what: description for the log.
+        seconds: that it takes about the first time.
+        moving: whether the node moves a robot meanwhile, and goes first.
 
     Raises:
         StartError: the node ends.
 
     """
-    node.get_logger().info(f'making the {part} ready in a process of its own: about {seconds:g} s '
+    node.get_logger().info(f'making the {what} ready in a process of its own: about {seconds:g} s '
                            'at its first start on this installation')
-    progress = StartProgress(node, f'compiling the {part}', seconds)
+    progress = StartProgress(node, f'compiling the {what}', seconds)
     # Ctrl-C in the terminal is for the node.
     child = subprocess.Popen(
-        ['nice', sys.executable, '-P', '-m', 'cpg_ros.ros.cli.precompile', part],
+        [*(['nice'] if moving else []), sys.executable, '-P', '-m', 'cpg_ros.ros.cli.precompile',
+         part],
         stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
         start_new_session=True)
     try:
         while child.poll() is None:
             if node.stop.wait(LOOK):
-                raise StartError(f'the node ends while it makes the {part} ready')
+                raise StartError(f'the node ends while it makes the {what} ready')
         if child.returncode:
             assert child.stderr is not None
             lines = child.stderr.read().decode(errors='replace').split('\n')
-            node.get_logger().warning(f'the process that compiles the {part} failed, and the node '
+            node.get_logger().warning(f'the process that compiles the {what} failed, and the node '
                                       f'does it: {next(filter(None, lines[::-1]), "no reason")}')
         else:
             node.get_logger().info(f'ready after {progress.passed:.1f} s')

@@ -26,7 +26,7 @@ from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.laws.virtual_stiffness import targets
+from cpg_ros.feedback.laws.virtual_stiffness import stretch
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
@@ -182,7 +182,7 @@ class ClosedLoopBatch(BatchPhysics):
         memory, state_of = feedback.memory, BodyState(self.geometry, runs)
         estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = Patterns(self.plans, feedback, scenarios, dt, gains is not None)
-        limits = self._robot.column('lower'), self._robot.column('upper')
+        limits = np.stack([self._robot.column('lower'), self._robot.column('upper')])
         models = [self.model(item) for item in scenarios]
         stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
             self.model(item, gains.stiffen_kp) for item in scenarios]
@@ -217,8 +217,8 @@ class ClosedLoopBatch(BatchPhysics):
                 angles = pattern.planned.angles
                 state_of.update(noticed, dt)
             angles = pattern.follow(angles)
-            if gains is not None and gains.virtual_stiffness and memory.stiff.any():
-                angles = targets(angles, noticed.joint_positions, memory.stiff, gains, limits)
+            if gains is not None and gains.virtual_stiffness:
+                stretch(angles, noticed.joint_positions, memory.stiff, gains, limits)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
             signals = {'place': state[:, 1 + parts.pose[:2]], 'rpy': senses.rpy,
                        'velocity': velocity, 'estimated': estimated,

@@ -140,8 +140,8 @@ def test_virtual_stiffness_does_not_act_on_old_angles():
 def test_virtual_targets_give_the_torque_of_stiffer_servos():
     """kp (target - angle) is s kp (wanted - angle), unless a limit holds the target."""
     wanted, measured = np.array([[0.2, -0.1], [0.2, -0.1]]), np.array([[0.1, 0.4], [0.1, 0.4]])
-    limits = np.array([-10.0, -0.3]), np.array([10.0, 10.0])
-    found = virtual_stiffness.targets(wanted, measured, np.array([True, False]), GAINS, limits)
+    limits, found = np.array([[-10.0, -0.3], [10.0, 10.0]]), wanted.copy()
+    virtual_stiffness.stretch(found, measured, np.array([True, False]), GAINS, limits)
     factor = GAINS.stiffen_distance
     assert 60.0 * (found[0, 0] - 0.1) == pytest.approx(60.0 * factor * (0.2 - 0.1))
     assert found[0, 1] == -0.3 and (found[1] == wanted[1]).all()

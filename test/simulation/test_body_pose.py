@@ -103,7 +103,7 @@ def test_a_gait_goes_on_about_the_moved_stand():
     assert moved.position == pytest.approx(plain.position + way, abs=1e-4)
     assert moved.velocity == pytest.approx(plain.velocity, abs=1e-6)
     numbers, gaits = np.zeros(8), np.zeros(2, dtype=np.int64)
-    moved.report(numbers, gaits)
+    moved._core.cpg_report(moved._address, numbers.ctypes.data, gaits.ctypes.data)
     assert numbers[5:] == pytest.approx(np.array(pose[1:]), abs=1e-4)
 
 

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import re
 from unittest import mock
 
+from c_ticks import CTicks
 from cpg_ros.feedback.input_checks import LATE
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
@@ -76,6 +77,7 @@ class FaultyGo2:
         self.loop = FeedbackLoop(self.pattern, geometry, inputs,
                                  lambda: (self.gait.own_speed, 0.0, 0.0))
         self.loop.wanted = True
+        self._ticks = CTicks(self.pattern, self.loop, DT)
         # Faults begin at another phase of the stride with each seed.
         self.sensors = FaultySensors(fault, seed, begins + 0.1 * seed)
         self.time, self._gap, self.crossed = 0.0, 0.0, 0
@@ -97,12 +99,11 @@ class FaultyGo2:
             if self._gap > 1.5 * DT:
                 # As the generator's ticker does it.
                 pattern.resume(self._gap - DT)
-            self.loop.sense(DT, self.time)
-            pattern.advance(DT)
+            self._ticks.tick(round(1e9 * self.time))
             self._count()
             self._gap = 0.0
-            body.command(self.loop.targets(pattern.position)[GO2.places])
-            body.scale_kp(self.loop.kp_scale)
+            body.command(self.loop.target[GO2.places])
+            body.scale_kp(self.loop.feedback.memory.kp_scale[0])
         body.step()
 
     def _count(self) -> None:

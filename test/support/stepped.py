@@ -95,7 +95,8 @@ class SteppedGenerator:
     def _serve(self) -> None:
         while not self._node.stop.is_set():
             try:
-                self._executor.spin_once(timeout_sec=0.1)
+                self._executor.spin_once(timeout_sec=0.02)
+                self._node.look()
             except ExternalShutdownException:
                 return
 

@@ -61,6 +61,12 @@ def version() -> str:
     return digest.hexdigest()[:14]
 
 
+def is_missing(network: type[Network]) -> bool:
+    """Return whether a network's library could be on disk, but is not."""
+    folder = generated.folder(equations_of(network).key)
+    return folder is not None and not (folder / f'kernel-{version()}.so').exists()
+
+
 @cache
 def library_of(network: type[Network]) -> ctypes.CDLL:
     """Return the library that steps a kind of network.

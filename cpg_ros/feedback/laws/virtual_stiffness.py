@@ -20,11 +20,8 @@ late, which destabilises a loop that is stiff by it, unlike a servo's own: it is
 measurements are too old, and acts for a limited time, after which it rests.
 """
 
-from typing import Any
-
-from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
-import numpy as np
 
 LAW = Law(
     'virtual_stiffness', 'make servos that take no gains stiff, while stiffen would, by targets '
@@ -74,19 +71,23 @@ def spend(spent, acting, gains, dt):
     return spent + dt if spent + dt < gains.stiffen_longest else -gains.stiffen_rest
 
 
-def targets(target: np.ndarray, measured: np.ndarray, acting: np.ndarray, gains: Any,
-            limits: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    """Return the targets of the joints, rad, which go further than wanted where the law acts.
+@jit_entry
+def stretch(targets, measured, acting, gains, limits):
+    """Let targets of joints go further than wanted, in place, where the law acts.
 
     Speed limits do not apply to these targets, as joints are not meant to reach them.
 
     Args:
-        target: angles within all limits, rad, shape (runs, joints).
-        measured: angles, rad, shape (runs, joints).
+        targets: angles within all limits, rad, shape (runs, joints).
+        measured: angles, rad, shape (runs, joints) or more.
         acting: whether the law acts, shape (runs,).
         gains: of the law.
-        limits: lowest and highest angles, rad, shape (joints,) each.
+        limits: lowest and highest angles, rad, shape (2, joints) or more.
 
     """
-    far = np.clip(measured + gains.stiffen_distance * (target - measured), *limits)
-    return np.where(acting[:, None], far, target)
+    for run in range(targets.shape[0]):
+        if acting[run]:
+            for k in range(targets.shape[1]):
+                angle = measured[run, k]
+                far = angle + gains.stiffen_distance * (targets[run, k] - angle)
+                targets[run, k] = min(max(far, limits[0, k]), limits[1, k])

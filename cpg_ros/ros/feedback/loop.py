@@ -19,17 +19,13 @@ import ctypes
 import math
 from typing import Any
 
-from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
 from cpg_ros.feedback.closed_loop import (
-    close,
-    CLOSED,
     closing_arguments,
     CONTRARY,
-    DIES_OUT,
     FRACTION,
     Instant,
     MOUNT,
@@ -42,9 +38,8 @@ from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, Memory
 from cpg_ros.feedback.kinematics import Geometry
-from cpg_ros.feedback.laws.virtual_stiffness import targets
 from cpg_ros.feedback.leg_rates import MOUNTED
-from cpg_ros.motion.pattern import Machine, Pattern
+from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.ros.node import native
@@ -103,10 +98,6 @@ class SensorLoop:
         """Return name -> age of its measurements when they are used, low-passed, s."""
         return self.inputs.latencies()
 
-    def targets(self, position: np.ndarray) -> np.ndarray:
-        """Return the angles to send for target angles, rad, shape (joints,)."""
-        return position
-
 
 class FeedbackLoop(SensorLoop):
     """Corrects a pattern by the robot's sensors, as long as they are plausible.
@@ -116,8 +107,8 @@ class FeedbackLoop(SensorLoop):
 
     """
 
-    def __init__(self, pattern: Pattern, geometry: Geometry, inputs: SensorInput, motion: Motion
-                 ) -> None:
+    def __init__(self, pattern: Pattern, geometry: Geometry, inputs: SensorInput, motion: Motion,
+                 odometry: Odometry | None = None) -> None:
         """Prepare to correct a pattern.
 
         Args:
@@ -125,32 +116,36 @@ class FeedbackLoop(SensorLoop):
             geometry: of the robot's legs.
             inputs: the robot's sensors.
             motion: returns the wanted motion.
+            odometry: to be advanced, None for none.
 
         """
         super().__init__(inputs, motion)
         self._pattern = pattern
-        planned, self._goal, scale = pattern.planned
+        planned, goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._instant = Instant.empty(len(pattern.robot.legs), scale)
         self._state = np.zeros(STATE)
-        self._arguments = closing_arguments(self.feedback, inputs.senses, inputs.sensor_data,
-                                            self._instant, self._state, planned[None], self._goal)
-        self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
-        self.odometry: Odometry | None = None
+        self._finishes, self.odometry = odometry is not None, odometry or Odometry.begin()
+        self._sent = pattern.position.copy()
+        self._arguments = (*closing_arguments(self.feedback, inputs.senses, inputs.sensor_data,
+                                              self._instant, self._state, planned[None], goal),
+                           self.odometry, pattern.position[None], self._sent[None])
         # It loads numba.
         from cpg_ros.feedback import by_address
         self._by_address = by_address
-        self._kernel: Any = None
+        self._finish: Any = None
         self._memories: list[Any] = []
         self._correction = self._corrects()
         self.restart()
         self.learn(pattern.plan)
-        self.bind()
-        self._machine = by_address.compiled(self._arguments)
+        self._close = by_address.closing_function(self._arguments)
+        self._correction.close = self._close.address
+        self.set_gains(self.feedback.gains)
 
     def _corrects(self) -> native.Correction:
-        """Return how ``tick.c`` corrects, but for what the pattern and the compiler tell."""
+        """Return how ``tick.c`` corrects, but for what is compiled."""
         memory, inputs, instant = self.feedback.memory, self.inputs.structs, self._instant
+        pattern = self._pattern.addresses
         self._blank = Memory.empty(1, len(instant.trim))
         self._resets = (native.Copy * len(memory))(*[
             native.Copy(part.ctypes.data, blank.ctypes.data, part.nbytes)
@@ -159,7 +154,8 @@ class FeedbackLoop(SensorLoop):
             take=native.address('rcl_take_serialized_message'),
             forget=native.address('rcutils_reset_error'), numbers=instant.numbers.ctypes.data,
             gaits=instant.gaits.ctypes.data, inputs=ctypes.addressof(inputs), count=len(inputs),
-            resets=ctypes.addressof(self._resets), parts=len(memory))
+            resets=ctypes.addressof(self._resets), parts=len(memory),
+            **{name: pattern[name] for name in ('report', 'plan', 'follow')})
 
     @property
     def wanted(self) -> bool:
@@ -175,31 +171,22 @@ class FeedbackLoop(SensorLoop):
         """Fraction of all corrections, 0 to 1."""
         return float(self._state[FRACTION])
 
-    @property
-    def kp_scale(self) -> float:
-        """Factor of the servos' proportional gain."""
-        return float(self.feedback.memory.kp_scale[0])
-
     def set_gains(self, gains: Gains) -> None:
-        """Replace the gains; errors as of bind."""
-        self.feedback.gains = gains
-        self.bind()
-
-    def bind(self) -> None:
-        """Use the feedback's gains from the next tick on.
+        """Use gains from the next tick on.
 
         Raises:
             InputError: one is outside its limits.
 
         """
-        self._bound = self.feedback.gains
-        self._bound.check()
-        self._arguments = (*self._arguments[:2], self._bound, *self._arguments[3:])
+        gains.check()
+        self.feedback.gains = gains
+        self._arguments = (*self._arguments[:2], gains, *self._arguments[3:])
         # A tick under way may still read those before.
         self._memories = [*self._memories[-1:], self._by_address.memory_of(self._arguments)]
         self._correction.arguments = ctypes.addressof(self._memories[-1])
-        if self._kernel is None:
-            self._kernel = specialised(close, *self._arguments)
+        if self._finish is None and (self._finishes or gains.virtual_stiffness):
+            self._finish = self._by_address.finishing_function(self._arguments)
+            self._correction.finish = self._finish.address
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
@@ -209,19 +196,12 @@ class FeedbackLoop(SensorLoop):
         self.feedback.reset()
         self.inputs.restart()
         self._arguments[7][0][:] = 0.0
-        if self.odometry is not None:
-            self.odometry.restart()
-        self._pattern.correct, self._instant.scale[0], self._instant.trim[:] = None, 1.0, 0.0
+        self.odometry.restart()
+        self._instant.scale[0], self._instant.trim[:] = 1.0, 0.0
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
         self.feedback.slot(plan)
-
-    @property
-    def delay(self) -> float:
-        """Age of the measured angles when they are used, low-passed, s; inf if not known."""
-        age = self.inputs.joints.age
-        return math.inf if math.isnan(age) else age
 
     @property
     def waiting(self) -> bool:
@@ -243,60 +223,27 @@ class FeedbackLoop(SensorLoop):
             found.append(f'{inputs.feet}: the contacts do not go with the gait')
         return '; '.join(found)
 
-    def sense(self, dt: float, now: float) -> None:
-        """Read the sensors and correct the coming tick by them; dt and now in s."""
-        pattern, instant = self._pattern, self._instant
-        if not self.wanted and self._state[SPENT] > DIES_OUT and not self._state[CLOSED]:
-            pattern.correct = None
-            return
-        if pattern.strides is not None:
-            pattern.strides.trim = instant.trim
-        self.inputs.read()
-        instant.numbers[:2] = dt, now
-        self.renew()
-        pattern.correct = self._correct
-
     def renew(self) -> None:
         """Take over the wanted motion."""
         self._instant.command[:] = self._motion()
 
-    def _correct(self, angles: np.ndarray) -> np.ndarray:
-        """Return the corrected angles, rad, shape (joints,), of planned ones."""
-        if self._bound is not self.feedback.gains:
-            self.bind()
-        self._pattern.report(self._instant.numbers[2:], self._instant.gaits)
-        done = self._kernel(*self._arguments)
-        if done == 2:
-            self.feedback.reset()
-        if self.odometry is not None:
-            memory, dt = self.feedback.memory, float(self._instant.numbers[0])
-            if done == 1:
-                self.odometry.advance(self.inputs.sensor_data, memory.velocity[0],
-                                      memory.contact[0], dt)
-            else:
-                self.odometry.lose(dt)
-        return self._goal
-
-    def targets(self, position: np.ndarray) -> np.ndarray:
-        """Do as the base class does, with targets moved where the virtual stiffness acts."""
-        feedback, stiff = self.feedback, self.feedback.memory.stiff
-        if not (stiff[0] and feedback.gains.virtual_stiffness):
-            return position
-        return targets(position, self.inputs.sensor_data.joint_positions, stiff, feedback.gains,
-                       self._limits)[0]
-
-    def machine(self, pattern: Machine) -> native.Correction | None:
-        """Return how machine code corrects a pattern's ticks, None where one needs Python."""
-        if self.odometry is not None or self.feedback.gains.virtual_stiffness:
-            return None
-        if self._bound is not self.feedback.gains:
-            self.bind()
+    def compiled(self) -> native.Correction:
+        """Read messages of new layouts; return how ``tick.c`` corrects the pattern."""
         if self._pattern.strides is not None:
             self._pattern.strides.trim = self._instant.trim
-        correction = self._correction
-        correction.close, correction.report = self._machine.address, pattern.report
-        correction.plan, correction.follow = pattern.plan, pattern.follow
+        self.inputs.read()
+        self.renew()
         return self._correction
+
+    @property
+    def target(self) -> np.ndarray:
+        """The angles to send, rad, shape (joints,), overwritten at every tick."""
+        return self._pattern.position if self._finish is None else self._sent
+
+    @property
+    def share(self) -> np.ndarray:
+        """The fraction of all corrections, shape (1,), overwritten at every tick."""
+        return self._state[FRACTION:FRACTION + 1]
 
 
 class BalanceLoop(SensorLoop):

@@ -68,47 +68,28 @@ def transform(frames: tuple[str, str], position: np.ndarray, orientation: np.nda
                  *each(message.transform.rotation, 'wxyz', orientation)])
 
 
-class OdometryPublisher:
-    """Publishes where the base is, 50 times a second."""
+def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, str],
+                   transforms: bool, share: np.ndarray) -> MessageBlock:
+    """Return the messages on where the base is, of 50 times a second.
 
-    def __init__(self, node: Node, source: Odometry, topic: str, frames: tuple[str, str],
-                 transforms: bool) -> None:
-        """Prepare.
+    Args:
+        node: that publishes.
+        source: of the published odometry.
+        topic: of the nav_msgs/Odometry.
+        frames: the one in which the robot moves, and that of its base.
+        transforms: whether to publish the transform between them, too.
+        share: of all corrections, (1,), without which nothing is published.
 
-        Args:
-            node: that publishes.
-            source: of the published odometry.
-            topic: of the nav_msgs/Odometry.
-            frames: the one in which the robot moves, and that of its base.
-            transforms: whether to publish the transform between them, too.
-
-        """
-        sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
-        parts = indices(sizes)
-        messages = [odometry(topic, frames, *parts)]
-        if transforms and has_transforms():
-            messages.append(transform(frames, *parts[:2]))
-        elif transforms:
-            node.get_logger().warning(
-                f'no transform from {frames[0]} to {frames[1]}: tf2_msgs is not installed '
-                "('make messages' or ros-jazzy-tf2-msgs)")
-        self._source, self._elapsed = source, 0.0
-        self._block = MessageBlock(node, sizes, messages)
-        self._pose = np.zeros((6, 6))
-        self._values = [np.zeros(size) for size in sizes]
-        self._values[4][::7] = np.square([*INSTANT, RATE, RATE, RATE])
-
-    def publish(self, dt: float, stamp: int) -> None:
-        """Publish if it is time; dt since the last call in s, stamp in ns."""
-        self._elapsed += dt
-        # A hair less: ticks are not exact.
-        if self._elapsed < 0.99 * PERIOD:
-            return
-        self._elapsed = 0.0
-        position, orientation, twist, pose, _ = self._values
-        source = self._source
-        position[:] = source.pose[:3]
-        source.orientation(orientation)
-        twist[:] = source.twist
-        pose[:] = source.pose_covariance(self._pose).ravel()
-        self._block.publish(stamp, self._values)
+    """
+    sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
+    parts = indices(sizes)
+    messages = [odometry(topic, frames, *parts)]
+    if transforms and has_transforms():
+        messages.append(transform(frames, *parts[:2]))
+    elif transforms:
+        node.get_logger().warning(
+            f'no transform from {frames[0]} to {frames[1]}: tf2_msgs is not installed '
+            "('make messages' or ros-jazzy-tf2-msgs)")
+    return MessageBlock(node, sizes, messages).feed(
+        source.pose, source.orientation, source.twist, source.pose_covariance,
+        np.diag(np.square([*INSTANT, RATE, RATE, RATE])), period=PERIOD, while_not_0=share)

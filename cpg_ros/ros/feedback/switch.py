@@ -14,8 +14,7 @@
 
 """Switches the feedback of a generator on and off, as its parameters say."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -31,16 +30,16 @@ from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
 from cpg_ros.feedback.laws.law import Gain
 from cpg_ros.motion.body_file import GAIT_SPEEDS
-from cpg_ros.motion.pattern import Machine, Pattern
+from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.strides import StrideCommand
-from cpg_ros.ros.command_topics import HeldPublisher, KpScalePublisher
+from cpg_ros.ros.command_topics import HeldPublisher, kp_scale_block
 from cpg_ros.ros.feedback.loop import BalanceLoop, FeedbackLoop, Motion
-from cpg_ros.ros.feedback.odometry import OdometryPublisher
+from cpg_ros.ros.feedback.odometry import odometry_block
 from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.ros.kernels import announced, BALANCE, compile_apart, FEEDBACK
-from cpg_ros.ros.node import native
+from cpg_ros.ros.node.message_block import MessageBlock
 from cpg_ros.ros.node.node_base import StartError
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
 import numpy as np
@@ -178,6 +177,7 @@ class FeedbackSwitch:
     Attributes:
         loop: a FeedbackLoop, or the BalanceLoop of a robot with soles; None as long as it has not
             been on.
+        blocks: messages that ``tick.c`` publishes of it.
 
     """
 
@@ -198,7 +198,7 @@ class FeedbackSwitch:
         self._biped = pattern.robot.biped
         self.loop: Any = None
         self._delays_logged = False
-        self._odometry: OdometryPublisher | None = None
+        self.blocks: list[MessageBlock] = []
         self._held: HeldPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
@@ -261,23 +261,24 @@ class FeedbackSwitch:
         robot, pattern = self._pattern.robot, self._pattern
         geometry = geometry_of(robot)
         if self._started:
-            compile_apart(self._node, 'feedback', FEEDBACK)
+            compile_apart(self._node, 'feedback', 'feedback', FEEDBACK, moving=True)
         with announced(self._node, 'the feedback', FEEDBACK):
             warm_up(geometry, len(robot.joints))
-        loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)
+        topic = self._value('odometry_topic')
+        odometry = Odometry.begin(self._value('odometry_scale'), self._value(
+            'odometry_scale_error')) if topic else None
+        loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion, odometry)
         if pattern.strides is None:
             # Speed and heading are closed by the strides.
             pattern.attach(StrideCommand(len(robot.legs)))
         for line in partial_legs(robot):
             self._node.get_logger().warning(line)
-        self._kp_scale = KpScalePublisher(self._node)
-        if topic := self._value('odometry_topic'):
-            loop.odometry = Odometry(geometry, self._value('odometry_scale'),
-                                     self._value('odometry_scale_error'))
-            self._odometry = OdometryPublisher(
-                self._node, loop.odometry, topic,
+        self.blocks.append(kp_scale_block(self._node, loop.feedback.memory.kp_scale))
+        if odometry is not None:
+            self.blocks.append(odometry_block(
+                self._node, odometry, topic,
                 (self._value('odom_frame'), self._value('base_frame')),
-                self._value('odometry_tf'))
+                self._value('odometry_tf'), loop.share))
         return loop
 
     def _make_balance(self) -> BalanceLoop:
@@ -285,7 +286,7 @@ class FeedbackSwitch:
         pattern, biped = self._pattern, self._biped
         assert isinstance(pattern, BalancedPattern) and biped is not None
         if self._started:
-            compile_apart(self._node, 'balance', BALANCE)
+            compile_apart(self._node, 'balance', 'balance', BALANCE, moving=True)
         inputs = self._inputs(GRAVITY * biped.total)
         if self._value('odometry_topic'):
             self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
@@ -310,7 +311,7 @@ class FeedbackSwitch:
             self.loop.learn(plan)
 
     def sense(self, dt: float, stamp: int) -> None:
-        """Correct the coming tick by the sensors; dt in s, stamp in ns."""
+        """Balance the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
 
@@ -328,39 +329,14 @@ class FeedbackSwitch:
                 f'{", ".join(delays) or "unknown, messages have no stamps"} '
                 f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
 
-    def machine(self, pattern: Machine) -> native.Correction | None:
-        """Return how machine code corrects a pattern, None where ticks need Python."""
-        return self.loop.machine(pattern)
-
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Let machine code take the sensors' messages meanwhile, if any."""
-        if self.loop is None:
-            yield
-        else:
-            with self.loop.inputs.held(), self._kp_scale.block.held():
-                yield
-
-    def output(self, rate: float) -> int:
-        """Return the output of kp_scale for ticks outside the interpreter, rate in Hz."""
-        return self._kp_scale.output(self.loop.feedback.memory.kp_scale, rate)
-
-    def targets(self, position: np.ndarray) -> np.ndarray:
-        """Return the targets to send for wanted angles of the joints, rad, shape (joints,)."""
-        return position if self.loop is None else self.loop.targets(position)
-
-    def publish(self, dt: float, stamp: int) -> None:
-        """Publish the messages that are due; dt since the last call, s, and stamp, ns."""
+    def publish(self, stamp: int) -> None:
+        """Publish and log what a balance has to say at a tick; stamp in ns."""
         if self.loop is None:
             return
-        if self._biped is None:
-            self._kp_scale.publish(dt, self.loop.kp_scale)
-        elif news := self.loop.news():
+        if news := self.loop.news():
             self._node.get_logger().warning(news)
         if self._held is not None:
             self._held.publish(stamp, self.loop.held_angles)
-        if self._odometry is not None and self.loop.fraction > 0.0:
-            self._odometry.publish(dt, stamp)
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""

@@ -175,7 +175,7 @@ class MessageBlock:
         values = self._words[NUMBERS:].view(float)
         self._parts = [values[slice(*edge)] for edge in pairwise(np.cumsum([0, *sizes]))]
         self.topics: list[str] = []
-        self._publishers: list[tuple[Any, memoryview]] = []
+        self._handles: list[Any] = []
         raws, changing, sources = zip(*(template.serialised() for _, template in templates),
                                     strict=True)
         starts = np.cumsum([0, *(-(-len(raw) // WORD) for raw in raws)])
@@ -186,30 +186,28 @@ class MessageBlock:
         self._sources = np.concatenate(sources)
         for (topic, template), raw, start in zip(templates, raws, WORD * starts[:-1],
                                                  strict=True):
-            part = memoryview(memory)[start:start + len(raw)]
-            part[:] = raw
+            memory[start:start + len(raw)] = raw
             publisher = node.create_publisher(
                 type(template.message), topic, QoSProfile(depth=100),
                 qos_overriding_options=OVERRIDABLE)
-            self._publishers.append((publisher, part))
+            self._handles.append(publisher.handle)
             self.topics.append(publisher.topic_name)
-        self._native = self._native_block()
+        self._native = self._native_block([len(raw) for raw in raws])
+        self._sizes = np.array(sizes, dtype=np.int64)
         self._output = native.Output(first=1.0)
 
-    def _native_block(self) -> native.SerializedMessages:
-        """Return what ``tick.c`` fills and publishes."""
+    def _native_block(self, lengths: Sequence[int]) -> native.SerializedMessages:
+        """Return what ``tick.c`` fills and publishes: messages of so many bytes."""
         start = at = self._block.ctypes.data
-        self._handles = [publisher.handle for publisher, _ in self._publishers]
         # Kept as long as the struct that points there.
-        self._messages = (native.Serialized * len(self._handles))()
+        self._messages = (native.Serialized * len(lengths))()
         self._pointers = np.array([handle.pointer for handle in self._handles], dtype=np.uint64)
-        for message, (_, part) in zip(self._messages, self._publishers, strict=True):
-            message.buffer, message.length, message.capacity = at, len(part), len(part)
-            at += -(-len(part) // WORD) * WORD
+        for message, length in zip(self._messages, lengths, strict=True):
+            message.buffer, message.length, message.capacity = at, length, length
+            at += -(-length // WORD) * WORD
         self._library = native.library()
         return native.SerializedMessages(
-            native.address('rcl_publish_serialized_message'),
-            native.address('rcutils_reset_error'), self._pointers.ctypes.data,
+            native.address('rcl_publish_serialized_message'), self._pointers.ctypes.data,
             ctypes.addressof(self._messages), start, self._words.ctypes.data,
             self._places.ctypes.data, self._sources.ctypes.data, len(self._handles),
             len(self._places))
@@ -222,14 +220,16 @@ class MessageBlock:
             values: of each part.
             duration: ns.
 
+        Raises:
+            MiddlewareError: the middleware refuses one.
+
         """
         for part, given in zip(self._parts, values, strict=True):
             part[:] = given
         with self.held():
             sent = self._library.publish(ctypes.byref(self._native), stamp, duration)
-        # rclpy raises the error of what the middleware refused.
-        for publisher, message in self._publishers[sent:]:
-            publisher.publish(bytes(message))
+        if sent < len(self._handles):
+            raise native.middleware_error()
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -242,18 +242,30 @@ class MessageBlock:
             for handle in self._handles:
                 handle.__exit__(None, None, None)
 
-    def output(self, places: Sequence[int], every: int, quiet: bool = False) -> int:
-        """Return the address of the struct by which ``tick.c`` publishes the messages.
+    def feed(self, *places: int | np.ndarray, period: float = 0.0, quiet: bool = False,
+             while_not_0: np.ndarray | None = None) -> 'MessageBlock':
+        """Say from where ``tick.c`` fills the messages, and when; return the block.
 
         Args:
-            places: addresses of pointers to the numbers of each part.
-            every: number of ticks between two publications.
+            places: arrays that have the numbers of each part, or addresses of pointers to these.
+            period: between two publications, s; 0 for every tick.
             quiet: publish as the first number changes, and else only while it is not 1.
+            while_not_0: publish only while this number, shape (1,), is not 0.
 
         """
-        self._from = np.array(places, dtype=np.uint64)
-        self._sizes = np.array([len(part) for part in self._parts], dtype=np.int64)
+        self._period, self._gate = period, while_not_0
+        self._kept = places
+        self._fixed = np.array([place.ctypes.data if isinstance(place, np.ndarray) else 0
+                                for place in places], dtype=np.uint64)
+        self._from = np.array([self._fixed[k:].ctypes.data if isinstance(place, np.ndarray) else
+                               place for k, place in enumerate(places)], dtype=np.uint64)
         self._output = native.Output(
             ctypes.addressof(self._native), self._from.ctypes.data, self._sizes.ctypes.data,
-            len(places), every, self._output.since, quiet, self._output.first)
+            len(places), 1, self._output.since, quiet,
+            None if while_not_0 is None else while_not_0.ctypes.data, self._output.first)
+        return self
+
+    def output(self, rate: float) -> int:
+        """Return the address of the struct of ``tick.c``, for a rate of ticks in Hz."""
+        self._output.every = max(1, round(rate * self._period))
         return ctypes.addressof(self._output)

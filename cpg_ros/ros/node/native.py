@@ -26,6 +26,7 @@ from typing import Any
 
 from cpg_ros.common.c_library import load
 from cpg_ros.common.cache_folder import cache_folder
+from cpg_ros.common.errors import CpgError
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 _SOURCE = Path(__file__).with_name('tick.c')
@@ -42,7 +43,7 @@ class SerializedMessages(ctypes.Structure):
     """The struct ``block`` of ``tick.c``."""
 
     _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'send', 'forget', 'publisher', 'message', 'memory', 'words', 'place', 'source')),
+        'send', 'publisher', 'message', 'memory', 'words', 'place', 'source')),
         ('messages', ctypes.c_int64), ('changes', ctypes.c_int64))
 
 
@@ -50,7 +51,7 @@ class Counters(ctypes.Structure):
     """The struct ``counters`` of ``tick.c``."""
 
     _fields_ = (*((name, ctypes.c_int64) for name in ('ticks', 'late', 'dropped', 'worst')),
-                ('resuming', ctypes.c_int32), ('wanted', ctypes.c_int32))
+                *((name, ctypes.c_int32) for name in ('resuming', 'wanted', 'stopping')))
 
 
 class Output(ctypes.Structure):
@@ -58,7 +59,7 @@ class Output(ctypes.Structure):
 
     _fields_ = (*((name, ctypes.c_void_p) for name in ('to', 'from', 'sizes')),
                 *((name, ctypes.c_int64) for name in ('parts', 'every', 'since', 'quiet')),
-                ('first', ctypes.c_double))
+                ('while_not_0', ctypes.c_void_p), ('first', ctypes.c_double))
 
 
 class Input(ctypes.Structure):
@@ -81,8 +82,17 @@ class Correction(ctypes.Structure):
     """The struct ``correction`` of ``tick.c``."""
 
     _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'close', 'arguments', 'report', 'plan', 'follow', 'take', 'forget', 'numbers', 'gaits',
-        'inputs', 'resets')), ('count', ctypes.c_int64), ('parts', ctypes.c_int64))
+        'close', 'finish', 'arguments', 'report', 'plan', 'follow', 'take', 'forget', 'numbers',
+        'gaits', 'inputs', 'resets')), ('count', ctypes.c_int64), ('parts', ctypes.c_int64))
+
+
+class Simulated(ctypes.Structure):
+    """The struct ``simulated`` of ``tick.c``."""
+
+    _fields_ = (*((name, ctypes.c_void_p) for name in (
+        'subscription', 'set', 'clear', 'add', 'wait', 'take', 'forget')),
+                ('message', Serialized),
+                *((name, ctypes.c_int64) for name in ('time', 'step', 'moved', 'deadline')))
 
 
 class Loop(ctypes.Structure):
@@ -90,8 +100,20 @@ class Loop(ctypes.Structure):
 
     _fields_ = (*((name, ctypes.c_void_p) for name in (
         'count', 'asked', 'advance', 'resume', 'what')),
-                *((name, ctypes.c_int64) for name in ('deadline', 'period', 'stall')),
-                ('correct', ctypes.c_void_p), ('outputs', 3 * ctypes.c_void_p))
+                *((name, ctypes.c_int64) for name in (
+                    'deadline', 'period', 'stall', 'stamp', 'behind')),
+                *((name, ctypes.c_void_p) for name in ('offset', 'clock', 'correct')),
+                ('outputs', 4 * ctypes.c_void_p), ('due', ctypes.c_int32))
+
+
+class _ErrorText(ctypes.Structure):
+    """``rcutils_error_string_t``."""
+
+    _fields_ = (('text', 1024 * ctypes.c_char),)
+
+
+#: What ``run`` of ``tick.c`` leaves to Python.
+ATTEND, RESUME, TICK, RESTART, REFUSED = range(1, 6)
 
 
 @cache
@@ -107,10 +129,8 @@ def library() -> ctypes.CDLL:
     loaded = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text}, _SOURCE.name)
     whole = ctypes.c_int64
     loaded.publish.argtypes, loaded.publish.restype = (ctypes.c_void_p, whole, whole), whole
-    loaded.run.argtypes, loaded.run.restype = (ctypes.c_void_p,), whole
-    loaded.wait_until.argtypes, loaded.wait_until.restype = (whole,), whole
-    loaded.system_offset.argtypes, loaded.system_offset.restype = (), whole
-    loaded.sense.argtypes, loaded.tick.argtypes = (ctypes.c_void_p,), (ctypes.c_void_p, whole)
+    for name in ('run', 'sense', 'tick', 'publish_outputs'):
+        getattr(loaded, name).argtypes = ctypes.c_void_p,
     loaded.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
     return loaded
 
@@ -133,3 +153,16 @@ def address(function: str) -> int | None:
     """Return the address of a function of rcl, to which rclpy's own library is linked."""
     linked = ctypes.CDLL(rclpy_implementation.__file__)
     return ctypes.cast(getattr(linked, function), ctypes.c_void_p).value
+
+
+class MiddlewareError(CpgError):
+    """The middleware refuses a message."""
+
+
+def middleware_error() -> MiddlewareError:
+    """Return the error that the middleware has set in this thread, which is cleared."""
+    linked = ctypes.CDLL(rclpy_implementation.__file__)
+    linked.rcutils_get_error_string.restype = _ErrorText
+    text = linked.rcutils_get_error_string().text.decode(errors='replace')
+    linked.rcutils_reset_error()
+    return MiddlewareError(f'a message cannot be published: {text}')

@@ -10,9 +10,20 @@
 #include <time.h>
 
 #define SECOND 1000000000
-/* Return code of rcl if no message waits. */
+/* Return codes of rcl: the time to wait is over, and no message waits. */
+#define TIMED_OUT 2
 #define NOTHING_TAKEN 401
-#define OUTPUTS 3
+#define OUTPUTS 4
+
+/* PATIENCE: longest time for which /clock is waited for before requests are looked at; COARSE:
+ * step of simulated time that is not a stall, as /clock may be coarse or lose a message; JITTER:
+ * step back above which it is a jump: after a smaller one (messages out of order, two publishers
+ * of /clock) ticks wait until time is past its last value; STOPPED: time by the steady clock after
+ * which a stop no longer waits for a still /clock; all in ns. */
+#define PATIENCE 20000000
+#define COARSE 50000000
+#define JITTER 100000000
+#define STOPPED 200000000
 
 /* Same layout as rcutils_uint8_array_t. */
 typedef struct {
@@ -22,9 +33,8 @@ typedef struct {
 } serialized;
 
 typedef struct {
-    /* rcl_publish_serialized_message, and rcutils_reset_error. */
+    /* rcl_publish_serialized_message */
     int32_t (*send)(const void *publisher, const serialized *message, void *allocation);
-    void (*forget)(void);
     const void *const *publisher;
     const serialized *message;
     uint32_t *memory;       /* of all messages, words */
@@ -47,7 +57,6 @@ int64_t publish(const block *b, int64_t stamp, int64_t duration)
     }
     for (int64_t i = 0; i < b->messages; i++) {
         if (b->send(b->publisher[i], &b->message[i], NULL)) {
-            b->forget();
             return i;
         }
     }
@@ -62,7 +71,7 @@ static int64_t steady_time(void)
 }
 
 /* Wait until a deadline by the steady clock, ns; return the time since it, ns. */
-int64_t wait_until(int64_t deadline)
+static int64_t wait_until(int64_t deadline)
 {
     int64_t behind = steady_time() - deadline;
     if (behind < 0) {
@@ -78,7 +87,8 @@ typedef struct {
     int64_t ticks, late, dropped;  /* how many */
     int64_t worst;                 /* longest delay, ns */
     int32_t resuming;              /* the last tick was left out after a stall */
-    int32_t wanted;                /* set by other threads: the next tick is to be Python's */
+    int32_t wanted;                /* set by other threads: Python is to prepare the next tick */
+    int32_t stopping;              /* set by other threads: ticks do not wait for /clock */
 } counters;
 
 typedef struct {
@@ -88,6 +98,7 @@ typedef struct {
     int64_t parts;
     int64_t every, since;              /* ticks between two messages, and since the last */
     int64_t quiet;                     /* only while the first number is not 1, and as it changes */
+    const double *while_not_0;         /* publish only while this is not 0; NULL for always */
     double first;
 } output;
 
@@ -114,6 +125,7 @@ typedef struct {
 /* The correction of the angles between plan and follow of the pattern. */
 typedef struct {
     int64_t (*close)(const void *arguments);
+    int64_t (*finish)(const void *arguments);  /* called after follow; NULL for nothing to do */
     const void *arguments;     /* replaced when gains change */
     void (*report)(const void *what, double *numbers, int64_t *gaits);
     void (*plan)(void *what, double dt);
@@ -135,6 +147,24 @@ static void number(const uint8_t *from, int swapped, void *to, int size)
     }
 }
 
+/* Return the stamp at which a message begins, ns. */
+static int64_t stamp_of(const uint8_t *data, int swapped)
+{
+    int32_t seconds = 0;
+    uint32_t nanoseconds = 0;
+    number(data + 4, swapped, &seconds, 4);
+    number(data + 8, swapped, &nanoseconds, 4);
+    return (int64_t)seconds * SECOND + nanoseconds;
+}
+
+/* Tell whether a message has another byte order than this machine: 0 as its second byte is
+ * big-endian. */
+static int is_swapped(const uint8_t *data)
+{
+    const uint16_t one = 1;
+    return (data[1] & 1) != *(const uint8_t *)&one;
+}
+
 /* Read a message; return 0, and mark it, if it is of another layout than is known. */
 int read_input(input *in, const uint8_t *data, int64_t length)
 {
@@ -146,9 +176,7 @@ int read_input(input *in, const uint8_t *data, int64_t length)
     if (in->unread) {
         return 0;
     }
-    /* The second byte says so: 0 for big-endian. */
-    const uint16_t one = 1;
-    const int swapped = (data[1] & 1) != *(const uint8_t *)&one;
+    const int swapped = is_swapped(data);
     int changed = 0;
     for (int64_t k = 0; k < in->count; k++) {
         double value;
@@ -156,13 +184,8 @@ int read_input(input *in, const uint8_t *data, int64_t length)
         changed |= memcmp(&value, &in->values[k], sizeof value) != 0;
         in->values[k] = value;
     }
-    int32_t seconds = 0;
-    uint32_t nanoseconds = 0;
-    if (in->stamped) {
-        number(data + 4, swapped, &seconds, 4);
-        number(data + 8, swapped, &nanoseconds, 4);
-    }
-    *in->stamp = seconds || nanoseconds ? seconds + 1e-9 * nanoseconds : NAN;
+    const int64_t stamp = in->stamped ? stamp_of(data, swapped) : 0;
+    *in->stamp = stamp ? 1e-9 * (double)stamp : NAN;
     *in->news = 1 + changed;
     return 1;
 }
@@ -193,27 +216,54 @@ int sense(correction *c)
 
 static void correct(correction *c, void *what, double dt, int64_t stamp)
 {
+    const void *arguments = __atomic_load_n(&c->arguments, __ATOMIC_ACQUIRE);
     c->numbers[0] = dt;
     c->numbers[1] = 1e-9 * (double)stamp;
     c->plan(what, dt);
     c->report(what, c->numbers + 2, c->gaits);
-    if (c->close(__atomic_load_n(&c->arguments, __ATOMIC_ACQUIRE)) == 2) {
+    if (c->close(arguments) == 2) {
         for (int64_t k = 0; k < c->parts; k++) {
             memcpy(c->resets[k].to, c->resets[k].from, (size_t)c->resets[k].size);
         }
     }
     c->follow(what, dt, 1);
+    if (c->finish) {
+        c->finish(arguments);
+    }
 }
+
+/* Simulated time. */
+typedef struct {
+    const void *subscription;          /* of /clock */
+    void *set;                         /* rcl_wait_set_t with room for it */
+    int (*clear)(void *set);
+    int (*add)(void *set, const void *subscription, size_t *index);
+    int (*wait)(void *set, int64_t timeout);
+    int (*take)(const void *subscription, void *message, void *info, void *allocation);
+    void (*forget)(void);
+    serialized message;
+    int64_t time, step;                /* the latest, and the step to it, ns; 0 before the first */
+    int64_t moved;                     /* when it came, by the steady clock, ns */
+    int64_t deadline;                  /* by the steady clock, 0 while ticks go by /clock */
+} simulated;
+
+/* What run leaves to Python: to prepare the next tick, to resume after a stall, a tick, to start
+ * again where simulated time jumps back, to report an error of the middleware. */
+enum { ATTEND = 1, RESUME, TICK, RESTART, REFUSED };
 
 typedef struct {
     counters *count;
-    const int32_t *asked;              /* set by the pattern if the next tick needs Python */
-    void (*advance)(void *what, double dt);
-    void (*resume)(void *what, double stall);  /* s */
+    const int32_t *asked;              /* set by the pattern if Python is to prepare the next tick */
+    void (*advance)(void *what, double dt);    /* NULL where Python ticks */
+    void (*resume)(void *what, double stall);  /* s; NULL where Python does it */
     void *what;
-    int64_t deadline, period, stall;   /* ns */
+    int64_t deadline, period, stall;   /* ns; stall: delay from which on ticks are left out */
+    int64_t stamp, behind;             /* of the tick, and how late it is, ns */
+    int64_t (*offset)(void);           /* system time minus steady time, ns */
+    simulated *clock;                  /* NULL for the steady clock */
     correction *correct;               /* NULL for none */
     output *outputs[OUTPUTS];          /* NULL behind the last one */
+    int32_t due;                       /* whether a tick is due */
 } loop;
 
 /* Return system time minus steady time, ns, of the narrowest of some readings: a thread switch in
@@ -242,7 +292,7 @@ static int put(output *o, int64_t stamp, int64_t duration)
     if (++o->since < o->every && !(o->quiet && changed)) {
         return 1;
     }
-    if (o->quiet && !changed && first == 1.0) {
+    if ((o->quiet && !changed && first == 1.0) || (o->while_not_0 && *o->while_not_0 == 0.0)) {
         return 1;
     }
     o->since = 0;
@@ -255,54 +305,178 @@ static int put(output *o, int64_t stamp, int64_t duration)
     return publish(o->to, stamp, duration) == o->to->messages;
 }
 
-/* Do a tick of a stamp, ns; return 0 if the middleware refuses a message. */
-int tick(loop *l, int64_t stamp)
+/* Publish what is due at a tick; return 0 if the middleware refuses a message. */
+int publish_outputs(loop *l)
 {
-    const double dt = 1e-9 * (double)l->period;
     int sent = 1;
-    if (l->correct) {
-        correct(l->correct, l->what, dt, stamp);
-    } else {
-        l->advance(l->what, dt);
-    }
-    for (int k = 0; k < OUTPUTS && l->outputs[k]; k++) {
-        sent &= put(l->outputs[k], stamp, l->period);
+    for (int k = 0; k < OUTPUTS && l->outputs[k] && sent; k++) {
+        sent = put(l->outputs[k], l->stamp, l->period);
     }
     return sent;
 }
 
-/* Tick until Python is wanted for a tick: by request, or to report an error of the middleware.
- * Return how long ago the deadline of that tick was, ns. Stalls are left out as Ticker does. */
-int64_t run(loop *l)
+/* Do a tick of the loop's stamp; return 0 if the middleware refuses a message. */
+int tick(loop *l)
+{
+    const double dt = 1e-9 * (double)l->period;
+    if (l->correct) {
+        correct(l->correct, l->what, dt, l->stamp);
+    } else {
+        l->advance(l->what, dt);
+    }
+    return publish_outputs(l);
+}
+
+static int is_attended(const loop *l)
+{
+    return __atomic_load_n(&l->count->wanted, __ATOMIC_ACQUIRE)
+        || (l->asked && __atomic_load_n(l->asked, __ATOMIC_ACQUIRE));
+}
+
+/* Leave out the ticks that a stall has cost, and the one after it: that keeps ticks apart. Where
+ * every sleep is longer than a stall, some remain. Return whether that one is left out. */
+static int leave_out(loop *l, int64_t *deadline)
 {
     counters *count = l->count;
+    const int64_t missed = l->behind / l->period;
+    count->resuming = !count->resuming;
+    count->dropped += missed + count->resuming;
+    *deadline += missed * l->period;
+    if (l->resume) {
+        l->resume(l->what, 1e-9 * (double)l->behind);
+    }
+    return count->resuming;
+}
+
+/* Wait for the next deadline by the steady clock; return what is left to Python, or 0. */
+static int by_steady_clock(loop *l, int64_t *deadline)
+{
+    counters *count = l->count;
+    l->behind = wait_until(*deadline + l->period);
+    if (is_attended(l)) {
+        return ATTEND;
+    }
+    *deadline += l->period;
+    count->worst = l->behind > count->worst ? l->behind : count->worst;
+    const int stalled = l->behind >= l->stall;
+    if (stalled) {
+        l->due = !leave_out(l, deadline);
+    } else {
+        l->due = 1;
+        count->resuming = 0;
+    }
+    count->late += l->due && l->behind > l->period;
+    return stalled && !l->resume ? RESUME : 0;
+}
+
+/* Wait for a message of /clock; return its time, ns, or 0 if none comes within PATIENCE. */
+static int64_t read_clock(simulated *c)
+{
+    int error = c->clear(c->set);
+    error = error ? error : c->add(c->set, c->subscription, NULL);
+    error = error ? error : c->wait(c->set, PATIENCE);
+    if (error && error != TIMED_OUT) {
+        c->forget();
+        wait_until(steady_time() + PATIENCE);
+    }
+    int64_t time = 0;
+    while (!(error = c->take(c->subscription, &c->message, NULL, NULL))) {
+        time = stamp_of(c->message.buffer, is_swapped(c->message.buffer));
+    }
+    if (error != NOTHING_TAKEN) {
+        c->forget();
+    }
+    return time;
+}
+
+/* Take over a time of /clock, ns; return what is left to Python, or 0. */
+static int take_time(loop *l, int64_t now)
+{
+    simulated *c = l->clock;
+    const int64_t back = c->time - now, usual = c->step;
+    if (!c->time || back > 0) {
+        const int event = c->time ? RESTART : 0;
+        l->deadline = c->time = now;
+        c->step = 0;
+        return event;
+    }
+    /* A clock may be coarser than a period; a stall is a step unlike the one before. */
+    c->step = now - c->time;
+    c->time = now;
+    l->behind = now - l->deadline - l->period;
+    if (l->behind < l->stall || c->step <= 2 * usual || c->step <= COARSE) {
+        return 0;
+    }
+    l->deadline += leave_out(l, &l->deadline) ? l->period : 0;
+    return l->resume ? 0 : RESUME;
+}
+
+/* Wait for the next deadline by /clock; return what is left to Python, or 0. */
+static int by_clock(loop *l)
+{
+    simulated *c = l->clock;
     for (;;) {
-        l->deadline += l->period;
-        const int64_t behind = wait_until(l->deadline);
-        if (__atomic_load_n(&count->wanted, __ATOMIC_ACQUIRE)
-            || __atomic_load_n(l->asked, __ATOMIC_ACQUIRE)) {
-            return behind;
+        const int stopping = __atomic_load_n(&l->count->stopping, __ATOMIC_ACQUIRE);
+        if (is_attended(l)) {
+            return ATTEND;
         }
-        if (l->correct && !sense(l->correct)) {
-            return behind;
+        if (c->deadline && stopping) {
+            const int64_t before = c->deadline;
+            const int event = by_steady_clock(l, &c->deadline);
+            l->deadline += c->deadline - before;
+            return event;
         }
-        count->worst = behind > count->worst ? behind : count->worst;
-        const int stalled = behind >= l->stall;
-        const int skip = stalled && !count->resuming;
-        count->resuming = skip;
-        if (stalled) {
-            const int64_t missed = behind / l->period;
-            l->resume(l->what, 1e-9 * (double)behind);
-            l->deadline += missed * l->period;
-            count->dropped += missed + skip;
-            if (skip) {
+        if (c->deadline) {
+            /* The next time counts, whatever it is. */
+            c->deadline = c->time = 0;
+            c->moved = steady_time();
+        }
+        if (l->deadline && l->deadline + l->period <= c->time) {
+            l->deadline += l->period;
+            l->due = 1;
+            return 0;
+        }
+        const int64_t now = read_clock(c), back = c->time - now;
+        if (now > c->time) {
+            c->moved = steady_time();
+        } else if (stopping && l->deadline
+                   && ((now && back > JITTER) || steady_time() >= c->moved + STOPPED)) {
+            c->deadline = steady_time();
+            continue;
+        }
+        if (now && !(back >= 0 && back <= JITTER)) {
+            const int event = take_time(l, now);
+            if (event) {
+                return event;
+            }
+        }
+    }
+}
+
+/* Tick until something is left to Python; return what. */
+int run(loop *l)
+{
+    for (;;) {
+        if (!l->due) {
+            const int event = l->clock ? by_clock(l) : by_steady_clock(l, &l->deadline);
+            if (event) {
+                return event;
+            }
+            if (!l->due) {
                 continue;
             }
         }
-        count->late += behind > l->period;
-        count->ticks++;
-        if (!tick(l, l->deadline + system_offset())) {
-            count->wanted = 1;
+        if (l->correct && !sense(l->correct)) {
+            return ATTEND;
+        }
+        l->due = 0;
+        l->count->ticks++;
+        l->stamp = l->deadline + (l->clock ? 0 : l->offset());
+        if (!l->advance) {
+            return TICK;
+        }
+        if (!tick(l)) {
+            return REFUSED;
         }
     }
 }

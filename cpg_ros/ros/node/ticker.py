@@ -15,7 +15,7 @@
 """A thread that ticks on absolute deadlines, by the steady clock or by simulated time."""
 
 from collections.abc import Callable, Sequence
-import contextlib
+from contextlib import AbstractContextManager, nullcontext, suppress
 import ctypes
 from dataclasses import dataclass
 import os
@@ -26,10 +26,11 @@ from typing import Any
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.node import native
 from cpg_ros.ros.node.parameters import fixed, Spec
-from rclpy.clock import JumpThreshold
-from rclpy.duration import Duration
+from cpg_ros.ros.node.polled import PolledSubscription
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
 
 # Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's.
 
@@ -125,13 +126,13 @@ def _raise_others() -> None:
     for thread in (int(name) for _ in range(2) for name in os.listdir('/proc/self/task')):
         if thread != own:
             # It may have ended.
-            with contextlib.suppress(ProcessLookupError):
+            with suppress(ProcessLookupError):
                 os.sched_setscheduler(thread, os.SCHED_RR, os.sched_param(1))
 
 
 def _lock_memory() -> str:
     """Lock the memory of the process; return why not, or ''."""
-    with contextlib.suppress(AttributeError):
+    with suppress(AttributeError):
         if ctypes.CDLL(None, use_errno=True).mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
             return ''
         return os.strerror(ctypes.get_errno())
@@ -142,16 +143,9 @@ def _lock_memory() -> str:
 #: robot must not be driven through the motion it missed, and never gets more than two ticks at
 #: once.
 STALL = 2
-#: COARSE: step of simulated time that is not a stall, s: /clock may be coarse or lose a message.
-COARSE = 0.05
 #: MOST_BEHIND: longest delay that a ticker without ``resume``, as in a simulation, makes up for,
 #: s.
 MOST_BEHIND = 1.0
-#: JITTER: step back of simulated time, s, above which it is a jump; after a smaller one (messages
-#: out of order, two publishers of /clock) the ticker waits until time is past its last value.
-JITTER = 0.1
-#: STOPPED: time of the steady clock, s, after which a stop no longer waits for a still /clock.
-STOPPED = 0.2
 
 
 class TickThread(threading.Thread):
@@ -213,12 +207,12 @@ class Ticker(TickThread):
     period is made up for at once; after a stall the periods that have passed are left out, and
     ``resume`` gets its length in s. With simulated time the deadlines are instants of ``/clock``,
     and a jump back calls ``restart``; after ``stop_moving`` the ticker continues by the steady
-    clock if ``/clock`` stands still for STOPPED s or jumps back.
+    clock if ``/clock`` stands still for .2 s or jumps back. All of this is done in ``tick.c``.
 
     Attributes:
         jumps: of simulated time back.
-        stopping: whether the ticks do not wait for ``/clock``; set it False at rest.
         paused: set by whoever ticks: the ticks go on, but nothing is done at them.
+        loop: shared with ``tick.c``.
 
     """
 
@@ -226,7 +220,7 @@ class Ticker(TickThread):
                  restart: Callable[[], None], failed: Callable[[BaseException], None],
                  resume: Callable[[float], None] | None = None,
                  begin: Callable[[], None] = lambda: None,
-                 steadily: Callable[..., tuple[int, int] | None] = lambda *_: None) -> None:
+                 prepare: Callable[[native.Loop], AbstractContextManager] = nullcontext) -> None:
         """Prepare to tick.
 
         Args:
@@ -237,154 +231,108 @@ class Ticker(TickThread):
             failed: called with the exception that ended the thread.
             resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
             begin: called first thing in the thread.
-            steadily: called with a function, a deadline and a period in ns; calls the function
-                with a Loop, which does the coming ticks until ``attend`` is called, the deadline
-                and the period, and returns what it does; None if ``tick`` is to be called.
+            prepare: called with the loop in the thread, first and after ``attend``; it may fill in
+                what does the coming ticks in place of ``tick``, which is kept while the result is
+                entered.
 
         """
         super().__init__('ticker', rate, failed)
         self._library = native.library()
-        self.jumps = 0
-        self.stopping = self.paused = False
-        self._clock: Any = node.get_clock()
+        self.jumps, self.paused = 0, False
         self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
-        self._steadily = steadily
-        self._moved = threading.Event()
-        threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
-                                  min_backward=Duration(nanoseconds=-1))
-        self._jumps = self._clock.create_jump_callback(
-            threshold, post_callback=lambda _: self._moved.set())
+        self._prepare = prepare
+        self.loop = native.Loop(count=ctypes.addressof(self.count), offset=ctypes.cast(
+            self._library.system_offset, ctypes.c_void_p).value)
+        clock: Any = node.get_clock()
+        self._clock = SimulatedClock(node) if clock.ros_time_is_active else None
+        if self._clock is not None:
+            self.loop.clock = ctypes.addressof(self._clock.struct)
 
     @property
     def waiting(self) -> bool:
         """Whether it has not been started, or is paused."""
         return self.paused or not self.is_alive()
 
+    @property
+    def stopping(self) -> bool:
+        """Whether the ticks do not wait for ``/clock``; set it False at rest."""
+        return bool(self.count.stopping)
+
+    @stopping.setter
+    def stopping(self, stopping: bool) -> None:
+        self.count.stopping = stopping
+
     def end(self) -> None:
         """Stop after the tick under way."""
         super().end()
         self.attend()
-        self._moved.set()
 
     def stop_moving(self) -> None:
         """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
         self.stopping = True
-        self._moved.set()
+
+    def attend(self) -> None:
+        """Let ``prepare`` be called before the next tick."""
+        self.count.wanted = 1
 
     def _run(self) -> None:
         self._begin()
-        if self._clock.ros_time_is_active:
-            self._run_simulated()
-        else:
-            self._run_steady(time.monotonic_ns(), self._system_time)
-
-    def _system_time(self, deadline: int) -> int:
-        """Return a time of the steady clock by the system clock, ns."""
-        return deadline + int(self._library.system_offset())
-
-    def _period(self) -> int:
-        return round(1e9 / self.rate)
-
-    def _run_steady(self, deadline: int, stamp: Callable[[int], int],
-                    going: Callable[[], bool] | None = None) -> None:
-        """Tick by the steady clock, while ``going`` if given; deadline and its ``stamp`` in ns."""
-        ending, count = self._ending, self.count
-        while not ending.is_set() and (going is None or going()):
-            period = self._period()
-            count.wanted = 0
-            left = self._steadily(self._run_outside, deadline, period) if going is None else None
-            if left is None:
-                deadline += period
-                behind = self._library.wait_until(deadline)
-            else:
-                deadline, behind = left
-            count.worst = max(count.worst, behind)
-            leap, skip = self._stalled(behind, period)
-            deadline += leap
-            if skip:
-                continue
-            count.ticks += 1
-            if behind > period:
-                count.late += 1
-            self._tick(period * 1e-9, stamp(deadline))
-
-    def _run_outside(self, loop: native.Loop, deadline: int, period: int) -> tuple[int, int]:
-        """Tick outside the interpreter; return the next deadline, and the time since it, ns."""
-        loop.count, loop.stall = ctypes.addressof(self.count), STALL * period
-        loop.deadline, loop.period = deadline, period
-        behind = self._library.run(ctypes.byref(loop))
-        return loop.deadline, behind
-
-    def attend(self) -> None:
-        """Let the next tick call ``tick`` in the interpreter."""
-        self.count.wanted = 1
-
-    def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
-        """Return how far the deadline must leap, ns, and whether to leave out its tick, too.
-
-        Leaving it out keeps ticks apart; where every sleep is longer than a stall, some remain.
-        """
-        resume = self._resume
-        if resume is None:
-            missed, skip = behind // period if behind > MOST_BEHIND * 1e9 else 0, False
-        elif behind < STALL * period:
-            self.count.resuming = 0
-            return 0, False
-        else:
-            missed, skip = behind // period, not self.count.resuming
-            self.count.resuming = skip
-            resume(behind * 1e-9)
-        self.count.dropped += missed + skip
-        return missed * period, skip
-
-    def _run_simulated(self) -> None:
-        # The last tick's stamp, the latest time, and its last step; 0 before the first.
-        deadline = last = step = 0
-        moved = time.monotonic()
+        loop, address = self.loop, ctypes.byref(self.loop)
+        loop.deadline = 0 if self._clock is not None else time.monotonic_ns()
         while not self._ending.is_set():
-            left = moved + STOPPED - time.monotonic()
-            self._moved.wait(max(left, 0.0) if self.stopping and deadline else None)
-            self._moved.clear()
-            now = self._clock.now().nanoseconds
-            back = last - now
-            if now > last:
-                moved = time.monotonic()
-            elif self.stopping and deadline and (
-                    back > JITTER * 1e9 or time.monotonic() >= moved + STOPPED):
-                deadline = self._stop_by_steady_clock(deadline)
-                # The next time counts, whatever it is.
-                last, moved = 0, time.monotonic()
-                continue
-            if now == 0 or 0 <= back <= JITTER * 1e9:
-                continue
-            if last == 0 or back > 0:
-                if last:
-                    self.jumps += 1
-                    self._restart()
-                deadline = last = now
-            # A clock may be coarser than a period; a stall is a step unlike the one before.
-            usual, step = step, now - last
-            last = now
-            period = self._period()
-            behind = now - deadline - period
-            if behind >= STALL * period and step > max(2 * usual, round(COARSE * 1e9)):
-                leap, skip = self._stalled(behind, period)
-                deadline += leap + skip * period
-            while not self._ending.is_set() and deadline + self._period() <= now:
-                period = self._period()
-                deadline += period
-                self.count.ticks += 1
-                self._tick(period * 1e-9, deadline)
+            self.count.wanted, loop.period = 0, round(1e9 / self.rate)
+            loop.stall = round(1e9 * MOST_BEHIND) if self._resume is None else STALL * loop.period
+            with self._prepare(loop), self._clock or nullcontext():
+                # Asked again, as wanted may have been set before it is reset above.
+                while not self._ending.is_set() and (
+                        event := self._library.run(address)) != native.ATTEND:
+                    self._handle(event)
 
-    def _stop_by_steady_clock(self, stamp: int) -> int:
-        """Continue the ticks from a stamp, ns, until the robot is at rest; return the last one."""
-        now = time.monotonic_ns()
-        ahead = stamp - now
+    def _handle(self, event: int) -> None:
+        """Do what ``tick.c`` leaves to Python."""
+        loop = self.loop
+        if event == native.TICK:
+            self._tick(1e-9 * loop.period, loop.stamp)
+        elif event == native.RESUME and self._resume is not None:
+            self._resume(1e-9 * loop.behind)
+        elif event == native.RESTART:
+            self.jumps += 1
+            self._restart()
+        elif event == native.REFUSED:
+            raise native.middleware_error()
 
-        def next_stamp(deadline: int) -> int:
-            nonlocal stamp
-            stamp = deadline + ahead
-            return stamp
+    def publish(self) -> None:
+        """Publish the loop's outputs at a tick of Python."""
+        if not self._library.publish_outputs(ctypes.byref(self.loop)):
+            raise native.middleware_error()
 
-        self._run_steady(now, next_stamp, lambda: self.stopping)
-        return stamp
+
+class SimulatedClock:
+    """``/clock`` as ``tick.c`` takes it, while it is entered.
+
+    Attributes:
+        struct: shared with ``tick.c``.
+
+    """
+
+    def __init__(self, node: Node) -> None:
+        self._messages = PolledSubscription(node, Clock, '/clock', raw=True, overridable=False)
+        context: Any = node.context.handle
+        with context:
+            self._set = rclpy_implementation.WaitSet(1, 0, 0, 0, 0, 0, context)
+        self._held: Any = self._messages.handle
+        self.struct = native.Simulated(
+            set=self._set.pointer, message=native.empty_message(),
+            **{name: native.address(function) for name, function in (
+                ('clear', 'rcl_wait_set_clear'), ('add', 'rcl_wait_set_add_subscription'),
+                ('wait', 'rcl_wait'), ('take', 'rcl_take_serialized_message'),
+                ('forget', 'rcutils_reset_error'))})
+
+    def __enter__(self) -> None:
+        self._held.__enter__()
+        self._set.__enter__()
+        self.struct.subscription = self._held.pointer
+
+    def __exit__(self, *_: object) -> None:
+        self._set.__exit__(None, None, None)
+        self._held.__exit__(None, None, None)

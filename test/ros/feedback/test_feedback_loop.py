@@ -14,10 +14,10 @@
 
 """The feedback behind its topics: messages that are wrong in mid-walk, as bytes, on a body."""
 
-import ctypes
 import importlib.util
 import math
 
+from c_ticks import CTicks
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_checks import FADE, GOOD, STALE
@@ -27,7 +27,6 @@ from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.ros.feedback import sensor_input
 from cpg_ros.ros.feedback.loop import FeedbackLoop
 from cpg_ros.ros.feedback.sensor_input import SensorInput
-from cpg_ros.ros.node import native
 from depth import in_depth
 from geometry_msgs.msg import WrenchStamped
 from go2 import DT, GO2, program
@@ -102,15 +101,10 @@ class Robot:
         self.loop = FeedbackLoop(self.pattern, geometry, inputs,
                                  lambda: (made.own_speed, 0.0, 0.0))
         self.loop.wanted = True
+        self.ticks = CTicks(self.pattern, self.loop, DT)
         self.late, self.lag = {topic: [] for topic in Wire.wires}, lag
-        self.frozen, self.wires = {}, dict(Wire.wires)
+        self.frozen = {}
         self.stamp = 0
-
-    def sense(self, dt, now):
-        self.loop.sense(dt, now)
-
-    def advance(self, dt):
-        self.pattern.advance(dt)
 
     def messages(self):
         body = self.body
@@ -147,9 +141,8 @@ class Robot:
             elif bad == 'delayed':
                 data = self.late[name][-1 - round(0.2 / DT)]
             wire.data = None if bad == 'dead' else data
-        self.sense(DT, 1e-9 * self.stamp)
-        self.advance(DT)
-        self.body.command(self.loop.targets(self.pattern.position)[GO2.places])
+        self.ticks.tick(self.stamp)
+        self.body.command(self.loop.target[GO2.places])
         self.body.step()
 
     def walk(self, topic='', how='', last=LAST):
@@ -261,74 +254,20 @@ def test_the_closed_loop_survives_the_push_that_fells_the_open_one(monkeypatch):
 @pytest.mark.parametrize('lag', [0, 10])
 def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatch, lag):
     robot, acted = Robot(monkeypatch, lag=lag), []
-    gains = robot.loop.feedback.gains = Gains(virtual_stiffness=True)
+    gains = Gains(virtual_stiffness=True)
+    robot.loop.set_gains(gains)
     for k in range(round(4.5 / DT)):
         if k == round(2.5 / DT):
             robot.body.push(np.array([0.0, 200.0, 0.0]), 0.1)
         robot.tick()
-        sent = robot.loop.targets(robot.pattern.position)
+        sent = robot.loop.target.copy()
         assert (sent >= GO2.column('lower')).all() and (sent <= GO2.column('upper')).all()
         acted.append((sent != robot.pattern.position).any())
-        assert robot.loop.kp_scale == 1.0
+        assert robot.loop.feedback.memory.kp_scale[0] == 1.0
     assert not robot.body.fallen
-    assert robot.loop.delay == pytest.approx(lag * DT, abs=DT)
+    assert robot.loop.inputs.joints.age == pytest.approx(lag * DT, abs=DT)
     assert not any(acted[:round(2.5 / DT)])
     assert 0.0 < sum(acted) * DT <= gains.stiffen_longest if lag == 0 else not any(acted)
-
-
-class InC(Robot):
-    """The same robot, whose ticks are those of ``tick.c``."""
-
-    def __init__(self, monkeypatch):
-        take = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_size_t, ctypes.POINTER(native.Serialized),
-                                ctypes.c_void_p, ctypes.c_void_p)(self.take)
-        forget = ctypes.CFUNCTYPE(None)(lambda: None)
-        self.kept = {'rcl_take_serialized_message': take, 'rcutils_reset_error': forget}
-        monkeypatch.setattr(native, 'address', lambda name: ctypes.cast(
-            self.kept[name], ctypes.c_void_p).value)
-        super().__init__(monkeypatch)
-        monkeypatch.undo()
-        machine = self.pattern.machine
-        self.native = native.Loop(advance=machine.advance, resume=machine.resume,
-                                  what=machine.what, period=round(1e9 * DT))
-        self.correction = self.loop.machine(machine)
-        self.native.correct = ctypes.addressof(self.correction)
-        for k, struct in enumerate(self.loop.inputs.structs):
-            struct.subscription, struct.depth = k + 1, 1
-        self.pythons = 0
-
-    def take(self, number, message, *_):
-        data = list(self.wires.values())[number - 1].newest()
-        if data is None:
-            return 401
-        self.kept[number] = data
-        message[0].buffer = ctypes.cast(ctypes.c_char_p(data), ctypes.c_void_p).value
-        message[0].length = len(data)
-        return 0
-
-    def sense(self, _, now):
-        self.loop.renew()
-        if not native.library().sense(ctypes.byref(self.correction)):
-            self.pythons += 1
-            self.loop.inputs.read()
-
-    def advance(self, _):
-        native.library().tick(ctypes.byref(self.native), self.stamp)
-
-
-@pytest.mark.parametrize(('topic', 'how'), [('imu', 'dead'), *in_depth(
-    *((topic, how) for topic in TOPICS for how in ('dead', 'frozen', 'nan', 'delayed')))])
-def test_ticks_outside_the_interpreter_correct_as_those_in_it_do(topic, how):
-    found = []
-    for kind in (Robot, InC):
-        with pytest.MonkeyPatch.context() as patch:
-            robot = kind(patch)
-            found.append((*robot.walk(topic, how), robot.named))
-    for one, other in zip(found[0][:3], found[1][:3], strict=True):
-        assert np.abs(one - other).max() < 1e-6
-    assert found[0][3] == found[1][3]
-    # Layouts of messages are learnt in Python.
-    assert robot.pythons == 1
 
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):
