@@ -29,7 +29,7 @@ from cpg_ros.dynamics.integration.c_text import part
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.mesh.collocation import solver
 from cpg_ros.networks import equations as generated
-from cpg_ros.networks.registry import find_network
+from cpg_ros.networks.registry import find_network, NETWORKS
 import numpy as np
 
 #: MOST_TRACKS: most gaits that fade into one another at once; a further one waits for a place.
@@ -127,7 +127,8 @@ def precompile(name: str) -> None:
     """
     network = find_network(name)
     core()
-    generated.equations_of(network).derive()
+    # A gait without a stored orbit is sought from an equilibrium, by higher derivatives.
+    generated.equations_of(network).derive(higher=network in NETWORKS.files)
     library_of(network)
     if not network.delay_parameter:
         solver()

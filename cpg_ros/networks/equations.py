@@ -151,9 +151,9 @@ class Equations:
     def _higher(self) -> ModuleType:
         return load(self.key, 'higher', lambda: _derivation().higher(self))
 
-    def derive(self) -> ModuleType:
-        """Return the code of the rates and their derivatives, written first if need be."""
-        return self._first
+    def derive(self, higher: bool) -> list[ModuleType]:
+        """Return the code of the rates and of first, or also higher, derivatives, as on disk."""
+        return [self._first, *([self._higher] if higher else [])]
 
     def rates(self, x: Sequence[Any], p: Sequence[Any]) -> list[Any]:
         """Return the rate of each variable.
