@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""From a recording to a gait: reading, recognising and fitting.
+"""From a recording to a gait: reading, recognition and fit.
 
 Imports ``motion`` and the rooms below it; knows nothing of ROS, except ``rosbag2_library``.
 """

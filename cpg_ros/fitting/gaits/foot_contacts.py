@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Stance and swing from the loads on the feet; walk and run by the flight.
+"""Stance and swing from the loads on the feet; walk and run from the flight.
 
 A stride is from touchdown to touchdown; duty is the fraction of it in stance. In a walk a foot is
 on the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal
-Locomotion). A runner's foot is foremost before it lands: contacts that are estimated from its
-motion begin too early, and what they show of flight is less than there is.
+Locomotion). A runner's foot is foremost before it lands: contacts estimated from its motion begin
+too early, and underestimate the flight.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -51,13 +51,13 @@ WALK, RUN = 0.1, 0.15
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FootContacts(ShortRepr):
-    """Which feet are on the ground.
+    """Contacts of the feet.
 
     Attributes:
         legs: their names.
-        times: s, rising, shape (n,).
-        down: whether each foot bears a load, bool, shape (n, legs).
-        by_motion: whether that is estimated from the motion of the feet.
+        times: s, ascending, shape (n,).
+        down: whether each foot is on the ground, bool, shape (n, legs).
+        by_motion: whether contacts are estimated from the motion of the feet.
 
     """
 
@@ -72,7 +72,7 @@ class FootContacts(ShortRepr):
 
     @property
     def source(self) -> str:
-        """What they are known by."""
+        """Source of the contacts."""
         return 'the motion of the feet' if self.by_motion else 'the loads on the feet'
 
     def _summary(self) -> str:
@@ -90,7 +90,7 @@ class FootContacts(ShortRepr):
 
     @property
     def gait(self) -> str | None:
-        """Walk or run, None where the flight is between theirs."""
+        """Walk or run, or None if the flight is between theirs."""
         if self.by_motion:
             both = float(self.down.all(axis=1).mean())
             return 'run' if self.flight >= WALK else 'walk' if both >= WALK else None
@@ -100,15 +100,15 @@ class FootContacts(ShortRepr):
               ) -> dict[str, float] | None:
         """Return by how much each leg touches down before the first, cycles.
 
-        A leg touches down where it begins to stand in most strides: a stumble in one of them, or
-        a foot that bounces, moves nothing.
+        Touchdown is where a leg begins to stand in most strides, so a stumble or a bouncing foot
+        has no effect.
 
         Args:
             phase: of the stride, cycles, at times, s.
             legs: names, in the order of the network.
 
         Returns:
-            None for too few strides, or if the strides do not agree on when a leg stands.
+            None for too few strides, or if the strides disagree.
 
         """
         cycles = phase(self.times)
@@ -146,7 +146,7 @@ FALLS, GRAVITY, NEVER, OFTEN, HARMONICS = 0.7, 9.81, 0.02, 0.1, 6
 
 
 def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
-    """Return the fraction of a stride in which a body falls freely: no foot is on the ground then.
+    """Return the fraction of a stride in which a body falls freely, without a foot on the ground.
 
     Args:
         phases: of the stride, cycles, shape (n,).
@@ -165,9 +165,9 @@ def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> f
 
 
 def _touchdown(stands: np.ndarray) -> float | None:
-    """Return where the longest stance begins, cycles, or None if the strides disagree too much.
+    """Return the begin of the longest stance, cycles, or None if the strides disagree too much.
 
-    Stands is the fraction of strides in which the leg stands at each phase, shape (POINTS,).
+    ``stands`` is the fraction of strides in which the leg stands at each phase, shape (POINTS,).
     """
     most = stands > 0.5
     if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
@@ -183,12 +183,12 @@ def _touchdown(stands: np.ndarray) -> float | None:
 
 def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end: float,
                   period: float) -> FootContacts | None:
-    """Find which feet are on the ground between two times.
+    """Find the feet's contacts between two times.
 
-    None for too few samples, or if it does not follow from their names whose feet they are.
+    Return None for too few samples, or if names do not tell to which legs the feet belong.
 
     Args:
-        loads: on the feet, which are called as the legs or as joints of them, such as FR_force.
+        loads: on the feet, named as the legs or their joints, such as FR_force.
         legs: names.
         begin: s.
         end: s.

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Assignment of joints to legs, guessed from the usual names.
+"""Assignment of joints to legs by common naming schemes.
 
-Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
-BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
-in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Hexapods:
-besides LM or ML and RM or MR, or middle or mid for front: LMCoxa, left_middle_femur. Three pairs
-or more may be counted from the head on: L1_coxa ... R3_tibia. Bipeds: left, right, LT, RT, L or R
-alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll: LLEG_HIP_R.
+Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR, BR),
+or the words left or right with front or fore, hind, rear or back, anywhere in the name and in any
+case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Hexapods: also LM or
+ML and RM or MR, or middle or mid for front: LMCoxa, left_middle_femur. Three pairs or more may be
+numbered from the head: L1_coxa ... R3_tibia. Bipeds: left, right, LT, RT, L or R alone: left_knee,
+L_hip, hip_rt, LHipPitch. An R after the side stands for roll: LLEG_HIP_R.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
@@ -59,7 +59,7 @@ _STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".j
 
 
 class LegsError(CpgError):
-    """No legs can be identified from the names; the message lists those there or missing."""
+    """No legs can be identified from the names; the message lists those found or missing."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,7 @@ class Legs:
     """Joints by leg.
 
     Attributes:
-        joints: leg -> its joints' names, in the order in which they were given; legs in the
-            order of the networks.
+        joints: leg -> names of its joints in the given order; legs in the order of the networks.
         explanation: how they were read, one line.
         unassigned: joints of no leg.
 
@@ -92,19 +91,19 @@ class Legs:
 
 
 def words_of(name: str) -> list[str]:
-    """Split a name into lower-case words: at signs, digits and capitals, and after a code."""
+    """Split a name into lower-case words, at signs, digits, capitals, and after a code."""
     words = [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
     side = next((k for k, word in enumerate(words) if word in SIDES), len(words))
     return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
 
 
 def _moved(words: Sequence[str]) -> Sequence[str]:
-    """Return the words of the part that a joint moves: torso_to_abduct does not move the torso."""
+    """Return the words of the part that a joint moves: not torso in torso_to_abduct."""
     return words[words.index('to') + 1:] if 'to' in words else words
 
 
 def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
-    """Return leg of four or six, leg of two ('' for none), and the words that name it."""
+    """Return the leg of four or six, the leg of two ('' for none), and the words that name it."""
     codes = {CODES[word] for word in words if word in CODES}
     sides = {SIDES[word] for word in words if word in SIDES}
     ends = {ENDS[word] for word in words if word in ENDS}
@@ -120,9 +119,9 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
 
 
 def place_of(joints: Sequence[str]) -> tuple[str, str]:
-    """Return side (l, r) and end (f, m, h) that names of a leg's joints state, '' for none.
+    """Return side (l, r) and end (f, m, h) in the names of a leg's joints, '' for none.
 
-    What only some names state, or names state differently, counts as none.
+    Both must be the same in all names.
     """
     read = [_read(words_of(name))[:2] for name in joints]
     sides, ends = {(four or two)[:1] for four, two in read}, {four[1:] for four, _ in read}
@@ -130,12 +129,12 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
 
 
 def no_leg(joints: Sequence[str], words: Collection[str]) -> bool:
-    """Return whether a limb's joints, but the last, have words of an arm, a head and so on."""
+    """Return whether a limb's joints, except the last, have words of an arm, a head and so on."""
     return any(not set(words).isdisjoint(_moved(words_of(name))) for name in joints[:-1] or joints)
 
 
 def role_of(name: str) -> str:
-    """Return a joint's name without its leg: equal for the same joint of each leg."""
+    """Return a joint's name without its leg, equal for the same joint of each leg."""
     counted, rest = _COUNTED.findall(name), _COUNTED.sub('', name)
     if len(counted) == 1 and any(sign.isalpha() for sign in rest):
         return ' '.join(words_of(rest))
@@ -145,13 +144,13 @@ def role_of(name: str) -> str:
 
 
 def legs_of(joints: Sequence[str]) -> Legs:
-    """Guess the legs of joints from their names.
+    """Identify the legs of joints from their names.
 
     Args:
         joints: names.
 
     Raises:
-        LegsError: no leg, or not all of two, four or six legs can be identified, or they are of
+        LegsError: no leg, or not all of two, four or six legs can be identified, or they belong to
             two robots.
 
     """
@@ -184,9 +183,9 @@ def legs_of(joints: Sequence[str]) -> Legs:
 
 
 def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the joints of legs that are counted, L1 R1 L2 ...; nothing if they are not.
+    """Return the joints of numbered legs, L1 R1 L2 ..., or nothing if they are not numbered.
 
-    Of joints that are counted each number is there once; of legs it has the same joints as others.
+    Each number of a joint occurs once; each number of a leg occurs with the same joints as others.
     """
     by_leg: dict[tuple[str, int], list[str]] = {}
     for name in joints:
@@ -204,7 +203,7 @@ def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def _refuse_two(joints: Sequence[str]) -> None:
-    """Refuse names that differ by what is before the leg's, and are the same otherwise."""
+    """Refuse names that differ only in what precedes the leg's name."""
     robots: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
     for name in joints:
         words = words_of(name)
@@ -226,7 +225,7 @@ def _refuse_two(joints: Sequence[str]) -> None:
 def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
     """Tell whether the front of right_hip_front is a direction, as beside right_knee.
 
-    It is where joints of no end have names that those of the only end do not have.
+    It is if joints without an end have names that those with an end lack.
     """
     ended = [name for name in joints if read[name][0] in there]
     plain = {role_of(name) for name in joints if read[name][1] and not read[name][0]

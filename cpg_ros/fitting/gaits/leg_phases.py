@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Phases between legs from their mean cycles, and the gait that they make.
+"""Phases between legs from their mean cycles, and the matching gait.
 
-A leg is ahead of another by the shift at which the same joints of both are most alike (circular
-cross-correlation of all of them). An angle may be counted in the opposite sense in another leg,
-as abduction is; the mean angles, or the sense that makes the waveforms more alike, decide.
-Legs with other joints, such as an animal's fore and hind ones, are compared by the first
-harmonic of the joint that moves most: half a cycle is then uncertain, as it is unknown which sense
-of an elbow corresponds to that of a knee. Insects' legs are compared by their feet (insect_legs).
+A leg leads another by the shift at which the same joints of both are most alike (circular
+cross-correlation of all of them). Another leg may have the opposite sign convention, as for
+abduction; the mean angles, or the sign that makes the waveforms more alike, decide. Legs with
+different joints, such as an animal's fore and hind ones, are compared by the first harmonic of the
+joint that moves most; half a cycle is then uncertain, as the sign of an elbow that corresponds to
+a knee's is unknown. Insects' legs are compared by their feet (insect_legs).
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,13 +45,13 @@ STRIDES = 3
 
 @dataclass(frozen=True)
 class PhaseScatter:
-    """Scatter and error of a leg's phase against the first leg.
+    """Scatter and error of a leg's phase relative to the first leg.
 
     Attributes:
         spread: standard deviation of single strides, cycles; nan if there are too few.
-        error: standard error of the mean, cycles; nan as well.
-        half_width: of its 95 % interval (Student), cycles; nan as well.
-        strides: how many were used.
+        error: standard error of the mean, cycles; nan likewise.
+        half_width: of its 95 % interval (Student), cycles; nan likewise.
+        strides: number of strides used.
 
     """
 
@@ -64,17 +64,17 @@ class PhaseScatter:
 def phase_scatter(phases: np.ndarray, x: np.ndarray, average: PhaseAverage,
                   legs: Mapping[str, Sequence[str]], names: Sequence[str]
                   ) -> dict[str, PhaseScatter]:
-    """Find how the phases of the legs against the first one scatter from stride to stride.
+    """Return how the phases of the legs relative to the first one scatter between strides.
 
     Args:
-        phases: of the samples, cycles, rising, shape (n,).
+        phases: of the samples, cycles, ascending, shape (n,).
         x: rad, nan where missing, shape (n, joints).
-        average: the mean cycles of these samples.
+        average: mean cycles of these samples.
         legs: leg -> its joints, the first leg first.
         names: of the joints, in the order of x.
 
     Returns:
-        Leg -> scatter; zeros for the first leg, the reference of all.
+        Leg -> scatter; zeros for the first leg.
 
     """
     theta = phases - average.zero
@@ -142,7 +142,7 @@ def _rotations(axis: str, angle: np.ndarray) -> np.ndarray:
 
 
 def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
-    """Return where a foot is, from the thorax, mm, shape (n, 3).
+    """Return the position of a foot relative to the thorax, mm, shape (n, 3).
 
     Args:
         angles: rad, of each joint in the order of JOINTS, shape (n,).
@@ -159,15 +159,15 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
 
 def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
                 ) -> dict[str, float] | None:
-    """Find by how much each foot is ahead of the first one on its way along the body.
+    """Return by how much each foot leads the first one in its motion along the body.
 
     Args:
         legs: leg -> its joints.
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
 
     Returns:
-        Leg -> phase in cycles, [0, 1), by the first harmonic; None if these are not six legs with
-        all the joints.
+        Leg -> phase in cycles, [0, 1), from the first harmonic; None if these are not six legs
+            with all joints.
 
     """
     roles = {leg: _roles(joints) for leg, joints in legs.items()}
@@ -203,11 +203,11 @@ class GaitMatch:
 
     Attributes:
         gait: None if no gait is near enough.
-        nearest: the nearest one.
-        distance: of that, in cycles: RMS over the legs after the best common shift.
-        margin: how much further the next distinct gait is, cycles.
-        alike: gaits that cannot be distinguished from the nearest, itself among them.
-        probability: that it is the nearest and no other, by the scatter of legs' phases.
+        nearest: nearest gait.
+        distance: from the nearest gait, cycles: RMS over the legs after the best common shift.
+        margin: additional distance of the next distinct gait, cycles.
+        alike: gaits that cannot be distinguished from the nearest, including it.
+        probability: that the nearest gait is right, given the scatter of legs' phases.
         notes: one line each.
 
     """
@@ -233,7 +233,7 @@ def _power(c: np.ndarray) -> float:
 
 
 def _sense(a: np.ndarray, b: np.ndarray) -> float:
-    """Return 1 if two joints count angles in the same sense, -1 if not, 0 if unknown."""
+    """Return 1 if two joints have the same sign convention, -1 if opposite ones, 0 if unknown."""
     levels, sizes = (a[0].real, b[0].real), np.sqrt([2.0 * _power(a), 2.0 * _power(b)])
     if all(abs(level) > SIGNED * size for level, size in zip(levels, sizes, strict=True)):
         return float(np.sign(levels[0] * levels[1]))
@@ -244,7 +244,7 @@ def _sense(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
-    """Pair joints of two legs: by what they are called but for the leg, or by number."""
+    """Pair joints of two legs by their names without the leg, or by number."""
     roles = {role_of(name): name for name in first}
     pairs = [(roles[role_of(name)], name) for name in other if role_of(name) in roles]
     bare = {''.join(sign for sign in role_of(name) if sign.isalpha() or sign == ' ').strip()
@@ -256,16 +256,16 @@ def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
 
 def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
                ) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Find by how much each leg is ahead of the first one.
+    """Return by how much each leg leads the first one.
 
     Args:
         legs: leg -> its joints, the first leg first.
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
 
     Returns:
-        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; legs whose
-        phase may be half a cycle off, as the sense of their angles is unknown; and joints
-        that count angles in the opposite sense of the first leg's.
+        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; legs whose phase
+            may be half a cycle off, as their sign convention is unknown; joints with the opposite
+            sign convention of the first leg's.
 
     """
     feet = foot_phases(legs, c)
@@ -305,9 +305,9 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 
 def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
            ) -> tuple[float, list[str], bool]:
-    """Return by how much the second of each pair is ahead of the first, all together.
+    """Return by how much the second of each pair leads the first, all together.
 
-    And the joints that count angles in the opposite sense, and whether any joint's sense is known.
+    Also return the joints with opposite sign conventions, and whether any convention is known.
     """
     power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
     least = TELLING**2 * max(power.values())
@@ -340,7 +340,7 @@ def _symmetry(network: type[Network], gait: str) -> Any:
 
 
 def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
-    """Tell whether the gait with all shifts turned round is another one of the network's."""
+    """Tell whether the gait with all shifts negated is another one of the network's."""
     turned = {name: -shift % 1 for name, shift in symmetry.shifts}
     others = [_symmetry(network, other) for other in network.gaits() if other != gait]
     # A gait of another group has other names of elements: compare the phases instead.
@@ -349,25 +349,26 @@ def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
 
 
 def _apart(phases: np.ndarray, target: np.ndarray, waves: np.ndarray) -> float:
-    """Return the distance of leg phases; between different waveforms any phase will do."""
+    """Return the distance of leg phases; between different waveforms any phase is allowed."""
     squares = [nearest_gait(phases[waves == wave], {'': target[waves == wave]})[1]**2
                * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
     return float(np.sqrt(sum(squares) / phases.size))
 
 
 def _odds(nearest: float, other: float, legs: int) -> float:
-    """Odds of a gait against the nearest one, from the distances of both."""
+    """Return the odds of a gait against the nearest one, from the distances of both."""
     return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / SCATTER**2))
 
 
 def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch:
     """Name the gait of leg phases.
 
-    Of several gaits within the tolerance the most symmetric is meant: every walk is a skip, too.
+    Among several gaits within the tolerance the most symmetric is taken, as every walk is a skip,
+    too.
 
     Args:
         phases: leg -> cycles, in the order of the network's legs.
-        network: whose gaits.
+        network: with the gaits.
 
     """
     own = np.array(list(phases.values()))
@@ -430,11 +431,11 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
 
 def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float | None
                 ) -> GaitMatch:
-    """Tell walk from run by flight, where the legs move alike in both.
+    """Distinguish walk and run by flight, for legs that move alike in both.
 
     Args:
         match: by the legs' phases.
-        contacts: of the feet, if they are known.
+        contacts: of the feet, if known.
         falling: fraction of the stride in which the body falls freely, if its height is known.
 
     """

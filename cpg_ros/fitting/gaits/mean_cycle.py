@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The mean cycle of a motion whose phase is known: a harmonic series fitted to all its samples."""
+"""Mean cycle of a motion with known phase: a harmonic series fitted to all its samples."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,10 +68,11 @@ def rows_of(phases: np.ndarray, harmonics: int) -> np.ndarray:
 
 
 def resolvable_harmonics(t: np.ndarray, period: float) -> int:
-    """Return how many harmonics the times determine once folded onto one cycle; 0 if none.
+    """Return the number of harmonics that the phases determine; 0 if none.
 
-    As many as a least-squares fit bears without magnifying noise: the smallest eigenvalue of
-    its normal matrix (1 for even sampling, 0 where harmonics are aliases) is kept from 0.
+    It is the largest number for which a least-squares fit does not magnify noise: the smallest
+    eigenvalue of its normal matrix (1 for even sampling, 0 where harmonics are aliases) stays away
+    from 0.
     """
     # Loaded where it is used, as is all of scipy here, for programs that fit nothing.
     from scipy.linalg import toeplitz
@@ -97,8 +98,8 @@ def evaluate_series(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
 def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return the least-squares weights (2 n + 1, channels) of rows for values (channels, m).
 
-    The normal matrix of exp(2 pi i n phase), n = -N..N, is Toeplitz. No BLAS here: on a busy
-    computer waiting for its threads takes longer than all of this.
+    The normal matrix of exp(2 pi i n phase), n = -N..N, is Toeplitz. It avoids BLAS, whose threads
+    take longer to wait for on a busy computer than all of this.
     """
     from scipy.linalg import solve_toeplitz, toeplitz
 
@@ -140,14 +141,14 @@ class PhaseAverage(ShortRepr):
     """Mean cycles.
 
     Attributes:
-        zero: the phase that is 0 in the following, cycles.
+        zero: phase that becomes 0, cycles.
         coefficients: c_n of ``x = Re(c_0 + 2 sum c_n exp(2 pi i n theta))`` for each joint, rad,
             complex, shape (n + 1, joints).
         spread: standard deviation of a cycle about the mean, rad, (joints, m).
         error: standard error of the mean, rad, (joints, m).
-        counts: samples used, (joints,).
-        spikes: samples left out, (joints,).
-        left: variance left about the mean over all variance, (joints,).
+        counts: number of samples used, (joints,).
+        spikes: number of samples dropped, (joints,).
+        left: variance about the mean over all variance, (joints,).
 
     """
 
@@ -165,7 +166,7 @@ class PhaseAverage(ShortRepr):
 
 
 def blocks(phases: np.ndarray) -> list[slice]:
-    """Cut a long recording into parts of many cycles each, so that none takes much memory."""
+    """Cut a long recording into parts of many cycles each, to limit memory."""
     count = min(-(-phases.size // BLOCK), int((phases[-1] - phases[0]) / CYCLES))
     edges = np.linspace(0, phases.size, max(count, 1) + 1).astype(int)
     return [slice(low, high) for low, high in pairwise(edges)]
@@ -174,7 +175,7 @@ def blocks(phases: np.ndarray) -> list[slice]:
 def mean_weights(x: np.ndarray, phases: np.ndarray, harmonics: int) -> np.ndarray:
     """Return the least-squares weights (2 n + 1, channels) of the series of x (channels, m).
 
-    Of a long recording the mean of those of its blocks.
+    For a long recording, return the mean over its blocks.
     """
     parts = blocks(phases)
     return np.mean([fit_series(x[:, part], rows_of(phases[part], harmonics))
@@ -187,10 +188,10 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
     """Average cycles.
 
     Args:
-        phases: of the samples in cycles, rising, shape (n,).
+        phases: of the samples in cycles, ascending, shape (n,).
         positions: shape (n, joints), nan where missing.
         theta: even points of a cycle for spread and error, shape (m,).
-        first: joints of which the one with the largest first harmonic gives phase 0.
+        first: joints, of which the one with the largest first harmonic gives phase 0.
 
     Raises:
         InputError: a joint has too few samples.

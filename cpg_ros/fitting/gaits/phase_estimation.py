@@ -14,10 +14,11 @@
 
 """Estimation of the stride phase over time for a steady motion of varying speed.
 
-Roughly from the first harmonic of all signals together: their complex amplitudes in a sliding
-window of one period have, in a steady gait, one direction, and how far they have turned along it
-is the phase. Then finely, with all harmonics: the phase is linear between knots, one a cycle, and
-fitted with the mean cycle in turn (Gauss-Newton). With few cycles it is linear throughout.
+A rough estimate comes from the first harmonic of all signals together: in a steady gait, their
+complex amplitudes in a sliding window of one period have one direction, and the rotation along it
+is the phase. The fine estimate uses all harmonics: the phase is linear between knots, one for each
+cycle, and is fitted alternately with the mean cycle (Gauss-Newton). With few cycles it is linear
+throughout.
 """
 
 from dataclasses import dataclass
@@ -67,11 +68,11 @@ STIFFNESS = 1e-3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PhaseEstimate(ShortRepr):
-    """The phase of a motion, linear between knots.
+    """Phase of a motion, linear between knots.
 
     Attributes:
-        knots: s, rising, shape (k,); the first and last are where the motion begins and ends.
-        phases: in cycles, shape (k,).
+        knots: s, ascending, shape (k,); the first and last are the ends of the motion.
+        phases: cycles, shape (k,).
         frequency: mean, Hz.
         frequency_error: its standard error, Hz.
 
@@ -103,12 +104,12 @@ class RoughPhase(ShortRepr):
 
 
 def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> RoughPhase:
-    """Follow the phase from a stretch onwards, both ways, as long as the motion stays alike.
+    """Follow the phase from a stretch in both directions, as long as the motion stays alike.
 
     Args:
-        times: rising, s, shape (n,).
+        times: ascending, s, shape (n,).
         positions: shape (n, joints), nan where missing.
-        seed: where the motion repeats.
+        seed: stretch in which the motion repeats.
 
     """
     step = seed.period / (BLOCKS * POINTS)
@@ -149,7 +150,7 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
 
 
 def _joined(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Mark the runs of steady places that hold one of those inside."""
+    """Mark the runs of steady positions that contain one of those inside."""
     number = np.cumsum(np.diff(steady, prepend=False))
     return np.isin(number, number[steady & inside])
 
@@ -158,7 +159,7 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     """Fit the phase to all harmonics of a stretch.
 
     Args:
-        times: rising, s, shape (n,).
+        times: ascending, s, shape (n,).
         positions: shape (n, joints), nan where missing.
         rough: the stretch.
 
@@ -198,15 +199,16 @@ def index_range(times: np.ndarray, begin: float, end: float) -> slice:
 def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     """Return the mean rate of the stretch and its standard error.
 
-    Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
-    between knots vary by 2 q/3 + 2 s and with their neighbours by q/6 - s: s is the variance of
-    the errors, q that of strides, as knots lie anywhere in these. A drift is set apart. The mean
-    of least variance gives all rates the same weight where they only wander, and is the slope of
-    a straight line where they do not.
+    Phases at the knots wander, as strides vary, and have errors. Rates between knots therefore
+    vary by 2 q/3 + 2 s and covary with their neighbours by q/6 - s, with the variances s of the
+    errors and q of strides, as knots lie anywhere in strides. A drift is treated separately. The
+    mean of least variance gives all rates the same weight if they only wander, and is the slope of
+    a straight line if they do not.
 
-    What is meant is the mean over this very stretch, strides that happened to be quick and all:
-    in error are the phases at the knots, the weights where they are not those of that mean, and
-    the phases at the ends, since a straight piece of phase does not follow a stride's own haste.
+    The result is the mean over this stretch, including strides that happened to be quick. Its
+    errors are those of the phases at the knots, of weights that differ from those of that mean,
+    and of the phases at the ends, where a straight piece of phase does not follow the stride's own
+    speed.
     """
     rates = np.diff(phases) / np.diff(knots)
     n = rates.size
@@ -250,7 +252,7 @@ def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
               ) -> tuple[np.ndarray, float]:
-    """Fit a constant rate with the mean cycle projected out; return phases and error."""
+    """Fit a constant rate with the mean cycle eliminated; return phases and error."""
     centred = grid - 0.5 * span
     for _ in range(2 * STEPS):
         at = np.interp(grid, [0.0, span], phases)
@@ -282,7 +284,7 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
 
 def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
             ) -> tuple[int, int]:
-    """Return first and last stride between knots of the longest run that are like the mean."""
+    """Return first and last stride of the longest run, between knots, that resembles the mean."""
     left, _ = _model(x, np.interp(grid, knots, phases))
     starts = np.searchsorted(grid, knots[:-1])
     counts = np.diff(np.append(starts, grid.size))
@@ -313,7 +315,7 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
 
 
 def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:
-    """Fit the phase at the knots and the mean cycle in turn."""
+    """Fit the phase at the knots and the mean cycle alternately."""
     interval = np.clip(np.searchsorted(knots, grid, side='right') - 1, 0, knots.size - 2)
     after = (grid - knots[interval]) / (knots[interval + 1] - knots[interval])
     before = 1.0 - after

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Plausibility checks of a recording's stride, legs and travel, and the confidence they leave."""
+"""Plausibility checks of a recording's stride, legs and travel, and the resulting confidence."""
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -124,10 +124,10 @@ def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
 
 
 def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIssue]:
-    """Return an issue if the hop of all legs may be a body that stands and sways.
+    """Return an issue if the hop of all legs may be the sway of a standing body.
 
     Args:
-        phases: leg -> its phase, cycles.
+        phases: leg -> phase, cycles.
         mean: cycles of the joints, rad, shape (joints, m).
 
     """
@@ -151,14 +151,14 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
                  ) -> list[QualityIssue]:
     """Return an issue if the legs' phases differ between parts of the stretch.
 
-    Animals' phases do so within one gait, too: parts that are all of the same gait are no issue.
+    Animals' phases vary within one gait, too; parts of the same gait are no issue.
 
     Args:
         phases: of the samples of a stretch, cycles, shape (n,).
         x: rad, nan where missing, shape (n, joints).
         legs: leg -> its joints.
         names: of the joints.
-        gait_of: returns the gait of phases, None if it is none.
+        gait_of: returns the gait of phases, or None.
 
     """
     parts = _by_parts(phases, x, legs, names)
@@ -208,7 +208,7 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
 
 
 def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[str]) -> list[str]:
-    """Return a line each on few cycles, a drift of the frequency, and samples left out."""
+    """Return a line each on few cycles, a drift of the frequency, and dropped samples."""
     notes = []
     if warp.cycles < SURE:
         notes.append(f'only {warp.cycles:.1f} cycles: errors are approximate, one value for each '
@@ -249,7 +249,7 @@ def _area(a: np.ndarray, b: np.ndarray) -> float:
 
 def _without_copies(legs: Sequence[Mapping[str, str]], c: Mapping[str, np.ndarray],
                     roles: Sequence[str]) -> list[str]:
-    """Return roles but those of joints that only copy another one: in a linkage, or twice."""
+    """Return roles without joints that only copy another one, in a linkage or by duplication."""
     kept: list[str] = []
     for role in roles:
         def copies(other: str, role: str = role) -> bool:
@@ -269,7 +269,7 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
            ) -> tuple[dict[str, float], set[str]]:
     """Return leg -> area of the loop of its two joints that move most, and these joints' names.
 
-    Only joints that all legs have are considered; both results are empty if fewer than two move.
+    Only joints of all legs are considered; both results are empty if fewer than two move.
     """
     roles = [{role_of(name): name for name in listed} for listed in legs.values()]
     power = {role: sum(float(np.sum(np.abs(c[own[role]][1:])**2)) for own in roles)
@@ -285,14 +285,14 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
                  girdles: Mapping[str, str], opposite: Collection[str], travel: float
                  ) -> list[QualityIssue]:
-    """Return an issue if the gait steps on the spot or turns on the spot.
+    """Return an issue if the gait steps or turns on the spot.
 
     Args:
         legs: leg -> its joints.
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
-        girdles: leg -> fore or hind, where the legs have these.
-        opposite: joints that count angles in the opposite sense of the first leg's.
-        travel: of the body in a stride, m; 0 if that is not known.
+        girdles: leg -> fore or hind, if the legs have them.
+        opposite: joints with the opposite sign convention of the first leg's.
+        travel: of the body in a stride, m; 0 if unknown.
 
     """
     loops, joints = _loops(legs, c)

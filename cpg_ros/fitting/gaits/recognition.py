@@ -40,12 +40,12 @@ CENTRES = np.linspace(-0.6, 0.6, 13)
 def best_shift(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the shift of the largest cross-correlation, cycles, and the correlation there.
 
-    Newton's method refines the best place of an even grid: no single harmonic or extreme decides.
+    Newton's method refines the maximum on an even grid.
 
     Args:
         terms: of the cross-correlation by order, complex, shape (..., n + 1): those of the first
-            signal times the conjugate ones of the second, the constant 0. The first is ahead by
-            the shift.
+            signal times the conjugate ones of the second, the constant 0. The first leads by the
+            shift.
 
     Returns:
         Two arrays of shape (...).
@@ -89,10 +89,10 @@ def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float
     """Return the difference of two waveforms: the smallest RMS over all shifts.
 
     Args:
-        a: a waveform on even points of a cycle, shape (m,).
+        a: waveform on even points of a cycle, shape (m,).
         b: another one.
-        plain: compare them as they are, over the RMS of the stronger one about its mean; by
-            default both are first given mean 0 and RMS 1, so that only shape counts.
+        plain: compare unscaled waveforms, over the RMS of the stronger one about its mean; by
+            default both are first given mean 0 and RMS 1.
 
     """
     sizes = a.std(), b.std()
@@ -107,9 +107,9 @@ def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float
 def steadiness(v: np.ndarray, w: np.ndarray) -> float:
     """Return the smallest angular speed, over the mean, of a closed curve about a centre.
 
-    The best of the centres tried; both variables are scaled to run from -1 to 1. At most 1; not
-    positive where the curve turns back somewhere or turns twice, so that the angle does not tell
-    the phase.
+    It is the best over several centres, with both variables scaled to -1 to 1. It is at most 1,
+    and not positive if the curve reverses or goes round twice, so that the angle does not
+    determine the phase.
 
     Args:
         v: a cell's first variable on even points of a cycle, shape (m,).
@@ -132,27 +132,25 @@ FEWEST = 8
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Recognition(ShortRepr):
-    """The gait that a rhythm shows, and its symmetry.
+    """The gait of a rhythm, and its symmetry.
 
-    Distances are the RMS violation of a symmetry over cells and cycle, in units of the
-    signals' RMS about their means: 0 where it holds, 1.4 where nothing does.
+    Distances are the RMS violation of a symmetry over cells and cycle, in units of the signals'
+    RMS about their means: 0 where it holds, 1.4 for unrelated signals.
 
     Attributes:
-        name: the gait, or None if no named one is within the tolerance.
-        nearest: the gait; if there is none, the one with the smallest distance, or one that
+        name: of the gait, or None if no named one is within the tolerance.
+        nearest: the gait or, if there is none, the one with the smallest distance, or one that
             includes its symmetry at a distance larger by no more than the tolerance.
         distance: of the nearest gait, the largest over the elements of its H.
-        margin: how much larger the distance of the second is; inf if there is none, negative
-            if it fits better with a smaller H.
-        second: the best of the named gaits whose symmetry is not part of the nearest one's, or
-            None if there is none.
-        phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
-            correlation; between different waveforms it is no more than that. Cells to which H
-            gives one waveform are compared with the first of them.
+        margin: additional distance of the second; inf if there is none, negative if it fits better
+            with a smaller H.
+        second: best of the named gaits whose symmetry is not part of the nearest one's, or None.
+        phases: of the cells relative to cell 1 in cycles, [0, 1), shape (cells,): the shift of
+            best correlation. Cells with one waveform under H are compared with the first of them.
         h: names of the elements of H, the largest consistent set within the tolerance.
         k: those among them with shift 0.
-        distances: element name -> (its best shift in cycles, its distance there). An element
-            below the tolerance that h lacks fits no homomorphism with the others.
+        distances: element name -> (best shift in cycles, distance). An element below the tolerance
+            that is not in h fits no homomorphism with the others.
 
     """
 
@@ -234,14 +232,13 @@ def recognise(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
               tolerance: float = 0.05) -> Recognition:
     """Find the symmetry of one cycle of a rhythm, and the named gait that has it.
 
-    Of several gaits within the tolerance, it is the one with the largest H, and among those the
-    one that fits best: every walk is also a skip, which has fewer symmetries.
+    Among several gaits within the tolerance, the one with the largest H is taken, and among those
+    the one that fits best: every walk is also a skip, which has fewer symmetries.
 
     Args:
-        signals: the first variable of each cell on even points of one cycle, shape (m, cells).
+        signals: first variable of each cell on even points of one cycle, shape (m, cells).
         group: of the network.
-        gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
-            two gaits.
+        gaits: name -> symmetry, of that group. A wave and its reverse count as two gaits.
         tolerance: largest distance of a symmetry that holds; see Recognition.
 
     Raises:
@@ -277,10 +274,10 @@ def recognise(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
 
 
 def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
-    """Return the phases of the cells against cell 1 in cycles, [0, 1).
+    """Return the phases of the cells relative to cell 1 in cycles, [0, 1).
 
-    Two waveforms may correlate equally well at several shifts, among which noise would choose
-    anew for each cell.
+    Two waveforms may correlate equally well at several shifts, between which noise would decide
+    for each cell.
     """
     first = [int(np.argmax(symmetry.waves == wave)) for wave in symmetry.waves]
     ahead = {cell: _best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in set(first)}

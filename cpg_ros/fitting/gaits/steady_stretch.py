@@ -14,11 +14,11 @@
 
 """Search for stretches of steady motion in a recording, and for their periods.
 
-Signals repeat with a lag L around a place if they differ there from themselves L later by much
-less than unrelated signals would: the square difference over the local variance (that of
-McLeod & Wyvill 2005, "A smarter way to find pitch", in windows of one lag). Lags of 12 to 23
-points are tried on grids that are each half as fine as the last one, so that all octaves cost
-little more than the first.
+Signals repeat with a lag L around a point if they differ from themselves L later by much less than
+unrelated signals would: the square difference over the local variance (McLeod & Wyvill 2005, "A
+smarter way to find pitch", in windows of one lag). Lags of 12 to 23 points are tried on grids that
+are each half as fine as the previous one, so that all octaves together cost little more than the
+first.
 """
 
 from dataclasses import dataclass
@@ -98,9 +98,9 @@ class Stretch:
 
     Attributes:
         begin, end: s.
-        period: the lag, s, to about 2 %.
+        period: lag, s, to about 2 %.
         difference: mean square difference after one lag over twice the variance.
-        size: RMS of the signals there about their means, rad.
+        size: RMS of the signals about their means, rad.
 
     """
 
@@ -122,10 +122,10 @@ class Stretch:
 
 def resample_evenly(times: np.ndarray, positions: np.ndarray, rate: float
                     ) -> tuple[np.ndarray, np.ndarray]:
-    """Put signals on an even grid, linearly, each over its own finite samples.
+    """Interpolate signals linearly on an even grid, each over its own finite samples.
 
     Args:
-        times: rising, s, shape (n,).
+        times: ascending, s, shape (n,).
         positions: shape (n, joints), nan where missing; no column all nan.
         rate: of the grid, Hz; lower if it had too many points.
 
@@ -203,9 +203,9 @@ def longest_run(mask: np.ndarray) -> tuple[int, int] | None:
 
 def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
               ) -> tuple[float, float] | None:
-    """Return the lag among the near ones with the least mean difference, and that difference.
+    """Return the lag among the near ones with the smallest mean difference, and that difference.
 
-    Between lags, by a parabola; None if a lag that is not near has less still.
+    A parabola interpolates between lags; None if a lag that is not near has a smaller one.
     """
     finite = np.isfinite(differences)
     means = np.where(finite, differences, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
@@ -252,7 +252,7 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
 
 
 def best_stretch(stretches: list[Stretch]) -> Stretch:
-    """Choose the stretch with most cycles of most motion, at its true period.
+    """Select the stretch with most cycles of most motion, at its true period.
 
     Half a period gives more cycles, which differ from one another: its multiple is then taken.
     """

@@ -14,8 +14,8 @@
 
 """The stride of a recording: its steady stretch, frequency, mean cycle, leg phases and gait.
 
-Found where the joints repeat themselves (steady), followed from there with its own phase, as no
-real stride is quite as long as the last (warp), and averaged over that phase (warped).
+A stretch is found where the joints repeat (steady), followed with a phase of its own, as strides
+vary in length (warp), and averaged over that phase (warped).
 """
 
 from collections.abc import Mapping, Sequence
@@ -132,14 +132,14 @@ def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
 
 def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarray, source: str,
                 notes: list[str]) -> tuple[list[str], dict[str, tuple[str, ...]], np.ndarray]:
-    """Leave out joints with hardly any angles; return names, legs, and which have enough.
+    """Drop joints with few angles; return names, legs, and which joints have enough.
 
     Args:
         names: of the joints.
         legs: leg -> its joints.
         x: angles, rad, nan where missing, shape (n, joints).
         source: of the recording, for messages.
-        notes: a line for each kind of data that is left out is added.
+        notes: extended by a line for each kind of dropped data.
 
     Raises:
         NoSteadyGait: a leg has no joint left.
@@ -412,7 +412,7 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
 
 
 def _hint(times: np.ndarray, x: np.ndarray, reach: np.ndarray) -> str:
-    """Return what may help where joints do not repeat themselves: another unit, more strides."""
+    """Return a remedy where joints do not repeat: another unit, or more strides."""
     if reach.max() > SWING:
         return ': if the angles are in degrees, declare it (--unit deg)'
     # Half a stride is at least as long as the slowest joint takes from its least to its largest.

@@ -14,10 +14,10 @@
 
 """Default starts of a fit: the best of many values that cover the ranges.
 
-A cost may have several minima: other parameters make much the same waveform of a free readout.
-Every candidate is judged by what its best readouts leave of the recording, which takes an orbit
-and a linear fit; the least costs on their grid are starts of the trust region, beside the
-network's own values.
+A cost may have several minima, as other parameters can produce similar waveforms with a free
+readout. Every candidate is judged by the residual of its best readouts, which takes an orbit and a
+linear fit; the smallest costs on the grid are starts of the trust region, beside the network's own
+values.
 """
 
 from contextlib import suppress
@@ -40,7 +40,7 @@ LEAST, MOST = 2, 3
 
 
 def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple[float, ...]:
-    """Return the coordinates of a free number that are tried besides its own."""
+    """Return the candidate coordinates of a free number besides its own."""
     if parameter.name == GAIT_DUTY:
         return DUTIES
     if k == problem.coordinates.delay:
@@ -52,14 +52,14 @@ def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple
 
 
 def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
-    """Return the network's own values and the least costs on a grid over the ranges.
+    """Return the network's own values and the smallest costs on a grid over the ranges.
 
     Args:
         problem: the fit.
         begin: the network's own values and a phase; without an orbit they are the only start.
 
     Returns:
-        Values, the least cost first, each of shape (values,).
+        Values, the smallest cost first, each of shape (values,).
 
     """
     try:
@@ -95,9 +95,10 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
 
 
 def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
-    """Return values near which the waveform may be the same upside down; None if none is known.
+    """Return values near which the waveform may be the same inverted; None if none is known.
 
-    A free readout makes the same motion of it: stance takes the part of swing.
+    With a free readout, an inverted waveform gives the same motion with stance and swing
+    exchanged.
     """
     fractions = [k for k, parameter in enumerate(problem.free) if parameter.name in SHARES]
     if not fractions:

@@ -14,9 +14,8 @@
 
 """Free numbers of a fit, the trust region, and its coordinates: delays over the critical one.
 
-Close to where a gait is born its shape is the same all along the Hopf set, which is curved. With
-the delay over its critical value for a coordinate that valley is straight, and the set's edge a
-bound.
+Near the onset of a gait its shape is the same all along the Hopf set, which is curved. With the
+delay over its critical value as a coordinate that valley is straight, and the onset a bound.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -39,7 +38,7 @@ APART, TINY = 0.03, 1e-3
 
 
 def distinct(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether values of the free numbers, shape (numbers,), are not about the same."""
+    """Return whether values of the free numbers, shape (numbers,), differ clearly."""
     return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
 
 
@@ -48,9 +47,9 @@ class Free:
     """A free number of a network in a gait.
 
     Attributes:
-        name: of a parameter, or of a group of them.
-        members: parameters that take its value: those that the gait's symmetry needs equal; none
-            if it is not the network's.
+        name: of a parameter, or of a group.
+        members: parameters with its value, which the gait's symmetry requires to be equal; none if
+            it does not belong to the network.
         low, high: bounds.
 
     """
@@ -72,11 +71,11 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
     Args:
         network: parameters.
         gait: one of its gaits.
-        names: of parameters, or of groups that the network sets together.
-        bounds: name -> lower and upper bound, where narrower than the range.
+        names: of parameters, or of groups of the network.
+        bounds: name -> lower and upper bound, if narrower than the range.
 
     Raises:
-        InputError: a name is unknown or given twice, or bounds cannot be used.
+        InputError: a name is unknown or repeated, or bounds cannot be used.
 
     """
     bounds = dict(bounds or {})
@@ -127,14 +126,14 @@ class Minimisation(ShortRepr):
     """Result of the minimisation from one start.
 
     Attributes:
-        start: values it started from.
-        values: where it ended.
-        cost: half the sum of squares there; infinite where the start had no orbit.
-        path: cost and values at the start and after every accepted step, shape
-            (iterations + 1, 1 + values).
-        evaluations: orbits that were solved for.
+        start: initial values.
+        values: final values.
+        cost: half the sum of squares there; infinite if the start had no orbit.
+        path: cost and values at the start and after every accepted step, shape (iterations + 1, 1
+            + values).
+        evaluations: number of orbits solved for.
         converged: whether a tolerance was met.
-        why: the reason where there was nothing to start from, or ''.
+        why: why the start has no orbit, or ''.
 
     """
 
@@ -153,7 +152,7 @@ class Minimisation(ShortRepr):
 
     @property
     def iterations(self) -> int:
-        """Accepted steps."""
+        """Number of accepted steps."""
         return max(0, len(self.path) - 1)
 
 
@@ -167,7 +166,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
         low: lower bounds, shape (n,).
         high: upper bounds.
         tolerance: relative change of values, and of the cost, at which to stop.
-        most: evaluations at most.
+        most: largest number of evaluations.
 
     """
     start = np.asarray(start, dtype=float)
@@ -203,14 +202,14 @@ ABOVE = 1e-7
 
 
 class Coordinates:
-    """Free numbers of a fit, and the coordinates that the trust region moves.
+    """Free numbers of a fit, and the coordinates in which the trust region moves.
 
-    The phase, which comes last, and all numbers but a free delay are their own coordinates. A
-    delay with bounds of its own is, too.
+    The phase, which comes last, and all numbers except a free delay are their own coordinates, and
+    so is a delay with bounds of its own.
 
     Attributes:
         free: the free numbers.
-        delay: index of the one that is measured by its critical value, -1 for none.
+        delay: index of the number measured in units of its critical value, -1 for none.
 
     """
 
@@ -236,7 +235,7 @@ class Coordinates:
         return point
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        """Coordinates of values; NoOrbit where the gait is born at no delay."""
+        """Return coordinates of values; NoOrbit where the gait exists at no delay."""
         coordinates = np.array(values, dtype=float)
         if not self.straight:
             coordinates[self.delay] /= self._onset(coordinates).value
@@ -265,7 +264,7 @@ class Coordinates:
         return matrix
 
     def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Move values by a step along straight lines of the coordinates, within the bounds."""
+        """Move values by a step in the coordinates, within the bounds."""
         if self.straight:
             low, high = self.bounds(values)
             return np.clip(values + step, low, high)
@@ -288,13 +287,13 @@ class Coordinates:
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100
                 ) -> Minimisation:
-        """Minimise from values that have an orbit; as trust_region.minimise, but in coordinates.
+        """Minimise from values with an orbit; as trust_region.minimise, but in coordinates.
 
         Args:
             evaluate: the problem, in values.
             start: values.
             tolerance: relative change of coordinates, and of the cost, at which to stop.
-            most: evaluations at most.
+            most: largest number of evaluations.
 
         """
         def moved(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

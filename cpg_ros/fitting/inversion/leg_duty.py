@@ -14,9 +14,9 @@
 
 """Duty factors in a fit: the generator's retiming of the legs, and its derivatives.
 
-The generator reads joints at the phase that the gait's duty makes of the cell's (motion.duty).
-That phase depends on the duty, and on when the cell's own signal peaks and is lowest, which the
-network's parameters move.
+The generator reads joints at a phase that the gait's duty factor maps from the cell's
+(motion.duty). The map depends on the duty factor, and on the phases of the cell's maximum and
+minimum, which depend on the network's parameters.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,18 +38,17 @@ GRID, STEPS = 1024, 4
 
 @dataclass(frozen=True)
 class GaitReadout:
-    """The generator's readout of a gait, other than the weights of the joints.
+    """The generator's readout of a gait, without the weights of the joints.
 
     Attributes:
-        leading: cell -> the cell that gives its leg's phase, both from 1; other cells lead
+        leading: cell -> the cell that gives its leg's phase, both from 1; other cells map to
             themselves.
-        duty: fraction of the stride that legs stand; None for what the network's cells do.
-        stance: phase of the leading cell at which a leg begins to stand by itself, after the
-            cell's peak, and for which fraction of the stride, cycles; None if it stands while the
-            cell falls.
-        harmonics: of a Morris-Lecar cell's waveform that joints follow.
-        weights: joint -> its weights of x and y in the robot file; they say which half of a
-            stride is which, where the recording does not.
+        duty: fraction of the stride that legs stand; None for that of the network's cells.
+        stance: touchdown as a phase of the leading cell after its peak, and duty factor, of the
+            cells, cycles; None if a leg stands while the cell falls.
+        harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
+        weights: joint -> its weights of x and y in the robot file, which tell stance from swing if
+            the recording does not.
 
     """
 
@@ -74,7 +73,7 @@ class GaitReadout:
         return cls(leading, motion.duty, motion.stance, robot.harmonics, weights)
 
     def agreement(self, names: Sequence[str], weights: np.ndarray) -> float:
-        """Return how far weights are those of the robot file, -1 to 1; 0 without a file.
+        """Return the agreement of weights with the robot file's, -1 to 1; 0 without a file.
 
         Args:
             names: of joints.
@@ -104,12 +103,12 @@ class OwnStance(NamedTuple):
 
 def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
                ) -> OwnStance:
-    """Return when a leg stands by itself, as motion.joint_readout.standing does.
+    """Return a leg's own stance, as motion.joint_readout.standing does.
 
     Args:
         seen: the gait's signals.
         wave: of the leading cell.
-        peaks_at_0: whether the cell peaks at phase 0 whatever the parameters.
+        peaks_at_0: whether the cell peaks at phase 0 for all parameters.
         stance: as of GaitReadout.
 
     """
@@ -125,7 +124,7 @@ def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, 
 
 
 def _extremum(terms: np.ndarray, slopes: np.ndarray, phase: float) -> tuple[float, np.ndarray]:
-    """Return the phase of an extremum near a place, cycles, and its derivatives."""
+    """Return the phase of an extremum near a phase, cycles, and its derivatives."""
     k = np.arange(terms.size)
     bend, waves = 0.0, np.ones_like(terms)
     for _ in range(STEPS):
@@ -141,11 +140,11 @@ def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
 
     Args:
         theta: phases of cells, cycles, any shape.
-        duty: fraction of the stride that the leg is to stand.
-        own: when it does by itself.
+        duty: fraction of the stride that the leg should stand.
+        own: its own stance.
         ahead: phases of the cells before those of their legs' leading cells, cycles, likewise.
-        members: how much each parameter moves with each free number, (parameters, numbers).
-        of_duty: how much the duty does, shape (numbers,).
+        members: derivatives of the parameters by the free numbers, (parameters, numbers).
+        of_duty: derivatives of the duty factor by the free numbers, shape (numbers,).
 
     Returns:
         Phases, their derivatives by the free numbers, (..., numbers), and by theta.

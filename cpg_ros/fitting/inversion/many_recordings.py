@@ -69,11 +69,11 @@ class Task:
     """A recording to invert.
 
     Attributes:
-        recording: where it is, for workers, too.
-        settings: as for all.
-        known: digest of the contents that were inverted before, or ''.
-        folder: that the fitted file will be in.
-        name: of the fitted file, without its ending.
+        recording: its path, also for workers.
+        settings: of all recordings.
+        known: digest of the contents at the last inversion, or ''.
+        folder: of the fitted file.
+        name: of the fitted file, without its suffix.
 
     """
 
@@ -85,7 +85,7 @@ class Task:
 
 
 def read(path: Path, settings: FitSettings) -> Recording:
-    """Read a recording of any format, by those of the options that it has."""
+    """Read a recording of any format, with those options that its format has."""
     kind, robot = format_of(path), settings.robot
     return read_recording(
         path, kind.name, progress=False,
@@ -191,10 +191,11 @@ class Folders:
 
     def __init__(self, folders: Sequence[Path], out: Path, settings: FitSettings,
                  progress: bool = True) -> None:
-        """Look for the recordings.
+        """Find the recordings.
 
         Raises:
-            InputError: a folder is not there or has no recordings, or out holds something else.
+            InputError: a folder does not exist or has no recordings, or out contains something
+                else.
             MissingLibraryError: pyarrow is missing.
 
         """
@@ -213,7 +214,7 @@ class Folders:
                        (self.results.folder / FITTED).absolute(), self.results.name(recording))
 
     def keep(self, outcome: JobOutcome[Task], shown: Path, tally: JobProgress) -> None:
-        """Store the outcome of a job, unless the recording was done before."""
+        """Store the result of a job, unless the recording was done before."""
         if outcome.error is None and 'reason' not in outcome.value:
             before = self.results.get(shown) or {'reason': ''}
             tally.add(failed=bool(before['reason']), kept=True)
@@ -255,12 +256,12 @@ class Folders:
               goes_on: Callable[[], bool] = lambda: True) -> Summary:
         """Invert the recordings in the folders, and new ones, until interrupted.
 
-        A recording is read once its files do not change between two looks.
+        A recording is read once its files stay unchanged between two checks.
 
         Args:
             executor: any.
-            say: takes a line for each recording that is taken.
-            goes_on: called before every look; False ends the watch.
+            say: takes a line for each recording.
+            goes_on: called before every check; False ends the watch.
 
         """
         seen: dict[Path, Any] = {}

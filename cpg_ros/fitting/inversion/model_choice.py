@@ -14,10 +14,10 @@
 
 """Choice of the network that explains a recording, by cross-validation on its strides.
 
-Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
-network that follows noise gains nothing by it. Networks whose errors a recording cannot
-distinguish, joint by joint, are ranked by how few numbers they take: readouts of order 3 make many
-a waveform of one that is nearly sinusoidal.
+Every other stride is fitted, and the fit is compared with the mean cycle of the others, so that a
+network gains nothing by following noise. Networks whose errors a recording cannot distinguish,
+joint by joint, are ranked by their number of parameters: readouts of order 3 make many waveforms
+from a nearly sinusoidal one.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,14 +50,16 @@ class NetworkComparison:
 
     Attributes:
         network: its name.
-        gait: that was fitted, '' if none was.
-        error: mean over the joints of RMS error over range on strides that were left out.
+        gait: fitted one, or ''.
+        error: mean over the joints of RMS error over range on strides that were not fitted.
         fitted: the same on those that were fitted.
-        parameters: numbers of the network that were fitted, or read off the legs' phases.
-        numbers: all numbers, those of the readouts included.
+        parameters: number of parameters of the network that were fitted, or read from the legs'
+            phases.
+        numbers: number of all fitted values, including the readouts'.
         why: why nothing was fitted, or ''.
         by_joint: error of each joint that moves.
-        alike: whether the recording cannot distinguish it from the network of the least error.
+        alike: whether the recording cannot distinguish it from the network with the smallest
+            error.
 
     """
 
@@ -75,15 +77,15 @@ class NetworkComparison:
 def compare_networks(recording: Recording, robot: Robot | None = None, order: int = 3,
                      done: Callable[[float], None] = lambda fraction: None
                      ) -> list[NetworkComparison]:
-    """Fit every network that has the recording's legs; the best on other strides come first.
+    """Fit every network that has the recording's legs; sort by the error on other strides.
 
-    Of several that the recording cannot distinguish, the one with the fewest numbers is first.
+    Among those that the recording cannot distinguish, the one with the fewest numbers is first.
 
     Args:
         recording: joints over time.
-        robot: whose networks, legs and cells are taken; all shipped ones by default.
+        robot: its networks, legs and cells are used; by default all shipped networks.
         order: of the readouts, 1 to 3.
-        done: called with the fraction of the work that is done, 0 to 1.
+        done: called with the finished fraction, 0 to 1.
 
     Raises:
         CpgError: there are no legs or no steady gait, or no network has such legs.

@@ -49,12 +49,12 @@ class CycleFit(ShortRepr):
     """A fit to a cycle.
 
     Attributes:
-        orbit: of the parameters found.
-        values: of the parameters fitted, shape (parameters,).
-        cost: the objective there, half the sum of squares.
+        orbit: at the fitted parameters.
+        values: of the fitted parameters, shape (parameters,).
+        cost: objective there, half the sum of squares.
         gradient: of the objective by the parameters, shape (parameters,).
         errors: fitted minus recorded, shape (samples, cells).
-        trial: how it went, iteration by iteration.
+        trial: the minimisation, iteration by iteration.
 
     """
 
@@ -87,15 +87,15 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
 
     Args:
         samples: of the cells, shape (samples, cells).
-        theta: when they were taken, in cycles from where cell 1 peaks, shape (samples,).
-        start: parameters to start from.
-        gait: that was recorded.
+        theta: times of the samples, cycles from cell 1's peak, shape (samples,).
+        start: initial parameters.
+        gait: recorded one.
         names: of the parameters to fit, each within its range; the others keep their values.
 
     Raises:
         ValueError: shapes do not fit.
-        InputError: a value is not finite, a name is unknown or given twice, there are fewer
-            values than parameters, or the start is out of a parameter's range.
+        InputError: a value is not finite, a name is unknown or repeated, there are fewer values
+            than parameters, or the start is out of a parameter's range.
         NoOrbit: the start has no such gait.
 
     """
@@ -147,8 +147,8 @@ class PaperFit(ShortRepr):
     """A fit from one start.
 
     Attributes:
-        start: values of the free parameters to begin with.
-        fit: what came of it.
+        start: initial values of the free parameters.
+        fit: result.
         joints: names, in the order of the cells.
 
     """
@@ -227,7 +227,7 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
 
 
 def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:
-    """Return the phase of an orbit, cycles, at which its cells come nearest to samples."""
+    """Return the phase of an orbit, cycles, at which its cells are nearest to samples."""
     def gap(shift: float) -> float:
         return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))
 

@@ -49,8 +49,8 @@ def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
 
     Args:
         result: the fit, as fit_recording returns it.
-        robot: which is kept but for the motion of this gait; joints that were not recorded move
-            as before. Without one, the joints are those recorded, and so are their limits.
+        robot: unchanged except for the motion of this gait; joints that were not recorded move as
+            before. Without one, the joints are those recorded, with their ranges as limits.
 
     Raises:
         InputError: a leg of the network has no recorded joint, or a joint would swing about an
@@ -93,7 +93,7 @@ def _scaled(motion: Motion, fraction: float) -> Motion:
 
 
 def _within_limits(robot: Robot, result: RecordingFit) -> bool:
-    """Return whether the fitted gait keeps to the limits; check_plan checks all else."""
+    """Return whether the fitted gait is within the limits; check_plan checks everything else."""
     fit = result.fit
     try:
         plan(robot, fit.gait, type(fit.network).presets()[fit.gait], fit.network,
@@ -106,7 +106,7 @@ def _within_limits(robot: Robot, result: RecordingFit) -> bool:
 
 
 def _networks(robot: Robot, fitted: str) -> tuple[str, ...]:
-    """Return the fitted network and those of the robot's that have the same legs and cells."""
+    """Return the fitted network and the robot's networks with the same legs and cells."""
     if fitted in robot.networks:
         return robot.networks
     cells = NETWORKS[fitted].legs[robot.assignment]
@@ -119,7 +119,7 @@ def fitted_motion(result: RecordingFit, robot: Robot | None) -> Motion:
 
     Args:
         result: the fit, as fit_recording returns it.
-        robot: whose limits the joints keep to, None for no limits.
+        robot: with the joints' limits, None for no limits.
 
     Raises:
         InputError: a joint would swing about an angle outside its limits.
@@ -144,7 +144,7 @@ def fitted_motion(result: RecordingFit, robot: Robot | None) -> Motion:
 
 
 def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | None:
-    """Return those rows of a table whose frequencies a gait of this one allows."""
+    """Return those rows of a table whose frequencies this gait allows."""
     if table is None:
         return None
     rows = [row for row in zip(table.speed, table.stride, table.frequency, table.turn,
@@ -169,8 +169,7 @@ def running_parameters(result: RecordingFit, robot: Robot | None = None) -> dict
 
     Args:
         result: the fit.
-        robot: whose joints the generator moves, and whose cells were fitted; without one, the
-            readouts are left out.
+        robot: of the generator, whose cells were fitted; without one, the readouts are left out.
 
     """
     fit, network = result.fit, result.fit.network
@@ -205,7 +204,7 @@ def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
     Args:
         tree: as of parameter_tree.
         robot: the robot file.
-        who: whose plan it is, in the error.
+        who: owner of the plan, for the error.
 
     Raises:
         InputError: the generator would refuse it.
@@ -225,20 +224,20 @@ def write_fitted(path: str | Path, result: RecordingFit, robot: Robot | None = N
                  named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 
-    Files that the generator would reject are not kept.
+    Files that the generator would reject are removed.
 
     Args:
         path: of the parameter file; frequencies in it are in Hz, angles in rad.
         result: the fit, as fit_recording returns it.
         robot: as of fitted_robot.
-        named: where the robot file will be moved to; it stays beside by default.
+        named: later path of the robot file; by default it stays.
 
     Returns:
         The files written.
 
     Raises:
         InputError: a joint would exceed the robot's limits.
-        CpgError: as in fitted_robot.
+        CpgError: as of fitted_robot.
         OSError: a file cannot be written.
 
     """

@@ -40,11 +40,11 @@ BLOCK = 1 << 20
 def found(folders: Sequence[Path]) -> Iterator[Path]:
     """Yield the recordings in folders, each of which may be one, sorted, each once.
 
-    A folder that a format takes for one recording is one; other files of known endings are
-    recordings by themselves.
+    A folder that a format recognises as one recording is one; otherwise each file with a known
+    suffix is a recording.
 
     Raises:
-        InputError: a folder is not there.
+        InputError: a folder does not exist.
 
     """
     seen: set[Path] = set()
@@ -131,16 +131,16 @@ class Results:
 
     Attributes:
         folder: of all.
-        settings: digest of how recordings are fitted: rows of others are done again.
+        settings: digest of the fit's settings; rows with others are done again.
 
     """
 
     def __init__(self, folder: Path, settings: str) -> None:
-        """Make the folder, or resume in it.
+        """Create the folder, or resume in it.
 
         Raises:
-            InputError: it holds something else.
-            OSError: it cannot be made.
+            InputError: it contains something else.
+            OSError: it cannot be created.
 
         """
         self.folder, self.settings = folder, settings
@@ -252,7 +252,7 @@ def _row(row: dict[str, Any]) -> str:
 
 
 def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: int) -> None:
-    """Write the page, row by row, beside and rename it.
+    """Write the page row by row under a temporary name, and rename it.
 
     Raises:
         OSError: it cannot be written.
@@ -331,11 +331,11 @@ def _batches(rows: Iterable[dict[str, Any]], columns: list[str]
 
 
 def write_tables(folder: Path, rows: Rows) -> list[Path]:
-    """Write both tables beside and rename them; return their paths.
+    """Write both tables under temporary names, and rename them; return their paths.
 
     Args:
-        folder: for them.
-        rows: begins with the first row anew whenever it is called.
+        folder: of the tables.
+        rows: returns a new iterator over the rows on each call.
 
     Raises:
         OSError: they cannot be written.

@@ -55,18 +55,18 @@ SKEWED, BENT, CLEARER = 0.4, 1.0, 0.3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LegStrides(ShortRepr):
-    """The strides of a leg.
+    """Strides of a leg.
 
     Attributes:
         leg: its name.
-        joint: whose extremes are taken.
-        begins: s, when its strides begin: the joint is foremost or, where nothing tells the sense,
-            at its largest angle, or the foot touches down; shape (n,).
+        joint: joint whose extremes are used.
+        begins: s, begin of its strides: the joint is foremost or, if its direction is unknown, at
+            its largest angle, or the foot touches down; shape (n,).
         periods: s, shape (n,).
-        retractions: s, from foremost to hindmost, or in stance, shape (n,); nan if nothing tells
-            the sense.
+        retractions: s, from foremost to hindmost, or in stance, shape (n,); nan if the direction
+            is unknown.
         range: of the joint in the mean cycle, rad.
-        why: why retraction and protraction cannot be told apart, or ''.
+        why: why retraction and protraction cannot be distinguished, or ''.
         by_contacts: whether the strides are those of the foot's contacts, not of the joint.
 
     """
@@ -137,7 +137,7 @@ def _words(name: str) -> set[str]:
 
 
 def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, float, str]:
-    """Return the joint whose extremes count, the sense in which it is protracted, and why not."""
+    """Return the joint to use, its direction of protraction, and why that is unknown."""
     def most(listed: Sequence[str]) -> str:
         return max(listed, key=lambda name: float(np.abs(c[name][1])))
 
@@ -181,11 +181,11 @@ def _extremes(times: np.ndarray, phases: np.ndarray, x: np.ndarray, c: np.ndarra
 
 
 def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
-    """Return where two half parabolas that meet in their summit fit best, None if nowhere.
+    """Return where two half parabolas that meet at their vertex fit best, or None.
 
-    The strokes on either side of an extreme last differently long, so its sides are differently
-    steep: a summit that is the same on both sides, and a mean of strides that differ, too, lie off
-    towards the slower stroke.
+    The strokes on either side of an extreme have different durations, so its sides have different
+    slopes: a vertex of a symmetric fit, and a mean of unequal strides, are biased towards the
+    slower stroke.
     """
     tried = expected + np.linspace(-SEARCHED, SEARCHED, TRIED)
     misfits = np.full(TRIED, np.inf)
@@ -247,7 +247,7 @@ def _names(legs: list[LegStrides]) -> list[str]:
 
 
 def every_stride(legs: list[LegStrides]) -> Rows:
-    """Return rows of the strides, leg by leg, with a head; empty cells where nothing tells."""
+    """Return rows of the strides, leg by leg, with a head; empty cells where unknown."""
     rows: Rows = [('leg', 'number', 'begin [s]', *_names(legs))]
     for leg in legs:
         for k, begin in enumerate(leg.begins):
@@ -333,11 +333,11 @@ def ranges(result: RecordingFit) -> Rows:
 
 def normalised(result: RecordingFit, legs: list[LegStrides]
                ) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Return the joints' mean cycles from the begin of their leg's stride on.
+    """Return the joints' mean cycles from the begin of their leg's stride.
 
     Returns:
-        Of each joint its leg, its name, and the angle and its standard deviation at the phases
-        of the mean cycle, deg, shape (m,).
+        For each joint its leg, its name, and the angle and its standard deviation at the phases of
+            the mean cycle, deg, shape (m,).
 
     """
     stride, curves = result.stride, []

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The library that reads bags: `rosbags`, or ROS's ``rosbag2_py`` where that is not installed.
+"""The library that reads bags: `rosbags`, or ROS's ``rosbag2_py`` if that is not installed.
 
 Ubuntu 24.04 has no apt package of `rosbags`; every ROS desktop has ``rosbag2_py``.
 """

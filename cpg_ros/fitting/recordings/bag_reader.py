@@ -15,7 +15,7 @@
 """Reader of rosbag2 bags: joint states, and foot loads on the clock of the joint states.
 
 Bags are sqlite3 or mcap, compressed or not, and are read without ROS. Foot loads are arrays
-without stamps, one number a leg, labelled with the legs' names; their times of reception place
+without stamps, one number for each leg, labelled with the legs' names; their receive times place
 them between the joint states.
 """
 
@@ -58,7 +58,7 @@ class LoadStream:
         self._clock: list[tuple[int, int]] = []
 
     def add(self, received: int, message: bytes) -> None:
-        """Take a serialised message, received at a time in ns."""
+        """Add a serialised message, received at a time in ns."""
         self._received.append(received)
         self._messages.append(bytes(message))
 
@@ -69,10 +69,10 @@ class LoadStream:
             self._clock.append((received, 1_000_000_000 * seconds + rest))
 
     def loads(self, start: float) -> FootLoads | None:
-        """Return the loads, None if nothing was delivered.
+        """Return the loads, or None if nothing was delivered.
 
         Args:
-            start: the recording's, s on the clock that it uses.
+            start: of the recording, s on its clock.
 
         Raises:
             RecordingError: a message is malformed, or has no label that names the legs.
@@ -140,24 +140,25 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
              ) -> Recording:
     """Read the joint states of a bag.
 
-    See `recorded` for joints that are on several topics, and for stamps. Loads on the feet are
-    read if one topic of the bag has them (see `LoadStream`).
+    See `recorded` for joints on several topics, and for stamps. Loads on the feet are read if
+    exactly one topic of the bag has them (see `LoadStream`).
 
-    A recorder that died leaves mcap files without an end and no metadata.yaml. The complete part
-    of such files is read, and a note reports it. A truncated sqlite3 file is an error.
+    A recorder that crashed leaves mcap files without an end and no metadata.yaml. The complete
+    part of such files is read, and a note reports it. A truncated sqlite3 file is an error.
 
     Args:
-        path: the bag's folder, or one of its storage files (.mcap, .db3, or packed: .mcap.zstd).
-        topics: which to read, by their names or namespaces; if empty, all topics of type
-            sensor_msgs/msg/JointState, or else the fastest of Unitree's LowState.
-        joints: which joints to take, in this order; all of them, if empty.
+        path: folder of the bag, or one of its storage files (.mcap, .db3, or compressed:
+            .mcap.zstd).
+        topics: names or namespaces; if empty, all topics of type sensor_msgs/msg/JointState, or
+            else the fastest of Unitree's LowState.
+        joints: names, in the order to return; all if empty.
         progress: show a progress bar.
-        some: joints that are not there are passed over, unless none is.
-        servo: of the joints, if the angles that they were driven to are wanted.
+        some: skip joints that are missing, unless all are.
+        servo: of the joints, to return their commanded angles.
 
     Raises:
-        RecordingError: see `recorded`; a bag that cannot be read, a topic that is not there or of
-            another type.
+        RecordingError: see `recorded`; the bag cannot be read, or a topic is missing or of another
+            type.
 
     """
     path = Path(path)

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The storage of rosbag2 bags: unfinished mcap files, topics, and messages as bytes.
+"""Storage of rosbag2 bags: unfinished mcap files, topics, and messages as bytes.
 
-Whatever the library raises on a damaged bag ends here, as one line that names the file.
+All exceptions of the library on a damaged bag become one line that names the file.
 """
 
 from collections import Counter
@@ -42,7 +42,7 @@ FOOTER = b'\x02' + (20).to_bytes(8, 'little') + bytes(20) + MAGIC
 
 
 def whole_part(path: Path) -> int | None:
-    """Return how many bytes hold whole records, or None where nothing is cut off (or no mcap)."""
+    """Return how many bytes contain whole records, or None if nothing is cut off (or no mcap)."""
     with open(path, 'rb') as file:
         size = file.seek(0, io.SEEK_END)
         file.seek(0)
@@ -120,7 +120,7 @@ class Bag:
 
     def __init__(self, path: Path, readers: list[Reader], cut: bool, notes: list[str],
                  size: int) -> None:
-        """Take readers; size is that of all storage files, bytes."""
+        """Store readers and the size of all storage files, bytes."""
         self.size = size
         self.path, self.readers, self.notes = path, readers, notes
         self.connections = [connection for reader in readers for connection in reader.connections]
@@ -205,7 +205,7 @@ def opened(path: Path) -> Iterator[Bag]:
     """Open a bag.
 
     Raises:
-        RecordingError: it is not there or damaged.
+        RecordingError: it is missing or damaged.
 
     """
     packed = path.name.endswith(ENDINGS[2:4]) and path.is_file()
@@ -263,7 +263,7 @@ def _opened(path: Path) -> Iterator[Bag]:
 
 
 def _renamed(path: Path, files: list[Path]) -> str:
-    """Return the names in metadata.yaml of storage files that all have other names now, or ''."""
+    """Return the names in metadata.yaml of storage files that all have been renamed, or ''."""
     text = (path / METADATA).read_text(errors='replace')[:LARGEST_METADATA]
     part = re.search(r'^  relative_file_paths:\n((?: +- .*\n)+)', text, re.M)
     names = [] if part is None else [line.strip(' -"\'') for line in part[1].splitlines()]
@@ -298,10 +298,10 @@ def _files(path: Path) -> list[Path]:
 
 
 def files_of_bag(folder: Path) -> list[Path]:
-    """Return the files of a folder that is one bag, sorted, and none of any other folder.
+    """Return the files of a folder that is one bag, sorted; none for other folders.
 
-    One with metadata.yaml is a bag, and so is one whose storage files are parts of one recording:
-    name_0.mcap, name_1.mcap ...
+    A folder with metadata.yaml is a bag, and so is one whose storage files are parts of one
+    recording: name_0.mcap, name_1.mcap ...
 
     Raises:
         OSError: the folder cannot be listed.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bag written message by message, raw, that has its name only when it is whole."""
+"""Writer of bags, message by message; a bag gets its name when it is complete."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,7 +37,7 @@ class BagError(CpgError):
 
 
 class BagWriter:
-    """Writes a bag in MCAP beside its place, and moves it there at the end.
+    """Writer of an MCAP bag under a temporary name, renamed at the end.
 
     Attributes:
         path: of the bag, a folder.
@@ -50,10 +50,10 @@ class BagWriter:
 
         Args:
             path: of the bag, a folder.
-            packed: whether MCAP's chunks are packed by zstd, which takes time.
+            packed: compress MCAP's chunks by zstd, which takes time.
 
         Raises:
-            BagError: something is there already, or the folder cannot be written to.
+            BagError: the name is taken, or the folder cannot be written to.
 
         """
         if path.exists():
@@ -73,12 +73,13 @@ class BagWriter:
             raise BagError(f'{path}: {getattr(error, "strerror", None) or error}') from error
 
     def connect(self, topic: str, kind: str, fields: Callable[[str], str]) -> Connection:
-        """Return where messages of a topic go.
+        """Return the destination for messages of a topic.
 
         Args:
             topic: its name.
             kind: its type, such as sensor_msgs/msg/JointState.
-            fields: returns the text of a type's .msg file, where the library does not know it.
+            fields: returns the text of a type's .msg file, for types that the library does not
+                know.
 
         """
         if kind not in self._store.types:
@@ -86,10 +87,10 @@ class BagWriter:
         return self._writer.add_connection(topic, kind, typestore=self._store)
 
     def write(self, connection: Connection, when: int, message: bytes) -> None:
-        """Write a serialised message that came at a time, ns.
+        """Write a serialised message with its receive time, ns.
 
         Raises:
-            BagError: the disk is full, or the like.
+            BagError: a write failed, for example on a full disk.
 
         """
         try:
@@ -99,10 +100,10 @@ class BagWriter:
         self.size += len(message)
 
     def close(self) -> None:
-        """Finish the bag and give it its name; one without messages is dropped.
+        """Complete and rename the bag; drop one without messages.
 
         Raises:
-            BagError: the disk is full, or the like.
+            BagError: a write failed, for example on a full disk.
 
         """
         try:

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles out of BVH files: every rotation of a joint is one, with the channel in its name.
+"""Joint angles from BVH files: each rotation channel of a joint, with the channel in its name.
 
-The format is Biovision's: a tree of joints with their channels, then a row of numbers per frame,
-angles in degrees (Meredith & Maddock 2001).
+The format is Biovision's: a tree of joints with their channels, then a row of numbers for each
+frame, angles in degrees (Meredith & Maddock 2001).
 """
 
 from collections.abc import Iterator, Sequence
@@ -47,18 +47,18 @@ LONGEST, MOST = 200_000, 10_000
 def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True) -> Recording:
     """Read joint angles from a BVH file.
 
-    Every channel that rotates is a joint, called `LeftLeg_x` for the channel Xrotation of
-    LeftLeg; angles are Euler's as they stand in the file, without jumps by whole turns. Channels
-    that do not move are left out.
+    Every rotation channel is a joint, named `LeftLeg_x` for the channel Xrotation of LeftLeg;
+    angles are the file's Euler angles, without jumps by whole turns. Channels that do not move are
+    dropped.
 
     Args:
         path: the file.
-        joints: the joints to take, in this order, or patterns such as 'Left*_x'; all that move,
-            if empty.
+        joints: names in the order to return, or patterns such as 'Left*_x'; all that move if
+            empty.
         progress: not used; files of minutes are read in a second.
 
     Raises:
-        RecordingError: see `merged`; a file that is no such tree with rows.
+        RecordingError: see `merged`; the file is not a tree with rows.
 
     """
     path = Path(path)

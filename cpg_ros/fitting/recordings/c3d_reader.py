@@ -57,21 +57,21 @@ LARGEST, BLOCK = 1_000_000_000, 512
 
 def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Sequence[str] = (),
              progress: bool = True) -> Recording:
-    """Read the joint angles of a C3D file: those that are in it, or those between its markers.
+    """Read the joint angles of a C3D file, or those between its markers.
 
     A biomechanical model, such as Plug-in Gait, writes angles as points that the parameter
-    POINT:ANGLES lists. They are taken where no segments are given: of each its first component,
+    POINT:ANGLES lists. Without segments, these are read: the first component of each, which is
     flexion in Plug-in Gait, without jumps by whole turns.
 
     Args:
         path: the file.
-        segments: which markers span which segment; see `load_segments`.
-        joints: of these, in this order, or patterns such as '*Knee*'; all of them, if empty.
+        segments: markers of each segment; see `load_segments`.
+        joints: names in the order to return, or patterns such as '*Knee*'; all if empty.
         progress: not used.
 
     Raises:
-        RecordingError: see `c3d_markers` and `joint_recording`; an unknown unit of angles, or no
-            angle of a joint.
+        RecordingError: see `c3d_markers` and `joint_recording`; the unit of the angles is unknown,
+            or a joint has no angle.
 
     """
     markers, angles, unit, events = _contents(Path(path))
@@ -99,7 +99,7 @@ def _point(parameters: Any, first: int) -> dict[str, Any]:
 
 
 def c3d_arrays(path: str) -> dict[str, Any]:
-    """Return the parameters of points as JSON, points and residuals, as the library has them."""
+    """Return the parameters of points as JSON, points and residuals, from the library."""
     import ezc3d
     file: Any = ezc3d.c3d(path)
     first = int(file['header']['points']['first_frame'])
@@ -113,11 +113,11 @@ STRIKE, OFF = ('foot strike', 'heel strike', 'hs'), ('foot off', 'toe off', 'to'
 
 
 def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
-    """Return when the feet land and leave the ground by a file's events.
+    """Return touchdowns and lift-offs from a file's events.
 
     Args:
-        events: LABELS, CONTEXTS (Left, Right) and TIMES (s) of the parameters EVENT; a label
-            may have the side as its first letter, LHS.
+        events: LABELS, CONTEXTS (Left, Right) and TIMES (s) of the parameters EVENT; a label may
+            begin with the letter of the side, LHS.
 
     """
     found = []
@@ -133,7 +133,7 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
 
 
 def c3d_markers(path: str | Path) -> Markers:
-    """Read the points of a C3D file; one with a negative residual was not seen.
+    """Read the points of a C3D file; points with a negative residual are missing.
 
     Names are those of `marker_names`.
 
@@ -180,7 +180,7 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
 
 
 def _names(point: Mapping[str, Any], key: str) -> list[str]:
-    """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
+    """Return a list of points; from 256 points on it continues in LABELS2, and so on."""
     keys = sorted((parameter for parameter in point if parameter.startswith(key)),
                   key=lambda parameter: (len(parameter), parameter))
     return [str(name).strip() for parameter in keys for name in point[parameter]]

@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""JointState messages decoded in bulk, straight from their CDR bytes.
+"""JointState messages decoded in bulk from their CDR bytes.
 
-The messages of a publisher mostly share one layout: frame, names and lengths are the same bytes
-at the same places, and only the stamp and the numbers differ. Then the positions of many
-messages are one strided array. The library decodes the first message of a layout, which gives
-the places; every other message is compared with it in all bytes that make up the layout. Padding
-is not initialised and never compared. Messages of rare layouts are left to the library.
+The messages of a publisher mostly share one layout: frame, names and lengths are the same bytes at
+the same offsets, and only the stamp and the numbers differ. The positions of many messages then
+are one strided array. The library decodes the first message of a layout, which gives the offsets;
+every other message is compared with it in all bytes of the layout. Padding is not initialised and
+never compared. The library decodes messages of rare layouts.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -49,14 +49,14 @@ class UndecodableError(CpgError):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SerializedBlock(ShortRepr):
-    """Messages that have the same names.
+    """Messages with the same names.
 
     Attributes:
-        rows: their places in the batch, shape (n,), rising.
+        rows: indices in the batch, shape (n,), ascending.
         stamps: of the headers, ns, shape (n,), int64.
         names: of the joints, as in the messages.
         positions: shape (n, positions); a message may have more or fewer than names.
-        velocities, efforts: same shape, rad/s and N m; of width 0 where they were not requested.
+        velocities, efforts: same shape, rad/s and N m; of width 0 if not requested.
 
     """
 
@@ -72,8 +72,8 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
     """Decode a batch of serialised JointState messages.
 
     Args:
-        messages: as they were received.
-        efforts: whether to decode velocities and efforts, too.
+        messages: as received.
+        efforts: decode velocities and efforts, too.
 
     Raises:
         UndecodableError: a message is damaged or of another type.
@@ -108,9 +108,9 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
 
 
 def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
-    """Join blocks of equal names and widths, their messages in the order of the batch again.
+    """Join blocks of equal names and widths, and restore the order of the batch.
 
-    They can differ in byte order, or in the frame's name.
+    Such blocks can differ in byte order, or in the frame's name.
     """
     alike: dict[tuple, list[SerializedBlock]] = {}
     for block in blocks:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles out of CSV files: a time column and one column per joint."""
+"""Joint angles from CSV files: a time column and one column for each joint."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -106,7 +106,7 @@ def split(header: str) -> tuple[str, str | None]:
 
 
 def load_columns(headers: list[str]) -> list[Column]:
-    """Return the columns of loads on feet, or of whether they touch the ground: two or more."""
+    """Return the columns of foot loads or contacts, if there are two or more."""
     found = []
     for k, header in enumerate(headers):
         name, unit = split(header)
@@ -119,30 +119,29 @@ def load_columns(headers: list[str]) -> list[Column]:
 
 def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
              joints: Sequence[str] = (), progress: bool = True) -> Recording:
-    """Read joint angles from a CSV file (commas, semicolons or tabs; the first line the header).
+    """Read joint angles from a CSV file with a header line and commas, semicolons or tabs.
 
-    A unit in a header, as in `knee [deg]` or `time [ms]`, counts for its column; other columns
-    are in `unit` and `time`, or in rad and s. Columns in another unit are not joints. Where some
-    columns are called positions (`JointPosFR_hip`), only those are joints, named `FR_hip`.
-    Otherwise every column but the time is a joint.
+    A unit in a header, as in `knee [deg]` or `time [ms]`, holds for its column; other columns are
+    in `unit` and `time`, or in rad and s. Columns in another unit are not joints. If some columns
+    are called positions (`JointPosFR_hip`), only those are joints, named `FR_hip`. Otherwise every
+    column except the time is a joint.
 
-    The file may be packed by gzip or have OpenSim's preamble (.mot, .sto), a second header row of
-    units, decimal commas where commas do not part the columns, and delimiters at the ends of its
-    lines. A single time far ahead of both neighbours is left out. Instead of a time there
-    may be a column such as `Gait cycle [%]`; the duration of the stride is then to be given (see
-    `repeat_stride`).
+    The file may be compressed by gzip or have OpenSim's preamble (.mot, .sto), a second header row
+    of units, decimal commas where commas do not separate columns, and delimiters at the ends of
+    its lines. A single time far ahead of both neighbours is dropped. A column such as `Gait cycle
+    [%]` may replace the time; the duration of the stride must then be given (see `repeat_stride`).
 
     Args:
         path: the file.
-        unit: 'rad' or 'deg', of columns whose header names no unit.
-        time: 's', 'ms', 'us' or 'ns', of the time column if its header names no unit.
-        joints: the joints or columns to take, in this order, or patterns such as 'JointPos*';
-            all joints, if empty.
+        unit: 'rad' or 'deg', for columns whose header has no unit.
+        time: 's', 'ms', 'us' or 'ns', for a time column whose header has no unit.
+        joints: joints or columns in the order to return, or patterns such as 'JointPos*'; all
+            joints if empty.
         progress: show a progress bar.
 
     Raises:
-        RecordingError: see `merged`; a file that is no such table, time that goes back, or a
-            value that is no number; the message names line and column.
+        RecordingError: see `merged`; the file is no such table, a time goes back, or a value is no
+            number; the message names line and column.
 
     """
     path = Path(path)
@@ -222,7 +221,7 @@ class _Table:
             self.needed[self.rest] = 'nanoseconds'
 
     def _begin(self, headers: list[str]) -> list[str]:
-        """Look at the first line below the header; return the header as it is to be read."""
+        """Examine the first line below the header; return the header to use."""
         first = next(self.lines, '')
         cells = self._cells(first, self.line + 1) if first.strip() else []
         units = [UNITS.fullmatch(cell.strip()) for cell in cells]
@@ -263,12 +262,12 @@ class _Table:
         return ['sec', 'nanosec', '', *[''] * len(names), *names, *[''] * len(rest)]
 
     def _widened(self, headers: list[str], name: int, value: int) -> list[str]:
-        """Turn a table with a line for each value into one with a column for each joint.
+        """Convert a table with a line for each value into one with a column for each joint.
 
         Args:
             headers: of the columns.
-            name: the column of the joints' names.
-            value: that of their angles.
+            name: column of the joints' names.
+            value: column of their angles.
 
         Returns:
             The headers of the new table, whose lines replace those of the file.
@@ -339,7 +338,7 @@ class _Table:
 
     def _scale(self, header: str, unit: str | None, option: str | None,
                units: dict[str, float]) -> float:
-        """Return the size of a column's unit: its header's, the option's, or the first."""
+        """Return the size of a column's unit: from its header, the option, or the first unit."""
         if unit and option and units[unit.lower()] != units[option]:
             raise RecordingError(f'{self.path}: column {header!r} is in {unit}, not {option}')
         return units[(unit or option or next(iter(units))).lower()]
@@ -446,7 +445,7 @@ class _Table:
 
 
 def _lines_before_header(head: Sequence[str]) -> int:
-    """Return how many lines come before the one that has the time among its columns."""
+    """Return the number of lines before the one that has the time among its columns."""
     for k, line in enumerate(head):
         cells = [split(cell.strip())[0] for cell in line.lstrip('#').strip().split(
             max(DELIMITERS, key=line.count))]

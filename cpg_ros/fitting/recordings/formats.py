@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The formats of recordings that can be read, and the front door to all of them."""
+"""Formats of recordings, and the entry point to all of them."""
 
 from argparse import Namespace
 from collections.abc import Sequence
@@ -54,12 +54,12 @@ def reading_options() -> list[Option]:
 
 
 def format_of(path: Path) -> RecordingFormat:
-    """Return a recording's format, by the ending of its name or by what the folder holds.
+    """Return a recording's format, by the suffix of its name or by the contents of the folder.
 
-    Where several formats have the ending, the first that recognises the file is its format.
+    If several formats have the suffix, the first that recognises the file is taken.
 
     Raises:
-        RecordingError: it is a file of another ending.
+        RecordingError: a file with an unknown suffix.
         OSError: the folder cannot be listed.
 
     """
@@ -84,16 +84,16 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     Args:
         path: of the file, or of the folder of a bag.
         format_name: one of FORMATS; by default the path decides.
-        robot_joints: joints of a robot, of which those that are there are taken where ``joints``
-            names none and the format may hold others.
+        robot_joints: joints of a robot; those that exist are read if ``joints`` is empty and the
+            format may contain others.
         progress: show a progress bar.
-        cycle: duration of the stride, s, of which exactly one was recorded; 0 if the times tell
-            it, None for any other recording.
-        options: as of the format's reader, such as `read_bag` or `read_csv`; those that are None
-            or empty count as not given.
+        cycle: duration of the stride, s, of a recording of exactly one stride; 0 if the times
+            state it, None for any other recording.
+        options: of the format's reader, such as `read_bag` or `read_csv`; None and empty values
+            count as not given.
 
     Raises:
-        RecordingError: see `merged`; the recording cannot be read, or its format is not known.
+        RecordingError: see `merged`; the recording cannot be read, or its format is unknown.
         InputError: no such format, or an option that it does not have.
 
     """
@@ -150,7 +150,7 @@ def chosen_format(args: Namespace) -> str:
 
 
 def check_reading_options(args: Namespace) -> None:
-    """Refuse options that the chosen format's reader does not take.
+    """Refuse options that the given format's reader does not take.
 
     Raises:
         InputError: one was given.

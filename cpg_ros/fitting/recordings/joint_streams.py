@@ -76,11 +76,11 @@ class Servo:
 
     def command(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray
                 ) -> np.ndarray:
-        """Return the angles that joints were driven to, rad.
+        """Return the commanded angles of joints, rad.
 
         Args:
             position: rad.
-            velocity: rad/s, of the same shape; not looked at where kd is 0.
+            velocity: rad/s, of the same shape; ignored if kd is 0.
             effort: N m, of the same shape.
 
         """
@@ -100,9 +100,9 @@ class Stream:
 
     Args:
         topic: its name.
-        joints: that are wanted; all of them, if empty.
-        servo: of the joints, if their commands are wanted instead of what they did.
-        source: what to put before the topic's name in messages.
+        joints: wanted ones; all if empty.
+        servo: of the joints, to return commanded instead of measured angles.
+        source: prefix of the topic's name in messages.
         kind: type of the messages, JointState or Unitree's LowState.
 
     """
@@ -138,7 +138,7 @@ class Stream:
 
     @property
     def stamped_so_far(self) -> bool:
-        """Whether most messages at hand have a header stamp."""
+        """Whether most undecoded messages have a header stamp."""
         stamped = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
         return stamped > 0.5 * self._size
 
@@ -148,7 +148,7 @@ class Stream:
         return self.unstamped < self.count - self.mute - self.odd - self.slack
 
     def add(self, received: int, message: bytes) -> None:
-        """Take a serialised message, received at a time in ns; errors as of decode."""
+        """Add a serialised message, received at a time in ns; errors as of decode."""
         self.received.append(received)
         self.messages.append(message)
         self._bytes += len(message)
@@ -156,10 +156,10 @@ class Stream:
             self.decode()
 
     def decode(self) -> None:
-        """Decode the messages at hand.
+        """Decode the pending messages.
 
         Raises:
-            RecordingError: a message that is no JointState.
+            RecordingError: a message is no JointState.
 
         """
         received = np.array(self.received, np.int64)
@@ -206,7 +206,7 @@ class Stream:
                 self._thin()
 
     def _named(self, names: tuple[str, ...], count: int) -> tuple[str, ...]:
-        """Return the names of positions as they are asked for."""
+        """Return the names of positions in the requested form."""
         if count and not names:
             self.unnamed = True
             return self.order if len(self.order) == count else tuple(
@@ -223,7 +223,7 @@ class Stream:
         return tuple(name.removeprefix(prefix) for name in names)
 
     def _thin(self) -> None:
-        """Downsample the samples at hand, with both clocks side by side."""
+        """Downsample the pending samples, with both clocks."""
         if not self._thinned:
             self._by_headers = self.stamped_so_far
         for stamps, received, names, positions in self.parts:
@@ -239,7 +239,7 @@ class Stream:
         self.parts, self._size = [], LONG
 
     def notes(self, headers: bool) -> list[str]:
-        """Return a line for each kind of data that is left out."""
+        """Return a line for each kind of data that is dropped."""
         counts = ((self.mute, 'without positions'),
                   (self.odd, 'with more or fewer positions than names' + self.first_odd),
                   (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
@@ -275,7 +275,7 @@ class Stream:
 
 def _of_joints(joints: set[str], names: tuple[str, ...], positions: np.ndarray
                ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Keep the names and positions of the joints wanted, copied only where others are there."""
+    """Keep the names and positions of the wanted joints; copy only if there are others."""
     if joints.issuperset(names):
         return names, positions
     columns = [k for k, name in enumerate(names) if name in joints]
@@ -283,7 +283,7 @@ def _of_joints(joints: set[str], names: tuple[str, ...], positions: np.ndarray
 
 
 def _once_each(streams: list[Stream], joints: Sequence[str]) -> list[str]:
-    """Choose one topic for every joint that is on several; return a note for each."""
+    """Select one topic for every joint that is on several; return a note for each."""
     order = sorted(streams, key=lambda candidate: (
         -len(candidate.joints), candidate.topic.rsplit('/')[-1] != 'joint_states',
         -candidate.count))
@@ -325,20 +325,20 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
              notes: Sequence[str] = (), some: bool = False) -> Recording:
     """Merge the streams of several topics into one recording.
 
-    A joint on several topics is taken from one: from the topic with the most joints, and among
-    these the one called joint_states, the one with the most messages, the first. Samples are at
-    their header stamps; where all of a topic's are 0, all samples are at their receive times.
+    A joint on several topics is taken from the topic with the most joints; among equal ones, from
+    the one named joint_states, then the one with the most messages, then the first. Samples have
+    their header stamps; if all stamps of a topic are 0, all samples have their receive times.
 
     Args:
-        streams: decoded topics; their samples are forgotten.
-        joints: which to take, in this order; all of them, if empty.
-        source: what to put before the topics' names in messages.
-        notes: to begin with.
-        some: joints that are not there are passed over, unless none is.
+        streams: decoded topics; their samples are consumed.
+        joints: names in the order to return; all if empty.
+        source: prefix of the topics' names in messages.
+        notes: initial notes.
+        some: skip joints that are missing, unless all are.
 
     Raises:
-        RecordingError: see `merged`; no message with positions, or, where the joints' servo is
-            known, a joint without efforts, or with none but 0.
+        RecordingError: see `merged`; no message has positions, or, with a servo, a joint has no
+            efforts, or only 0.
 
     """
     there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
@@ -395,7 +395,7 @@ class LiveRecording:
         self._kept: dict[str, deque[tuple[int, bytes]]] = {topic: deque() for topic in topics}
 
     def add(self, topic: str, received: int, message: bytes) -> None:
-        """Keep a serialised JointState that came in at a time in ns; forget those too old."""
+        """Add a serialised JointState received at a time in ns; drop old ones."""
         samples = self._kept[topic]
         samples.append((received, message))
         if self.window > 0.0:
@@ -404,7 +404,7 @@ class LiveRecording:
                 samples.popleft()
 
     def copy(self) -> 'LiveRecording':
-        """Return the same messages, to be decoded while more come in."""
+        """Return a copy, to be decoded while more messages arrive."""
         other = LiveRecording(tuple(self._kept), self.window)
         for topic, samples in self._kept.items():
             other._kept[topic].extend(samples)
@@ -415,12 +415,12 @@ class LiveRecording:
         """Decode the kept messages.
 
         Args:
-            joints: which to take; all of them, if empty.
-            some: joints that are not there are passed over, unless none is.
-            servo: of the joints, if the angles that they were driven to are wanted.
+            joints: wanted ones; all if empty.
+            some: skip joints that are missing, unless all are.
+            servo: of the joints, to return their commanded angles.
 
         Raises:
-            RecordingError: nothing, or nothing that can be used, came in.
+            RecordingError: there is no message, or none can be used.
 
         """
         if not any(self._kept.values()):

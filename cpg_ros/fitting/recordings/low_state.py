@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Unitree's ``LowState``, many messages at once: of dogs (unitree_go), humanoids (unitree_hg).
+"""Unitree's ``LowState`` messages in bulk, of quadrupeds (unitree_go) and humanoids (unitree_hg).
 
-They have no stamps and no names. A dog's motors are FR, FL, RR, RL with hip, thigh and calf each,
-and so are its feet; a humanoid's are by default those of a G1.
+They have no stamps and no names. A quadruped's motors are FR, FL, RR, RL with hip, thigh and calf
+each, and its feet have the same order; a humanoid's are by default those of a G1.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +42,7 @@ _HEADER, _LITTLE_ENDIAN = 4, 1
 
 
 def _fields(size: int, motor: int, motors: int, offsets: Sequence[int]) -> np.dtype:
-    """Return the fields of a message of a size, of whose motors each takes ``motor`` bytes."""
+    """Return the fields of a message of a size, with ``motor`` bytes for each motor."""
     one = np.dtype({'names': ['q', 'dq', 'torque'], 'formats': ['<f4'] * 3,
                     'offsets': [0, 4, 12], 'itemsize': motor})
     # Of the last motor only these numbers: what follows it ends the message.
@@ -80,10 +80,10 @@ def decode_low_states(messages: Sequence[bytes], joints: Sequence[str], efforts:
     """Yield messages as joint states without stamps.
 
     Args:
-        messages: as they were received.
-        joints: of a robot in the order of its motors, which names them; Unitree's names if it
-            has any of these, or has more joints than there are motors, or of a dog fewer.
-        efforts: whether to return velocities and efforts, too.
+        messages: as received.
+        joints: names of a robot's joints in the order of its motors; Unitree's names if any of
+            these is among them, if there are more joints than motors or, for a quadruped, fewer.
+        efforts: return velocities and efforts, too.
         kind: type of the messages.
 
     """

@@ -14,9 +14,8 @@
 
 """Markers on a body over time, and the recording of the joint angles between them.
 
-A marker that was not seen, or hardly, makes the angles that need it missing; nothing is filled
-in. Angles are between a body's own segments: they do not depend on where the camera or the
-laboratory's axes stand.
+Angles that need a missing or unreliable marker are missing; nothing is interpolated. Angles are
+between a body's own segments: they do not depend on the camera's or the laboratory's axes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -53,7 +52,7 @@ LIKELY = 0.6
 
 @dataclass(frozen=True)
 class Segment:
-    """A line through a body, from one end to the other; each end is the mean of its markers."""
+    """A line through a body between two ends; each end is the mean of its markers."""
 
     begin: tuple[str, ...]
     end: tuple[str, ...]
@@ -66,13 +65,13 @@ class Segment:
 
 @dataclass(frozen=True)
 class JointAngle:
-    """The angle by which a segment is turned from another.
+    """Angle of a segment relative to another.
 
     Attributes:
-        between: names of the segment it is turned from, such as the thigh, and of the one that
-            is turned, such as the shank.
-        axis: name of the segment about which it turns, by the right hand, in three dimensions;
-            '' for the angle between the two, which has no sign.
+        between: names of the reference segment, such as the thigh, and of the rotated one, such as
+            the shank.
+        axis: name of the segment about which it rotates, right-handed, in three dimensions; '' for
+            the unsigned angle between the two.
         neutral: angle that counts as 0, rad.
 
     """
@@ -90,9 +89,9 @@ class Segments:
     Attributes:
         segments: name -> segment.
         joints: name -> angle.
-        least_likelihood: below it, a marker is not seen.
-        alternatives: marker -> other names for it, or for what may stand in its place.
-        body: markers whose mean is the place of the body.
+        least_likelihood: below it, a marker counts as missing.
+        alternatives: marker -> other names for it, or for substitutes.
+        body: markers whose mean is the position of the body.
         feet: leg -> markers of its foot, from the heel to the toe.
 
     """
@@ -105,7 +104,7 @@ class Segments:
     feet: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def named_as(self, there: Sequence[str]) -> 'Segments':
-        """Return the same with those alternatives for markers that are there."""
+        """Return the same segments with alternatives applied for markers that exist."""
         names = {name: next((marker for marker in others if marker in there), name)
                  for name, others in self.alternatives.items() if name not in there}
 
@@ -118,11 +117,11 @@ class Segments:
                        feet={leg: ends(names) for leg, names in self.feet.items()})
 
     def markers(self, joint: str, solid: bool) -> tuple[str, ...]:
-        """Return the markers that a joint's angle is made of, each once.
+        """Return the markers of a joint's angle, each once.
 
         Args:
             joint: its name.
-            solid: in three dimensions, where its axis' markers count, too.
+            solid: in three dimensions, where the axis' markers count, too.
 
         """
         segment = self.joints[joint]
@@ -132,7 +131,7 @@ class Segments:
 
 
 class _Reader(YamlReader):
-    """Reads the ends of segments, too."""
+    """Reader that knows the ends of segments."""
 
     def ends(self, value: Any, where: str) -> Segment:
         listed = self.items(value, where)
@@ -217,18 +216,18 @@ FARTHEST = 1e9
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Markers(ShortRepr):
-    """Places of markers.
+    """Positions of markers.
 
     Attributes:
         names: of the markers.
         stamps: ns, int64, shape (n,).
-        points: shape (n, markers, 2 or 3), in any unit, nan where not seen; of a picture x to the
+        points: shape (n, markers, 2 or 3), in any unit, nan where missing; in a picture x to the
             right and y up.
         source: the file.
-        likelihoods: that a marker is where it is said to be, 0 to 1, shape (n, markers), nan if
-            that is not known; None where all are certain.
-        notes: what was repaired or left out, one line each.
-        unit: of the points, m; nan if that is not known.
+        likelihoods: of the positions, 0 to 1, shape (n, markers), nan if unknown; None if all are
+            certain.
+        notes: what was repaired or dropped, one line each.
+        unit: of the points, m; nan if unknown.
 
     """
 
@@ -246,14 +245,14 @@ class Markers(ShortRepr):
 
 
 def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, ...], list[str]]:
-    """Return names of markers that are there once each, and notes.
+    """Return distinct names of markers, and notes.
 
-    The subject before a colon is left out, unless names are then there twice. Of equal labels the
+    The subject before a colon is dropped unless names are then ambiguous. Among equal labels, the
     one with most points keeps the name, and the others are numbered: 'LKNE#2'.
 
     Args:
         labels: as in the file.
-        points: shape (n, markers, 2 or 3), nan where not seen.
+        points: shape (n, markers, 2 or 3), nan where missing.
 
     """
     short = [label.rpartition(':')[2].strip() for label in labels]
@@ -276,18 +275,18 @@ def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, 
 
 
 def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None) -> np.ndarray:
-    """Return the angle by which a direction is turned from another.
+    """Return the angle of a direction relative to another.
 
     Args:
         first: direction, of any length, shape (n, 2 or 3).
         second: of the same shape.
-        axis: in three dimensions, the direction about which it turns, shape (n, 3); None for the
-            angle between the two.
+        axis: in three dimensions, the axis of rotation, shape (n, 3); None for the angle between
+            the two.
 
     Returns:
-        rad, shape (n,): from -pi to pi, positive counter-clockwise or, about the axis, by the
-        right hand; without an axis in three dimensions from 0 to pi. nan where a direction is
-        missing, or has none as seen along the axis.
+        rad, shape (n,): from -pi to pi, positive counter-clockwise or right-handed about the axis;
+            without an axis in three dimensions from 0 to pi. nan where a direction is missing, or
+            parallel to the axis.
 
     """
     with np.errstate(all='ignore'):
@@ -311,16 +310,17 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
                     joints: Sequence[str] = ()) -> Recording:
     """Return the joint angles between markers.
 
-    Joints whose markers are not in the file, or never seen together, are left out with a note,
-    unless they are asked for.
+    Joints whose markers are missing, or never present together, are dropped with a note, unless
+    they are requested.
 
     Args:
         markers: over time.
-        segments: which markers span what; the path of a file, or the name of a shipped one.
-        joints: names or patterns, in this order; all joints, if empty.
+        segments: markers of the segments; the path of a file, or a shipped name.
+        joints: names or patterns, in the order to return; all if empty.
 
     Raises:
-        RecordingError: see `merged` and `load_segments`; no segments, or no joint has an angle.
+        RecordingError: see `merged` and `load_segments`; there are no segments, or no joint has an
+            angle.
 
     """
     source = markers.source
@@ -362,16 +362,16 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
 
 def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: Sequence[str],
                segments: Segments, markers: Markers, points: np.ndarray) -> Recording:
-    """Return the recording of angles with the place of the body, and which foot stands when.
+    """Return the recording of angles with the position of the body and the feet's contacts.
 
     Args:
         source: the file.
         joints: their names.
         angles: rad, shape (n, joints).
-        notes: to begin with.
-        segments: body and feet, as their markers are called in the file.
+        notes: initial notes.
+        segments: body and feet, with their markers' names in the file.
         markers: of the file.
-        points: of the markers, nan where not seen, shape (n, markers, 2 or 3).
+        points: of the markers, nan where missing, shape (n, markers, 2 or 3).
 
     """
     there = set(markers.names)
@@ -451,7 +451,7 @@ def contacts(events: Sequence[Footfall], start: float, times: np.ndarray) -> Foo
         times: of the recording, s, shape (n,).
 
     Returns:
-        1 on the ground and 0 in the air; None unless all feet are in both where all are known.
+        1 on the ground and 0 in the air; None unless every foot has both.
 
     """
     known: dict[str, list[tuple[float, bool]]] = {}
@@ -477,7 +477,7 @@ def contacts(events: Sequence[Footfall], start: float, times: np.ndarray) -> Foo
 
 
 def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:
-    """Return the points, nan where they are not seen or hardly."""
+    """Return the points, nan where they are missing or unlikely."""
     points = markers.points.astype(float)
     points[~(np.abs(points) <= FARTHEST).all(axis=2)] = np.nan
     if markers.likelihoods is None:

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles or markers out of numpy's archives (.npz) of arrays with names."""
+"""Joint angles or markers from numpy archives (.npz) of named arrays."""
 
 from collections.abc import Mapping, Sequence
 import math
@@ -50,20 +50,19 @@ def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None 
              joints: Sequence[str] = (), progress: bool = True) -> Recording:
     """Read joint angles from an archive of arrays.
 
-    Either one array per joint, called like it, shape (n,); or `positions`, shape (n, joints),
-    and their names in `joints`. Besides, `time` (s), shape (n,), or `fps` (Hz), a number; and
-    `unit`, 'rad' or 'deg'. Arrays of objects are not read: they may run code.
+    It contains either one array for each joint, with its name, shape (n,); or `positions`, shape
+    (n, joints), and names in `joints`. In addition, `time` (s), shape (n,), or `fps` (Hz), a
+    number; and `unit`, 'rad' or 'deg'. Arrays of objects are not read, as they can run code.
 
     Args:
         path: the file.
-        unit: 'rad' or 'deg', where the archive does not say.
-        fps: samples a second, where the archive has neither times nor a rate.
-        joints: the joints to take, in this order, or patterns such as 'left*'; all of them, if
-            empty.
+        unit: 'rad' or 'deg', if the archive does not state it.
+        fps: samples per second, if the archive has neither times nor a rate.
+        joints: names in the order to return, or patterns such as 'left*'; all if empty.
         progress: not used.
 
     Raises:
-        RecordingError: see `merged`; an archive that is damaged or has no such arrays.
+        RecordingError: see `merged`; the archive is damaged or has no such arrays.
 
     """
     path = Path(path)

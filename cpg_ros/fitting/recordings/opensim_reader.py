@@ -14,8 +14,8 @@
 
 """Joint angles from OpenSim's motion and storage files (.mot, .sto), and markers from TRC files.
 
-Coordinates of a motion are read as joints. What is no angle is left out: translations, which no
-header tells apart but their names do, and of states the speeds and the muscles'.
+Coordinates of a motion are read as joints. Coordinates that are no angles are dropped:
+translations, which only their names distinguish, and in files of states speeds and muscles.
 """
 
 from collections.abc import Sequence
@@ -70,10 +70,10 @@ def read_trc(path: str | Path, segments: str | Path | None = None, joints: Seque
 def trc_markers(path: str | Path) -> Markers:
     """Read the markers of a TRC file.
 
-    A marker whose cells are empty, or all three 0, was not seen. Lengths stay in the file's unit.
+    A marker whose cells are empty, or all 0, is missing. Lengths stay in the file's unit.
 
     Raises:
-        RecordingError: a file that has no such header, or rows of another width.
+        RecordingError: the file has no such header, or rows of another width.
 
     """
     path = Path(path)

@@ -116,11 +116,11 @@ def read_pose(path: str | Path, segments: str | Path | None = None,
     """Read the joint angles between the markers of a file of poses.
 
     Args:
-        path: the CSV file, packed by gzip or not, or the HDF5 file.
-        segments: which markers span which segment; see `load_segments`.
-        fps: frames a second of the video, which no such file has.
-        individual: of several animals, the one to read.
-        joints: of these, in this order; all of them, if empty.
+        path: the CSV file, compressed by gzip or not, or the HDF5 file.
+        segments: markers of each segment; see `load_segments`.
+        fps: frames per second of the video, which no such file states.
+        individual: animal to read, if there are several.
+        joints: names in the order to return; all if empty.
         progress: not used.
 
     Raises:
@@ -187,7 +187,7 @@ def hdf5_arrays(path: str) -> dict[str, Any]:
 
 
 class _Names(pickle.Unpickler):
-    """Reads the names of columns, which pandas pickles, and nothing that runs code."""
+    """Unpickler of the names of columns, as pandas writes them, which runs no code."""
 
     def find_class(self, module: str, name: str) -> Any:
         raise RecordingError(f'{module}.{name} among the names of columns')
@@ -275,7 +275,7 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
 
 
 def _chosen(individual: str | None, there: Sequence[str], path: Path) -> str:
-    """Return which animal to read; where there are several, it has to be named."""
+    """Return the animal to read; it must be named if there are several."""
     if (individual is None and len(there) < 2) or individual in there:
         return individual if individual is not None else (*there, '')[0]
     lacking = '' if individual is None else f'no individual {individual!r}; '

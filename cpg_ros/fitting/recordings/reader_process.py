@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Libraries that read files, in a process that a damaged file may crash, fill or hold up.
+"""Libraries that read files, in a process that a damaged file may crash, fill or block.
 
-Run as a module with a function that reads a file into arrays, the file, and the file to write.
+It runs as a module with a function that reads a file into arrays, the file, and the file to write.
 """
 
 from collections.abc import Callable

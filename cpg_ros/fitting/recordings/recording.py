@@ -14,7 +14,7 @@
 
 """Recordings: joint angles and foot loads over time, their repair, single strides, and formats.
 
-Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
+Bags, tables and live topics deliver chunks of samples; `merged` makes one recording of them.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -42,8 +42,8 @@ class FootLoads(ShortRepr):
     """Loads on the feet over time.
 
     Attributes:
-        legs: their names, or those of columns that name them, such as FR_force.
-        times: s from the recording's start, rising, shape (n,).
+        legs: their names, or columns that name them, such as FR_force.
+        times: s from the recording's start, ascending, shape (n,).
         loads: in the robot's unit, such as N, or 1 for contact; shape (n, legs).
         by_motion: whether contacts are estimated from the motion of the feet.
 
@@ -83,20 +83,20 @@ class Recording(ShortRepr):
 
     Attributes:
         joints: their names.
-        times: s, shape (n,), strictly rising, the first is 0.
+        times: s, shape (n,), strictly ascending from 0.
         positions: rad, shape (n, joints); nan where a joint has no sample.
-        source: what to call it in messages, such as 'walk_bag, /joint_states'.
+        source: name in messages, such as 'walk_bag, /joint_states'.
         start: stamp at times = 0, s.
-        notes: what was repaired or left out, one line each.
-        loads: on the feet, where they were recorded, too.
-        cycle: duration of a stride, s, of which the recording is copies; nan where its times are
+        notes: what was repaired or dropped, one line each.
+        loads: on the feet, if recorded.
+        cycle: duration of a stride, s, if the recording is copies of one; nan if its times are
             fractions of one stride of unknown duration; 0 for all other recordings.
-        body: where the body was, m, the last axis upward, shape (n, 3), where that was recorded.
-        commanded: whether the positions are those that servos were driven to, not what they did.
+        body: position of the body, m, the last axis upward, shape (n, 3), if recorded.
+        commanded: whether the positions are commanded, not measured.
 
     Raises:
-        RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
-            do not belong together.
+        RecordingError: fewer than two samples, times that do not ascend from 0, or shapes that do
+            not fit.
 
     """
 
@@ -130,7 +130,7 @@ class Recording(ShortRepr):
         """Return the recording of these joints, in this order.
 
         Raises:
-            RecordingError: a joint is not there; the message names those that are.
+            RecordingError: a joint is missing; the message names those that exist.
 
         """
         require(names, self.joints, self.source)
@@ -141,7 +141,7 @@ class Recording(ShortRepr):
         """Return the recording between two times, s; its times begin at 0 again.
 
         Raises:
-            RecordingError: fewer than two samples are there.
+            RecordingError: there are fewer than two samples.
 
         """
         within = (self.times >= begin) & (self.times <= end)
@@ -157,7 +157,7 @@ class Recording(ShortRepr):
 
 
 def refuse_stand_in(path: Path, head: bytes) -> None:
-    """Reject files that only point to a recording, or are recordings of another system.
+    """Refuse pointers to a recording, and recordings of another system.
 
     Args:
         path: of the file.
@@ -176,7 +176,7 @@ def refuse_stand_in(path: Path, head: bytes) -> None:
 
 
 def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
-    """Check that joints are there, and that none is named twice.
+    """Check that joints exist, and that none is named twice.
 
     Raises:
         RecordingError: one is missing or named twice.
@@ -192,7 +192,7 @@ def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
 
 
 def abbreviate(names: Sequence[str], most: int = 6) -> str:
-    """Return names in quotes, the first ones where they are many."""
+    """Return names in quotes, only the first ones if they are many."""
     shown = ', '.join(repr(name) for name in names[:most])
     return shown + (f' and {len(names) - most} more' if len(names) > most else '')
 
@@ -203,15 +203,15 @@ def joint_list(joints: Sequence[str]) -> str:
 
 
 def matching(patterns: Sequence[str], names: Sequence[str], source: str) -> list[str]:
-    """Return the names that are asked for, each once, in the order in which they are.
+    """Return the requested names, each once, in the requested order.
 
     Args:
-        patterns: names, or patterns such as 'left*'; all names, if empty.
-        names: that are there.
-        source: what to call the file in messages.
+        patterns: names, or patterns such as 'left*'; all names if empty.
+        names: existing ones.
+        source: name of the file in messages.
 
     Raises:
-        RecordingError: nothing fits one of them.
+        RecordingError: a pattern matches nothing.
 
     """
     matches: list[str] = []
@@ -243,8 +243,8 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
         stamps: ns, int64, shape (n,).
         names: of the joints.
         angles: rad, shape (n, names).
-        notes: to begin with.
-        joints: names or patterns, in this order; all joints, if empty.
+        notes: initial notes.
+        joints: names or patterns, in the order to return; all if empty.
         body: as of Recording, at these stamps, nan where missing; None if unknown.
 
     Raises:
@@ -264,17 +264,17 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
 def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
     """Join samples, each of all joints or of some, into one recording.
 
-    Samples of different joints with the same stamp become one; a joint without a sample at a
-    stamp is nan there. Of samples of a joint with the same stamp the first is kept. Values that
-    are not finite count as missing. A long recording is put on a coarser grid (see `thinned`).
+    Samples of different joints with the same stamp become one; a joint without a sample at a stamp
+    is nan there. Among samples of a joint with the same stamp, the first is kept. Values that are
+    not finite count as missing. A long recording is downsampled (see `thinned`).
 
     Args:
         chunks: in the order of arrival, for each set of names; see `Chunk`.
-        source: what to call the recording in messages.
-        joints: which joints to take, in this order; all of them, if empty.
+        source: name of the recording in messages.
+        joints: names in the order to return; all if empty.
 
     Raises:
-        RecordingError: no sample, a joint that is not there or has no finite position, or no
+        RecordingError: there is no sample, a joint is missing or has no finite position, or no
             time passes.
 
     """
@@ -346,7 +346,7 @@ def _groups(chunks: Iterable[Chunk], source: str
 
 def _parts(groups: dict[tuple[str, ...], Thinned], wanted: tuple[str, ...]
            ) -> tuple[list[Part], list[str]]:
-    """Take the wanted joints' samples out of groups; return them, and notes on their thinning."""
+    """Take the wanted joints' samples out of groups; return them, and notes on downsampling."""
     parts, notes = [], []
     for group in list(groups):
         columns = [k for k, name in enumerate(group) if name in wanted]
@@ -360,10 +360,10 @@ def _parts(groups: dict[tuple[str, ...], Thinned], wanted: tuple[str, ...]
 
 
 def _in_order(parts: list[Part], origin: int) -> tuple[list[Part], int, int]:
-    """Sort samples by time, s from an origin in ns, of equal times the first only.
+    """Sort samples by time, s from an origin in ns; keep the first of equal times.
 
     Returns:
-        The samples, how many came late, and how many were duplicates.
+        The samples, and how many were late and how many were duplicates.
 
     """
     ordered, late, again = [], 0, 0
@@ -451,10 +451,10 @@ UNNAMED = re.compile(r'^(?:.*[./])?positions?\[(\d+)\]$')
 
 
 def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recording:
-    """Name positions that have none by the order of a robot file.
+    """Name unnamed positions by the order of a robot file.
 
     Raises:
-        RecordingError: there are more or fewer than the robot has joints.
+        RecordingError: their number is not that of the robot's joints.
 
     """
     if len(recording.joints) != len(robot_joints):
@@ -479,15 +479,15 @@ DURATIONS, SEAM_SPEED, ODD_SHARE = (0.1, 3.0), 0.3, 0.2
 
 
 def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
-    """Return copies of a recording of exactly one stride, one after the other.
+    """Return consecutive copies of a recording of exactly one stride.
 
     Args:
         recording: of one stride; its last sample may be the first one of the next stride.
-        duration: of the stride, s; 0 if the recording's times tell.
+        duration: of the stride, s; 0 to take it from the recording's times.
 
     Raises:
-        RecordingError: the duration is unknown or impossible, or a joint does not end where it
-            begins.
+        RecordingError: the duration is unknown or impossible, or a joint does not return to its
+            first angle.
 
     """
     length, step = float(recording.times[-1]), float(np.median(np.diff(recording.times)))
@@ -520,7 +520,7 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
 
 
 def recognise_stride(recording: Recording) -> Recording | None:
-    """Return copies of a recording if it is exactly one stride by all appearances, or None."""
+    """Return copies of a recording if it appears to be exactly one stride, or None."""
     x = recording.positions
     if recording.cycle or len(x) < 16 or not np.isfinite(x).all():
         return None
@@ -551,14 +551,14 @@ def _seam(recording: Recording) -> tuple[np.ndarray, bool]:
 
 @dataclass(frozen=True)
 class Option:
-    """An option of readers, which the command line has, too.
+    """An option of readers and of the command line.
 
     Attributes:
         name: of the reader's argument; on the command line after two dashes.
         help: in a phrase.
         metavar: its value in the help.
-        choices: values it may have; any, if empty.
-        several: whether it takes one or more values, none of them by default.
+        choices: allowed values; any if empty.
+        several: whether it takes one or more values, none by default.
 
     """
 
@@ -581,20 +581,20 @@ class RecordingFormat:
     """A format of recordings.
 
     Attributes:
-        name: by which it is chosen; on the command line after two dashes.
-        contents: what such a recording is, with its article, for the head of the help.
-        help: of the option that takes one.
+        name: on the command line after two dashes.
+        contents: kind of recording, with its article, for the head of the help.
+        help: of the option for such a recording.
         metavar: the option's value in the help.
-        read: reads one: its path, then by name ``progress`` (show a bar) and the options below.
-        endings: of the names of its files.
-        options: that its reader takes.
-        features: what else its reader takes: ``servo``, if it has velocities and efforts, and
-            ``some``, to pass over joints that are not there.
+        read: reader: takes the path, then by name ``progress`` (show a bar) and the options below.
+        endings: suffixes of the files' names.
+        options: of the reader.
+        features: further arguments of the reader: ``servo``, if it has velocities and efforts, and
+            ``some``, to skip missing joints.
         lacks: option or feature -> why it is refused, in a phrase.
-        recognises: tells whether a file with one of its endings is of this format, where others
-            have that ending, too.
-        files_in: returns the files of a folder that is one recording, sorted, or none for any
-            other folder; None if recordings of this format are files.
+        recognises: tells whether a file with one of its suffixes is of this format, if others have
+            that suffix, too.
+        files_in: returns the sorted files of a folder that is one recording, or none for any other
+            folder; None if recordings of this format are files.
 
     """
 

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bags through ROS's own ``rosbag2_py``, where the library `rosbags` is not installed.
+"""Bags through ROS's own ``rosbag2_py``, if the library `rosbags` is not installed.
 
-It has the same interface as `rosbags_library`, so that callers need not know which one reads.
+It has the interface of `rosbags_library`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,7 +48,7 @@ class Connection:
 
 
 def unpack_file(path: Path, into: Path) -> None:
-    """Refuse a storage file that was packed as a whole: without its folder ROS reads none."""
+    """Refuse a compressed storage file: ROS reads it only with its folder."""
     needed('rosbags')
 
 

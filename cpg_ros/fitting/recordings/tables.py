@@ -38,7 +38,7 @@ TRUTH = {'true': 1.0, 'false': 0.0}
 
 
 def number_in(cell: str) -> float | None:
-    """Return the number in a cell, nan where it is empty, None where it is something else."""
+    """Return the number in a cell, nan if it is empty, None if it is something else."""
     try:
         return float(cell) if cell.strip() else float('nan')
     except ValueError:
@@ -69,19 +69,19 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
 
     Args:
         lines: of text.
-        headers: of the columns; '' for those that need not hold numbers.
+        headers: of the columns; '' for those that need not contain numbers.
         delimiter: of cells; None for any white space.
         path: for messages.
-        first: number of the first of the lines, counted from 1.
-        cut: whether a last line with fewer cells is left out, as one not written to its end.
+        first: number of the first line, counted from 1.
+        cut: drop a last line with fewer cells, as incompletely written.
         loads: columns of loads, which may be words.
-        fixed: column -> text that it has in every line.
+        fixed: column -> text in all of its lines.
 
     Returns:
-        Numbers, shape (rows, columns), and a line for each kind of row that was left out.
+        Numbers, shape (rows, columns), and a line for each kind of row that was dropped.
 
     Raises:
-        RecordingError: a cell that is no number, or a line of another width.
+        RecordingError: a cell is no number, or a line has another width.
 
     """
     numbered = [(k, line) for k, line in enumerate(lines, first) if line.strip()]
@@ -129,7 +129,7 @@ ALWAYS, RATIO = 20_000_000, 100
 
 
 class UnpackedSize:
-    """Counts the bytes that come out of one file, chunk or message."""
+    """Counter of the bytes unpacked from one file, chunk or message."""
 
     def __init__(self, packed: int) -> None:
         self.most, self._size = max(ALWAYS, RATIO * packed), 0
@@ -138,7 +138,7 @@ class UnpackedSize:
         """Count bytes.
 
         Raises:
-            RecordingError: they have become too many.
+            RecordingError: there are too many.
 
         """
         self._size += count
@@ -160,14 +160,14 @@ def stamps_of_frames(frames: np.ndarray, fps: str | float | None, path: Path) ->
 
     Args:
         frames: their numbers, shape (n,).
-        fps: frames a second, as a number or its text; None if nobody said.
+        fps: frames per second, a number or its text; None if unknown.
         path: for messages.
 
     Returns:
         ns, int64, shape (n,).
 
     Raises:
-        RecordingError: there is no rate or an impossible one, or a frame without a number.
+        RecordingError: the rate is missing or impossible, or a frame has no number.
 
     """
     if fps is None:
@@ -198,7 +198,7 @@ EMPTY = ',;\t \r\n'
 #: END: last line of the preamble of OpenSim's .mot and .sto files; PREAMBLE: most lines of it.
 END, PREAMBLE = 'endheader', 100
 class _Lines(io.TextIOWrapper):
-    """Text with a limit on the length of lines, without which it would fill the memory.
+    """Text with a limit on the length of lines, which would otherwise fill the memory.
 
     Attributes:
         path: of the file.
@@ -244,11 +244,11 @@ class _Unpacked(gzip.GzipFile):
 
 @contextmanager
 def opened(path: Path) -> Iterator[io.TextIOBase]:
-    """Open a text, packed by gzip or not.
+    """Open a text, compressed by gzip or not.
 
     Raises:
-        RecordingError: it is no regular file, cut or damaged, no text, or unpacks to more than
-            recordings have (see `UnpackedSize`); from within, too.
+        RecordingError: it is not a regular file, truncated, damaged, no text, or larger than
+            recordings may be (see `UnpackedSize`); also within the context.
 
     """
     try:
@@ -283,15 +283,15 @@ def remaining_lines(text: io.TextIOBase, path: Path) -> list[str]:
 
 def preamble(first: str, text: Iterator[str]
              ) -> tuple[str, int, str | None, int | None] | None:
-    """Pass over the preamble of OpenSim's files.
+    """Skip the preamble of OpenSim's files.
 
     Args:
-        first: its first line, read already.
+        first: its first line, already read.
         text: the rest.
 
     Returns:
-        The line of the header, how many lines come before that, and, if they are declared, the
-        unit of angles and the number of rows; None if it is no such file.
+        The header line, the number of lines before it, and, if declared, the unit of angles and
+            the number of rows; None if it is no such file.
 
     """
     lines = [first]

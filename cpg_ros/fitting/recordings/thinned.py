@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Thinning of long recordings to an even grid so that they fit in memory, without wild samples.
+"""Downsampling of long recordings to an even grid that fits in memory, without outliers.
 
 A point of the grid has the mean of the samples nearest to it, corrected for their slope, as they
-are not centred on it. Grids are multiples of a step since the epoch, so that topics recorded side
-by side come to lie on the same stamps.
+are not centred on it. Grids are multiples of a step since the epoch, so that topics recorded
+together share stamps.
 """
 
 from array import array
@@ -111,12 +111,12 @@ SPIKE = 3.0
 
 
 class Thinned:
-    """Samples of some joints: as they came, or on a grid once they are many.
+    """Samples of some joints, as received, or on a grid once they are many.
 
     Attributes:
-        step: of the grid, ns; 0 as long as there is none.
-        count: samples that came in.
-        rate: of theirs, Hz, once there is a grid.
+        step: of the grid, ns; 0 without a grid.
+        count: number of received samples.
+        rate: of the received samples, Hz, with a grid.
 
     """
 
@@ -129,7 +129,7 @@ class Thinned:
         self._stamps, self._values = array('q'), array('d')
 
     def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
-        """Take samples.
+        """Add samples.
 
         Args:
             stamps: ns, int64, shape (n,).
@@ -166,7 +166,7 @@ class Thinned:
         self._values.frombytes(values.tobytes())
 
     def taken(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return stamps and values, the caller's own, and forget them."""
+        """Return stamps and values, and forget them."""
         stamps, values = self._joined()
         self._coming = []
         if self.step:
@@ -178,7 +178,7 @@ class Thinned:
 
     @property
     def note(self) -> str:
-        """A line on the thinning, or ''."""
+        """Line on the downsampling, or ''."""
         return '' if not self.step else (
             f'{self.count} samples, of {self.rate:.4g} Hz, smoothed to {1e9 / self.step:g} Hz: '
             'the recording is long')
@@ -221,7 +221,7 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
              ) -> tuple[np.ndarray, np.ndarray]:
     """Put samples on the grid.
 
-    Where samples lie on one side of a point, their mean stands, at its own stamp.
+    Where all samples lie on one side of a point, their mean keeps its own stamp.
 
     Args:
         stamps: ns, int64, shape (n,).
@@ -229,7 +229,8 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
         step: of the grid, ns.
 
     Returns:
-        Stamps, shape (m,), rising, and values, shape (m, columns); m points have samples.
+        Stamps, shape (m,), ascending, and values, shape (m, columns), of the m points with
+            samples.
 
     """
     if not len(stamps):
