@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The core of the pattern in C: structs of ``c/host.h`` and functions of ``c/host.c``.
+"""The pattern's core in C: structs of ``c/host.h`` and functions of ``c/host.c``.
 
-The parts of an export, compiled once for all robots and networks; each network has a library of
-its own (integration.c_kernel). Arrays here own all memory. Functions hold the interpreter's lock:
-they take microseconds, and other threads write what they read.
+It consists of the parts of an export, compiled once for all robots and networks; each network has
+a library of its own (integration.c_kernel). Arrays here own all memory. The functions hold the
+interpreter's lock for microseconds, as other threads write what they read.
 """
 
 import ctypes
@@ -43,7 +43,7 @@ _REAL, _WHOLE, _POINTER = ctypes.c_double, ctypes.c_int32, ctypes.c_void_p
 
 
 def _struct(name: str, *fields: tuple[Any, str]) -> type[ctypes.Structure]:
-    """Return a struct, from pairs of a type and the names of its fields."""
+    """Return a struct, from pairs of a type and its fields' names."""
     return type(name, (ctypes.Structure,), {'_fields_': [
         (field, kind) for kind, names in fields for field in names.split()]})
 
@@ -87,7 +87,7 @@ _FUNCTIONS: dict[str, tuple[Any, ...]] = {
 
 
 def _sources() -> dict[str, str]:
-    """Return the files of the core, name -> text."""
+    """Return the core's files, name -> text."""
     defines = (f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_ANGLES {TABLE}\n'
                f'#define HOLD {HOLD!r}')
     names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'body',
@@ -102,10 +102,10 @@ def _sources() -> dict[str, str]:
 
 @cache
 def core() -> ctypes.CDLL:
-    """Return the core's functions, compiled if need be.
+    """Return the core's library, compiled if it is not in the cache.
 
     Raises:
-        NoCompiler: it is not on disk, and there is no C compiler, or it fails.
+        NoCompiler: compilation is needed, and there is no C compiler, or it fails.
 
     """
     loaded = load(generated.folder(), f'pattern-{version()}', _sources, 'the pattern')
@@ -119,10 +119,10 @@ def core() -> ctypes.CDLL:
 
 
 def precompile(name: str) -> None:
-    """Compile or load the machine code of a network's generator.
+    """Compile or load the machine code of a network's generator; errors as of find_network.
 
     Args:
-        name: as find_network takes it, and errors as of that.
+        name: as find_network takes it.
 
     """
     network = find_network(name)
@@ -136,7 +136,7 @@ def precompile(name: str) -> None:
 
 def confine(target: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt: float,
             position: np.ndarray, velocity: np.ndarray, behind: np.ndarray) -> int:
-    """Move joints to the wanted positions within their limits; count those held back.
+    """Move joints to the wanted positions within their limits; return how many are held back.
 
     Where a limit acts, and where a joint catches up, velocity is the difference quotient.
 
@@ -144,9 +144,9 @@ def confine(target: np.ndarray, wanted_rate: np.ndarray, limits: np.ndarray, dt:
         target: positions, rad, shape (joints,).
         wanted_rate: their velocities, rad/s.
         limits: lowest and highest angle, rad, and largest speed, rad/s, shape (3, joints).
-        dt: since the last tick, s.
+        dt: time since the last tick, s.
         position: of the last tick, rad; overwritten.
-        velocity: filled, rad/s.
+        velocity: overwritten, rad/s.
         behind: whether a limit held each joint back in the last tick; overwritten.
 
     """
@@ -160,12 +160,12 @@ class CGait:
     """A gait as the core takes it.
 
     Attributes:
-        struct: its numbers, and addresses of arrays that stay as long as this object.
+        struct: numbers of the gait, and addresses of arrays that live as long as this object.
 
     """
 
     def __init__(self, **fields: Any) -> None:
-        """Set fields of the struct; arrays of integers or floats, None for none."""
+        """Set fields of the struct: numbers, arrays of integers or floats, None for no array."""
         self.struct = Gait()
         self._arrays = []
         for name, value in fields.items():
@@ -177,20 +177,20 @@ class CGait:
 
 
 class CTrack:
-    """A gait whose network runs, as the core takes it.
+    """A running gait as the core takes it.
 
     Attributes:
-        struct: its numbers, and addresses of arrays that stay as long as this object.
-        angle, d_angle_d_phase, reach: of each joint: angle from the stand, rad; its derivative by
-            phase, rad per cycle, and by the stride of its leg, rad.
+        struct: numbers of the gait, and addresses of arrays that live as long as this object.
+        angle, d_angle_d_phase, reach: of each joint: angle from the stand, rad; derivative by
+            phase, rad per cycle; derivative by its leg's stride, rad.
         legs: phase of each leg, cycles.
-        clocks: of each cell, shape (6, cells): phase (cycles), what its speed (cycles a stride)
-            is above 1 now and at the next look, amplitude, its rate (per stride) now and then.
+        clocks: of each cell, shape (6, cells): phase (cycles), speed less 1 (cycles a stride) now
+            and at the next look, amplitude, its rate (per stride) now and then.
 
     """
 
     def __init__(self, gait: CGait) -> None:
-        """Make room for a gait."""
+        """Allocate the arrays of a gait."""
         joints, legs, cells = gait.struct.joints, gait.struct.legs, gait.struct.cells
         self.struct = Track()
         self.angle, self.d_angle_d_phase, self.reach = motion = np.zeros((3, joints))
@@ -205,12 +205,12 @@ class CTrack:
         self.follow(gait)
 
     def follow(self, gait: CGait) -> None:
-        """Read joints and legs as this gait has them."""
+        """Read joints and legs by this gait."""
         self._kept['gait'] = gait
         self.struct.gait = ctypes.addressof(gait.struct)
 
     def run(self, which: str, stepper: Stepper) -> None:
-        """Take a stepper's arrays as one of the networks of the struct: net, home or seed."""
+        """Use a stepper's arrays as one of the struct's networks: net, home or seed."""
         lane = stepper.lane
         self._kept[which] = stepper, lane
         arrays = stepper.clock, stepper.now, *stepper.ring[1:]

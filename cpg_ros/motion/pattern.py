@@ -14,9 +14,9 @@
 
 """The moving pattern: from plans to joint positions and velocities, tick by tick.
 
-A gait switch cross-fades two networks whose legs share one phase; a ramp scales the pattern
-between the stand and the gait; a watchdog compares the network with its orbit. The pattern's clock
-slows where a joint would exceed the speed of the gaits, and after a stall.
+A gait switch cross-fades two networks whose legs share one phase. A ramp scales the pattern
+between the stand and the gait. A watchdog compares the network with its orbit. The pattern's clock
+slows after a stall, and where a joint would exceed the speed of the gaits.
 """
 
 from collections import deque
@@ -52,11 +52,11 @@ def _shared(name: str) -> Any:
 
 
 def _steered(field: str, address: Callable[[StrideCommand], int]) -> Any:
-    """Return a property: the stride command that steers, None for none.
+    """Return a property for the stride command, None for none.
 
     Args:
         field: of the core's struct, that points to it.
-        address: returns where the field points.
+        address: stride command -> address for the field.
 
     """
     def read(self: Any) -> StrideCommand | None:
@@ -70,13 +70,13 @@ def _steered(field: str, address: Callable[[StrideCommand], int]) -> Any:
 
 
 class GaitRunner:
-    """A network running one plan, and the watchdog that compares it with the gait's orbit.
+    """A network that runs a plan, with a watchdog that compares it with the gait's orbit.
 
     Attributes:
         legs: phase of each leg, cycles.
         phase: of the first leg by the clock, cycles.
-        progress: share of its transition that is over, 0 to 1.
-        settling: strides that are left to find the gait.
+        progress: completed fraction of its transition, 0 to 1.
+        settling: remaining strides to find the gait.
         address: of its struct in the core.
 
     """
@@ -86,7 +86,7 @@ class GaitRunner:
 
     def __init__(self, plan: GaitPlan, transition: float,
                  strides: StrideCommand | None = None) -> None:
-        """Run a plan; a stride command, if given, scales its strides."""
+        """Run a plan; a stride command scales its strides."""
         self._core, self._track = core(), CTrack(plan.core)
         self._struct, self.address = self._track.struct, self._track.address
         self._struct.transition = transition
@@ -96,7 +96,7 @@ class GaitRunner:
         self.reseed(plan.readout.start)
 
     def _start_on(self, plan: GaitPlan) -> None:
-        """Take a plan's orbit to start on, and a network of its own to run there."""
+        """Set the orbit to start on, and create a network for it."""
         self.plan, self._own = plan, plan.seed.copy()
         self._track.follow(plan.core)
         self._track.run('seed', plan.seed)
@@ -114,21 +114,21 @@ class GaitRunner:
         self._track.run('net', stepper)
 
     def advance(self, strides: float) -> bool:
-        """Advance by some strides; tell whether the network is still on its orbit."""
+        """Advance by some strides; return whether the network is still on its orbit."""
         return bool(self._core.cpg_track_advance(self.address, strides))
 
     def reseed(self, phase: float | None = None) -> None:
-        """Put the network on its orbit where its first leg is at a phase, cycles.
+        """Put the network on its orbit, at a phase of the first leg in cycles.
 
-        The phase is the clock's if not given.
+        The default phase is the clock's.
         """
         self._core.cpg_track_reseed(self.address, self.phase if phase is None else phase)
 
     def drift_to(self, plan: GaitPlan) -> None:
         """Take a plan's parameters and leave the change to the network's own dynamics.
 
-        If the state has no component in the new gait's symmetry class, as on the exact orbit of
-        another gait, a small one is added; the lock would otherwise hold the network at rest.
+        A state without a component in the new gait's symmetry class, such as a state on another
+        gait's exact orbit, gets a small one; otherwise the lock would hold the network at rest.
         """
         orbit, stepper = plan.orbit, self.stepper
         stepper.set(orbit.network, plan.gain, orbit.symmetry)
@@ -158,13 +158,13 @@ SHORTEST = 0.05
 class Pattern:
     """Joint positions and velocities of a robot in its gait.
 
-    ``advance`` belongs to one thread; ``apply`` and ``enable`` may be called from another.
+    ``advance`` belongs to one thread; ``apply`` and ``enable`` may be called from others.
 
     Attributes:
         position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
-        faults: times the watchdog had to put the network back on its orbit.
-        held: ticks in which a limit held a joint back.
-        body: the pose of the body.
+        faults: number of times that the watchdog put the network back on its orbit.
+        held: number of ticks in which a limit held a joint back.
+        body: pose of the body.
         frequency_scale: factor of the pattern's clock.
         substep: longest part of a tick while gaits fade or the ramp moves, s.
 
@@ -229,7 +229,7 @@ class Pattern:
         return [self._runners[one] for one in reversed(found)]
 
     def _keep(self, track: GaitRunner) -> None:
-        """Keep a runner as long as the core may run it."""
+        """Keep a runner alive as long as the core may run it."""
         waiting = self._struct.waiting
         used = {waiting, track.address, *(one.address for one in self._tracks)}
         for old in list(self._runners)[:-2 * MOST_TRACKS]:
@@ -238,7 +238,7 @@ class Pattern:
         self._runners[track.address] = track
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
-        """Begin anew at phase 0, with the newest plan, from where the joints are."""
+        """Restart at phase 0 with the newest plan, from the present joint positions."""
         newest, struct = self._tracks[-1], self._struct
         newest.reseed(0.0)
         self._run([newest])
@@ -256,17 +256,17 @@ class Pattern:
         self.start_from(self.position, ramp)
 
     def _go(self, ramp: Any, end: float, time: float) -> None:
-        """Lead a ramp to its end within a time in s, from its present level and rate."""
+        """Move a ramp to its end in a time in s, from its present level and rate."""
         self._core.cpg_ramp_to(ctypes.addressof(ramp), end, time)
 
     def _absorb(self) -> None:
-        """Let the core smooth the jump of the next wanted positions: it decays over time."""
+        """Let the core smooth the next jump of the wanted positions."""
         self._struct.absorbed, self._struct.jumped = 0.0, 0
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
-        """Begin at these angles, rad, (joints,), and lead the joints to the stand in s or more.
+        """Begin at these angles, rad, (joints,), and move to the stand in a time in s or more.
 
-        To be called before the first advance. No joint takes more than half of its speed limit.
+        Call it before the first advance. No joint takes more than half of its speed limit.
         """
         # The joints' offsets from the stand, and the ramp that leads these to 0.
         self._found[:] = angles - self._offset
@@ -282,9 +282,9 @@ class Pattern:
     # -- requests from other threads ------------------------------------------------------
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
-        """Change to a plan over a transition in s; 0 leaves it to the network's dynamics.
+        """Change to a plan over a transition in s; 0 leaves the change to the network's dynamics.
 
-        A plan that still waits, for a tick or for the end of other changes, is replaced.
+        It replaces a plan that still waits.
         """
         # Seeding an orbit takes long: do it in the caller's thread, not in that of the ticks.
         prepared = GaitRunner(plan, max(transition, SHORTEST), self.strides)
@@ -303,7 +303,7 @@ class Pattern:
         self._struct.go = math.copysign(max(ramp, SHORTEST), 1.0 if enabled else -1.0)
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
-        """Request the legs' strides, shape (legs,), and the pace; see StrideCommand.
+        """Request strides of the legs, shape (legs,), and the pace; see StrideCommand.
 
         Raises:
             ValueError: the pattern was made without a stride command.
@@ -314,7 +314,7 @@ class Pattern:
         self.strides.set_target(stride, pace, at_once=self._ramp.level == 0.0)
 
     def attach(self, strides: StrideCommand) -> None:
-        """Use a stride command from now on; one that has no target yet changes nothing."""
+        """Use a stride command from now on; without a target it changes nothing."""
         for track in self._tracks:
             track.strides = strides
         self.strides = strides
@@ -330,7 +330,7 @@ class Pattern:
 
     @property
     def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
-        """The plan that fades out, the newest plan in force, and the share of the newest."""
+        """The plan that fades out, the newest plan in force, and the fraction of the newest."""
         older, newest = (tracks := self._tracks)[-2:][0], tracks[-1]
         if older is newest:
             return newest.plan, newest.plan, 0.0
@@ -338,32 +338,32 @@ class Pattern:
 
     @property
     def phases(self) -> np.ndarray:
-        """Phase of each leg in cycles, shape (legs,); 0 is where its cell peaks."""
+        """Phase of each leg, cycles, shape (legs,); 0 is where its cell peaks."""
         return self._newest.legs
 
     @property
     def state(self) -> np.ndarray:
-        """The newest network's state and rate, shape (2, components); overwritten by advance."""
+        """State and rate of the newest network, shape (2, components); overwritten by advance."""
         return self._newest.stepper.now[:2]
 
     @property
     def level(self) -> float:
-        """0 at the stand, 1 in the full gait."""
+        """Level of the ramp: 0 at the stand, 1 in the full gait."""
         return self._ramp.level
 
     @property
     def standing(self) -> bool:
-        """Tell whether it is disabled and the ramp has ended."""
+        """Whether the pattern is disabled and the ramp has ended."""
         return not (self.enabled or self._ramp.level or self._struct.go or self._approach.parts)
 
     @property
     def in_transition(self) -> bool:
-        """Tell whether gaits are still fading into one another, or settling."""
+        """Whether gaits fade into one another, or settle."""
         return self._struct.tracks > 1 or self._newest.settling > 0.0
 
     @property
     def recovering(self) -> bool:
-        """Tell whether the pattern is still recovering from a fault."""
+        """Whether the pattern recovers from a fault."""
         return bool(self._struct.recovering)
 
     @property
@@ -396,13 +396,13 @@ class Pattern:
         self._core.cpg_advance(self._address, dt)
 
     def plan_tick(self, dt: float) -> np.ndarray:
-        """Begin to advance by dt in s; return where joints are wanted, rad, to be corrected."""
+        """Begin to advance by dt in s; return the wanted angles, rad, for a correction."""
         self.take_drift()
         self._core.cpg_plan(self._address, dt)
         return self._wanted
 
     def follow(self, dt: float, goal: np.ndarray) -> None:
-        """Move the joints to corrected angles of plan_tick, rad, shape (joints,)."""
+        """Move the joints to the corrected angles, rad, shape (joints,)."""
         self._goal[:] = goal
         self._core.cpg_follow(self._address, dt, 1)
 
@@ -418,6 +418,6 @@ class Pattern:
     def resume(self, stall: float) -> None:
         """Resume after a stall in s from where the pattern stopped, slowly at first.
 
-        Belongs to the thread of advance.
+        Call it from the thread of advance.
         """
         self._core.cpg_resume(self._address, stall)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint commands taken from topics, as a robot's controllers would take them."""
+"""Joint commands from topics, as a robot's controllers receive them."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -51,7 +51,7 @@ def kp_scale_block(node: Node, scale: np.ndarray) -> MessageBlock:
 
 
 class KpScaleSubscription:
-    """Takes the factor from the topic."""
+    """Receives the factor from the topic."""
 
     def __init__(self, node: Node) -> None:
         self._subscription = PolledSubscription(node, Float64, KP_SCALE_TOPIC)
@@ -91,14 +91,14 @@ class HeldPublisher:
 
 
 class HeldSubscription:
-    """Takes where held joints are to be driven from the topic."""
+    """Receives target angles of held joints."""
 
     def __init__(self, node: Node, robot: Robot) -> None:
         self._subscription = PolledSubscription(node, JointState, HELD_TOPIC)
         self._names = list(robot.held)
 
     def receive(self) -> np.ndarray | None:
-        """Return the newest angles, rad, shape (joints,); None without a new message that fits."""
+        """Return the newest angles, rad, shape (joints,); None without a new, valid message."""
         message = self._subscription.newest()
         if (message is None or list(message.name) != self._names
                 or len(message.position) != len(self._names)
@@ -117,15 +117,15 @@ class _Bad(CpgError):
 
 
 class Commands:
-    """The angles of the last valid messages.
+    """Angles of the last valid messages.
 
-    ``receive`` reads the messages that have arrived, in the thread that uses them. A message is
-    used as a whole or, if anything in it is invalid, not at all.
+    ``receive`` reads the messages that have arrived, in the calling thread. It accepts a message
+    as a whole, or rejects it if anything in it is invalid.
 
     Attributes:
         angles: rad, in ``robot.order``; before the first command, those passed to __init__.
-        topics: the names of the topics, resolved.
-        refused: why the last ``receive`` rejected a message; '' if it did not.
+        topics: names of the topics, resolved.
+        refused: why the last ``receive`` rejected a message, or ''.
 
     """
 
@@ -167,12 +167,12 @@ class Commands:
         return all(self._node.count_publishers(topic) for topic in self.topics)
 
     def expect(self, since: int) -> None:
-        """Expect commands that are not stamped before an instant, ns."""
+        """Expect commands with a stamp not before an instant, ns."""
         self._since = since
         self._fresh = [False] * len(self._fresh)
 
     def receive(self) -> bool:
-        """Read what has arrived; return whether every topic has brought an expected command."""
+        """Read the arrived messages; return whether all topics have an expected command."""
         self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
             # All of them: an invalid one is reported even if a valid one has followed.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generator node: a central pattern generator that publishes joint states in real time."""
+"""The generator node, which publishes joint states of a gait in real time."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, ExitStack
@@ -69,10 +69,10 @@ QUIET = 5.0
 
 
 class Diagnostics:
-    """Reports ERROR on a fault until the pattern is back, and on other publishers and joints that
-    do not follow; else WARN.
+    """Status of the generator on /diagnostics.
 
-    A warning is for lateness, and for silence: what is not published is not OK.
+    It is ERROR after a fault until the pattern is back, with other publishers, and with joints
+    that do not follow; WARN with late ticks, and while nothing is published.
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
@@ -274,7 +274,7 @@ class Generator(StartedNode):
         return plan
 
     def _create_pattern(self, network: type[Network], plan: GaitPlan) -> None:
-        """Create the pattern, what steers and corrects it, and its publishers."""
+        """Create the pattern, its steering and feedback, and its publishers."""
         robot, steered = plan.robot, self._value('cmd_vel')
         autostart = self._value('autostart') and not self._value('managed')
         soled = robot.biped is not None
@@ -301,7 +301,7 @@ class Generator(StartedNode):
         return self._planner.complete(super()._complete(parameters), self._values())
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Return whether a batch can run as a whole; change nothing."""
+        """Return whether a batch can run as a whole, without changing anything."""
         plan = self.pattern.plan
         if any(p.name in self._planner.names for p in parameters):
             try:
@@ -347,7 +347,7 @@ class Generator(StartedNode):
     # -- the robot ------------------------------------------------------------------------
 
     def _motion(self) -> tuple[float, float, float]:
-        """Return the speeds forward and to the left, m/s, and the yaw rate, rad/s, wanted."""
+        """Return the wanted speeds forward and to the left, m/s, and yaw rate, rad/s."""
         if self._cmd_vel:
             return self._cmd_vel.motion
         return self.pattern.plan.own_speed, 0.0, 0.0
@@ -366,7 +366,7 @@ class Generator(StartedNode):
 
     @property
     def _needs_pose(self) -> bool:
-        """Whether the joints' present angles must be known before the first motion."""
+        """Whether the first motion requires the joints' measured angles."""
         return self._value('command') != 'none' and not self._value('assume_stand')
 
     def _find_pose(self) -> tuple[str, np.ndarray | None]:
@@ -384,7 +384,7 @@ class Generator(StartedNode):
         return '', None
 
     def _start_publishing(self) -> tuple[str, str]:
-        """Start publishing; return why not, or '', and the name of the pose to start from."""
+        """Start publishing; return why not, or '', and the name of the initial pose."""
         if self._value('exclusive') and self._others.check():
             return self._others.text, ''
         refusal, pose = self._find_pose()
@@ -403,7 +403,7 @@ class Generator(StartedNode):
         return '', 'the stand' if pose is None else 'the measured pose'
 
     def _look_for_pose(self) -> None:
-        """Start publishing as soon as the pose is measured; log news of why it is not."""
+        """Start publishing as soon as the pose is measured; log changes of the reason why not."""
         refusal, pose = self._start_publishing()
         if not refusal:
             self.get_logger().info(f'beginning from {pose}')
@@ -412,14 +412,14 @@ class Generator(StartedNode):
         self._unmeasured = refusal
 
     def _end_search(self) -> None:
-        """Wait for the pose no longer."""
+        """Stop waiting for the pose."""
         if self._search is not None:
             self._search.cancel()
             self._search, self._unmeasured = None, ''
 
     @property
     def _awaited(self) -> str:
-        """Text on the condition that publishing waits for."""
+        """Text on the condition for which publishing waits."""
         if self._search is not None and self._measured is not None:
             return f'the measured pose on {self._measured.topic}'
         return '~/enable' if self._lifecycle is None else 'configure'
@@ -456,7 +456,7 @@ class Generator(StartedNode):
         return ''
 
     def _shut_down(self) -> str:
-        """End the node as a signal does, with a ramp down; return ''."""
+        """End the node with a ramp down, as a signal does; return ''."""
         self.stop.set()
         return ''
 
@@ -488,7 +488,7 @@ class Generator(StartedNode):
         return response
 
     def _commanded(self) -> np.ndarray | None:
-        """Return the angles that joints should be at, rad, or None while there are none."""
+        """Return the commanded angles, rad, or None while there are none."""
         # The balance of a biped sends torques as angles, q + tau / kp.
         torques = isinstance(self.pattern, BalancedPattern) and self.pattern.balancing
         if self.ticker.waiting or not self.ticker.ticks or torques or self._feedback.recovering:
@@ -496,7 +496,7 @@ class Generator(StartedNode):
         return self._sent.copy()
 
     def _lag(self, reason: str) -> None:
-        """Switch the feedback off while a joint does not follow: it would correct by it."""
+        """Switch the feedback off while a joint does not follow: it would correct wrongly."""
         self._feedback.hinder(reason)
         if reason:
             self.get_logger().error(reason)
@@ -537,7 +537,7 @@ class Generator(StartedNode):
             yield
 
     def _restart(self) -> None:
-        """Start again where simulated time jumped back, which the diagnostics log."""
+        """Restart after simulated time jumped back; the diagnostics log the jump."""
         ramp = self._value('ramp')
         # At the end there is no time for a longer one.
         self.pattern.restart(min(ramp, LAST_RAMP) if self.stop.is_set() else ramp,
@@ -562,7 +562,7 @@ class Generator(StartedNode):
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
     def look(self) -> float:
-        """Let ticks outside the interpreter know what motion is wanted, and whether it rests."""
+        """Pass the wanted motion, and whether it rests, on to ticks outside the interpreter."""
         self._feedback.renew()
         if self.ticker.stopping and self.pattern.standing:
             self.ticker.stopping = False
@@ -571,8 +571,8 @@ class Generator(StartedNode):
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.
 
-        A biped that balances goes into a crouch instead, and another robot sits down if it is to,
-        within LAST_CROUCH; a second signal that comes later than LAST_DEADLINE ends that at once.
+        A balancing biped crouches instead, and a robot with ``end: sit`` sits down, within
+        LAST_CROUCH; a second signal later than LAST_DEADLINE ends that at once.
         """
         began = time.monotonic()
         crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()

@@ -46,7 +46,7 @@ CELLS = 0.02
 
 
 class Outputs:
-    """Per-leg and combined joint states, leg phases, and commands for ros2_control.
+    """Publisher of joint states per leg and combined, leg phases, and ros2_control commands.
 
     Attributes:
         topics: those that move joints, resolved.
@@ -57,7 +57,7 @@ class Outputs:
         """Prepare all messages.
 
         Raises:
-            StartError: the combined topic is one of the others.
+            StartError: the combined topic equals another one.
 
         """
         own = [*(f'{leg}/joint_states' for leg in robot.legs), *COMMAND_TOPICS.values()]
@@ -119,8 +119,7 @@ def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
 
     Args:
         names: of the joints.
-        parts: which of a block's numbers are their positions, velocities and, if there are any,
-            efforts.
+        parts: indices in the block of positions, velocities and, optionally, efforts.
 
     """
     message = JointState(name=list(names))
@@ -130,7 +129,7 @@ def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
 
 
 def labelled(names: tuple[str, ...], places: np.ndarray) -> Template:
-    """Return a template of an array with a number for each name; its label lists the names."""
+    """Return a template of an array with one number for each name, listed in its label."""
     message = Float64MultiArray()
     message.layout.dim = [MultiArrayDimension(label=','.join(names), stride=1, size=len(names))]
     return Template(message, numbers=[(message, 'data', places)])
@@ -143,7 +142,7 @@ FRESH = 1.0
 
 
 class MeasuredPose:
-    """The newest angles of the joints on a topic of joint states, read on demand.
+    """Newest angles of the joints on a topic of joint states, read on demand.
 
     Attributes:
         topic: its resolved name.
@@ -159,7 +158,7 @@ class MeasuredPose:
         self.topic = self._subscription.topic
 
     def receive(self, fresh: float = FRESH) -> np.ndarray:
-        """Return the angle of each joint, rad, leg by leg; NaN where none is ``fresh``, in s."""
+        """Return each joint's angle, rad, leg by leg; nan if older than ``fresh``, s."""
         for message, arrived in self._subscription.receive():
             for name, angle in zip(message.name, message.position, strict=False):
                 if (k := self._index.get(name)) is not None and math.isfinite(angle):
@@ -167,7 +166,7 @@ class MeasuredPose:
         return np.where(self._arrived > time.time_ns() - fresh * 1e9, self._angles, math.nan)
 
     def lacks(self, angles: np.ndarray) -> str:
-        """Return why angles that were taken are not the robot's pose, or ''."""
+        """Return why angles are not a complete pose of the robot, or ''."""
         missing = [name for name, k in self._index.items() if math.isnan(angles[k])]
         if len(missing) == len(self._index):
             return f'no joint states on {self.topic}'
@@ -186,19 +185,19 @@ ASIDE = 0.2
 
 
 class CmdVel:
-    """Steers a pattern by the newest command; other threads may change the gait meanwhile."""
+    """Steering of a pattern by the newest velocity command; the gait may change meanwhile."""
 
     def __init__(self, node: Node, pattern: Pattern, plan: GaitPlan, enabled: bool,
                  timeout: Callable[[], float], ramp: Callable[[], float],
                  closed: Callable[[], bool]) -> None:
-        """Follow the commands on ``cmd_vel``.
+        """Subscribe to ``cmd_vel``.
 
         Args:
-            node: that subscribes; its parameter ``stamped_cmd_vel`` says which type.
-            pattern: to be steered.
-            plan: gait that it walks.
+            node: that subscribes; its parameter ``stamped_cmd_vel`` selects the type.
+            pattern: to steer.
+            plan: of the gait.
             enabled: whether the robot may walk.
-            timeout: returns how long a command counts, s.
+            timeout: returns how long a command is valid, s.
             ramp: returns the duration of the ramp between stand and gait, s.
             closed: returns whether feedback is active.
 
@@ -223,12 +222,12 @@ class CmdVel:
 
     @property
     def walking(self) -> bool:
-        """Whether a fresh command demands motion."""
+        """Whether a valid command demands motion."""
         return self._enabled and not self._stale and self._target != (0.0, 0.0, 0.0)
 
     @property
     def motion(self) -> tuple[float, float, float]:
-        """The current speeds forward and to the left, m/s, and yaw rate, rad/s."""
+        """Present speeds forward and to the left, m/s, and yaw rate, rad/s."""
         if not self.walking:
             return 0.0, 0.0, 0.0
         speed, aside, turn = self._target
@@ -237,7 +236,7 @@ class CmdVel:
 
     @property
     def state(self) -> str:
-        """The command as text, for diagnostics."""
+        """Command as text, for diagnostics."""
         if self._stale:
             return 'none'
         speed, aside, turn = self._target
@@ -249,7 +248,7 @@ class CmdVel:
         return (clock if clock.ros_time_is_active else STEADY).now().nanoseconds * 1e-9
 
     def look_for_misfits(self) -> str:
-        """Return who publishes commands of the other type, which do not arrive; log news."""
+        """Return who publishes commands of the other type, which do not arrive; log changes."""
         own, other = ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist')[
             ::1 if self._stamped else -1]
         names = sorted({node_of(publisher)
@@ -264,7 +263,7 @@ class CmdVel:
         return text
 
     def _take_stamped(self, message: TwistStamped) -> None:
-        """Take a command in the base's frame and of this time; a stamp of 0 is none."""
+        """Accept a fresh command in the base's frame; a stamp of 0 counts as fresh."""
         stamp, frame = message.header.stamp, message.header.frame_id
         base = self._node.get_parameter('feedback.base_frame').value
         if frame not in (*BASES, base):
@@ -337,6 +336,6 @@ class CmdVel:
             self._pattern.enable(walking, self._ramp())
 
     def end(self) -> None:
-        """Leave the pattern alone: it is being ramped down for the last time."""
+        """Stop steering: the pattern ramps down for the last time."""
         with self._deciding:
             self._enabled = self._up = False

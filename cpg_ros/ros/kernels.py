@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Compilation before a node moves anything, announced before it begins."""
+"""Compilation before a node moves anything, announced in advance."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -39,10 +39,10 @@ EVERY = 1.0
 
 
 class StartProgress:
-    """A thread that publishes how long something has taken, until its end."""
+    """Thread that publishes the duration of a step of the start until it ends."""
 
     def __init__(self, node: Node, what: str, seconds: float) -> None:
-        """Begin to publish that ``node`` waits for ``what``, about ``seconds``."""
+        """Publish that ``node`` waits for ``what``, for about ``seconds``."""
         self._node, self._what, self._seconds, self._began = node, what, seconds, time.monotonic()
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._ended = threading.Event()
@@ -60,11 +60,11 @@ class StartProgress:
 
     @property
     def passed(self) -> float:
-        """Time that it has taken, s."""
+        """Elapsed time, s."""
         return time.monotonic() - self._began
 
     def end(self) -> None:
-        """Publish no more."""
+        """Stop publishing."""
         self._ended.set()
         self._thread.join()
         self._node.destroy_publisher(self._publisher)
@@ -78,9 +78,9 @@ LOOK = 0.05
 
 
 def compile_kernels(network: str, node: Node) -> None:
-    """Compile or load what runs a network, named as for find_network: in C.
+    """Compile or load a network's code in C; the name is as of find_network.
 
-    Its equations are derived in another process: sympy takes 35 MB, which would stay.
+    Another process derives the equations: sympy takes 35 MB, which would stay.
 
     Raises:
         CpgError: there is no C compiler.
@@ -98,10 +98,7 @@ def compile_kernels(network: str, node: Node) -> None:
 
 @contextmanager
 def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
-    """Announce compilations that take about ``seconds``, if there are any.
-
-    They are logged, and published on /diagnostics as they go on.
-    """
+    """Announce compilations, which take about ``seconds``, in the log and on /diagnostics."""
     begun: list[StartProgress] = []
 
     def compiling() -> None:
@@ -120,16 +117,16 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
 
 
 def compile_apart(node: Any, part: str, what: str, seconds: float, moving: bool = False) -> None:
-    """Compile a part of ``precompile`` in another process; this one then loads it.
+    """Compile a part of ``precompile`` in another process, and load it in this one.
 
-    A compiler keeps the interpreter's lock for up to seconds, for which Python's ticks would wait.
+    A compiler holds the interpreter's lock for up to seconds, for which Python's ticks would wait.
 
     Args:
         node: that waits for it.
         part: as ``precompile`` takes it.
         what: description for the log.
-        seconds: that it takes about the first time.
-        moving: whether the node moves a robot meanwhile, and goes first.
+        seconds: approximate duration of the first time.
+        moving: whether the node moves a robot meanwhile, and has priority.
 
     Raises:
         StartError: the node ends.

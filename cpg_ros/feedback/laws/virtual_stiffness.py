@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Virtual stiffness: servos that take positions only are stiff by targets that go too far.
+"""Virtual stiffness: targets beyond the wanted angles stiffen servos that take positions only.
 
-A servo turns its joint by kp (target - angle): with a target that is s times as far from the
-measured angle as the wanted one, its gain is s kp, and its damping stays. The angle is measured
-late, which destabilises a loop that is stiff by it, unlike a servo's own: it is left alone where
-measurements are too old, and acts for a limited time, after which it rests.
+A servo turns its joint by kp (target - angle): a target s times as far from the measured angle as
+the wanted one makes the gain s kp and keeps the damping. The measured angle is late, which
+destabilises this loop, unlike a servo's own. The law therefore does not act where measurements are
+too old, and acts for a limited time, after which it rests.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
@@ -41,11 +41,11 @@ LAW = Law(
 
 @jit
 def acts(spent, stiff, delay, gains):
-    """Return whether the law acts, that is, whether targets go further than the wanted angles.
+    """Return whether the law acts: whether targets go beyond the wanted angles.
 
     Args:
         spent: see spend.
-        stiff: whether the law stiffen wants servos to be stiff.
+        stiff: whether the law stiffen requests stiff servos.
         delay: age of the measured angles, s.
         gains: of the law.
 
@@ -55,7 +55,7 @@ def acts(spent, stiff, delay, gains):
 
 @jit
 def spend(spent, acting, gains, dt):
-    """Return the time for which the law has acted, s; if negative, minus the rest that is left.
+    """Return the time for which the law has acted, s; if negative, minus the remaining rest.
 
     Args:
         spent: the same, dt in s earlier.

@@ -12,11 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Compile the kernels that the first start of a generator would otherwise wait for.
+"""Compile the kernels for which the first start of a generator would otherwise wait.
 
-``make build`` runs it once for each installation: the networks in C, and the feedback of robots
-with points and with soles for feet by numba. Whatever is not done in time is compiled when it is
-first used.
+``make build`` runs it once for each installation: networks in C, and the feedback of robots with
+point feet and with soles by numba. The rest is compiled on first use.
 """
 
 from collections.abc import Sequence
@@ -46,7 +45,7 @@ ROBOT, BIPED = 'unitree_go2', 'humanoid'
 
 
 def compile_part(part: str) -> None:
-    """Compile or load what runs a network or all, the feedback, or what balances a biped."""
+    """Compile or load one network or all, the feedback, or the balance of a biped."""
     if part == 'feedback':
         # It loads numba.
         from cpg_ros.feedback.by_address import warm_up
@@ -63,7 +62,7 @@ def compile_part(part: str) -> None:
 
 
 def compile_parts(parts: Sequence[str]) -> None:
-    """Compile parts in a process each, as many at once as there are cores."""
+    """Compile parts in one process each, as many at once as there are cores."""
     began = time.monotonic()
     say(f'compiling the numerical kernels, so that no start waits for it: {", ".join(parts)} '
         f'(at most {LIMIT:g} s)')
@@ -87,7 +86,7 @@ def compile_parts(parts: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compile the parts that are named, or all; return the exit code."""
+    """Compile the given parts, or all; return the exit code."""
     parts = (sys.argv[1:] if arguments is None else arguments) or PARTS
     if len(parts) == 1:
         compile_part(parts[0])

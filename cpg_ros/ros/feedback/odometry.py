@@ -41,8 +41,8 @@ def odometry(topic: str, frames: tuple[str, str], *places: np.ndarray) -> tuple[
     """Return topic and message; places are indices of its numbers in the block.
 
     Args:
-        topic: to be published on.
-        frames: of the pose, and of the twist and of what moves.
+        topic: of the message.
+        frames: of the pose, and of the twist and the child.
         places: of position, orientation, twist and, if they change, both covariances.
 
     """

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics of a robot's sensors: the newest plausible messages, as arrays."""
+"""Topics of a robot's sensors: the newest plausible messages, as arrays."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
@@ -58,14 +58,14 @@ TURNED, SWUNG = 2.0 * math.pi, 20.0
 
 
 class JointLayout:
-    """The layout of a publisher's joint states, the same for all messages with the same names.
+    """Layout of a publisher's joint states, shared by all messages with the same names.
 
     Attributes:
         wrong: why the messages cannot be used, or ''.
-        position, velocity, effort: the byte at which the joints' doubles begin, in the message's
-            own order; None where there are none.
+        position, velocity, effort: first byte of the joints' doubles, in the message's order; None
+            if missing.
         places: index of each wanted joint in the message, shape (joints,).
-        same: bytes, from and to, that tell the layout: names and counts.
+        same: range of bytes that identifies the layout: names and counts.
 
     """
 
@@ -113,13 +113,13 @@ class JointLayout:
 
 
 def legs_of(data: bytes, legs: Sequence[str]) -> np.ndarray:
-    """Return the index of each leg among the numbers of a Float64MultiArray, shape (legs,).
+    """Return each leg's index among the numbers of a Float64MultiArray, shape (legs,).
 
-    Its first dimension's label may name them, with commas in between; otherwise they come in
-    the given order.
+    The first dimension's label may name the legs, separated by commas; the default is the given
+    order.
 
     Raises:
-        ValueError: it has not one number a leg.
+        ValueError: it does not have one number for each leg.
 
     """
     message = deserialize_message(data, Float64MultiArray)
@@ -132,31 +132,31 @@ def legs_of(data: bytes, legs: Sequence[str]) -> np.ndarray:
 
 
 class _Input:
-    """One topic: its subscription, its monitor, and where its numbers go.
+    """One topic: subscription, monitor, and destination of its numbers.
 
     Attributes:
         messages: the subscription.
         monitor: see InputMonitor.
-        struct: how ``tick.c`` reads them.
+        struct: by which ``tick.c`` reads them.
 
     """
 
     def __init__(self, messages: PolledSubscription, monitor: InputMonitor, struct: native.Input,
                  unreadable: np.ndarray) -> None:
-        """Take messages; unreadable is Senses' of the input, shape (1,)."""
+        """Subscribe; unreadable is Senses' of the input, shape (1,)."""
         self.messages, self.monitor, self.struct = messages, monitor, struct
         self._unreadable = unreadable
         self.expect((), 0)
 
     def expect(self, places: Sequence[int] | np.ndarray, length: int, known: bytes = b'',
                same: Sequence[tuple[int, int]] = (), wrong: str = '') -> None:
-        """Read messages of a layout from now on.
+        """Expect messages of a layout from now on.
 
         Args:
-            places: first byte of each number; below 0 from the end.
-            length: of the messages, bytes; below 0 that of the shortest ones.
+            places: first byte of each number; negative from the end.
+            length: of the messages, bytes; negative for the shortest ones.
             known: one of them.
-            same: bytes of it that all messages must have, from and to.
+            same: range of its bytes that all messages must have.
             wrong: why they cannot be used, or ''.
 
         """
@@ -190,12 +190,12 @@ class SensorInput:
 
         Args:
             node: that subscribes.
-            robot: that has the sensors.
-            geometry: of its legs; of a robot whose efforts cannot be the contacts, its weight, N.
+            robot: with the sensors.
+            geometry: of its legs; for a robot whose efforts cannot give contacts, its weight, N.
             imu: topic of its sensor_msgs/Imu.
             joints: topic of its measured sensor_msgs/JointState.
             contacts: one of CONTACTS.
-            feet: topic of the Float64MultiArray, or the name below each leg's of its
+            feet: topic of the Float64MultiArray, or suffix to each leg's name for its
                 WrenchStamped.
             mount: roll, pitch and yaw of the IMU in the base's frame, rad.
             latest: largest age of stamped measurements when they are used, s.
@@ -245,7 +245,7 @@ class SensorInput:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Let C take the messages meanwhile."""
+        """Let C take the messages in the meantime."""
         with ExitStack() as kept:
             for one in self.inputs:
                 kept.enter_context(one.messages.handle)
@@ -313,7 +313,7 @@ class SensorInput:
         self._take_in(*arguments)
 
     def _learn(self, number: int, one: _Input, data: bytes) -> None:
-        """Find out where the numbers are in messages of a new layout."""
+        """Find the positions of the numbers in messages of a new layout."""
         places: Any = ()
         same: Sequence[tuple[int, int]] = ()
         wrong = f'messages of {len(data)} bytes'

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Switches the feedback of a generator on and off, as its parameters say."""
+"""Switch of a generator's feedback, controlled by parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -96,7 +96,7 @@ def _specs(gains: Mapping[str, Gain], values: Any) -> dict[str, Spec]:
 
 
 def of_gains(usual: Gains) -> dict[str, Spec]:
-    """Return the parameters of the laws, whose defaults are these gains."""
+    """Return the parameters of the laws, with these gains as defaults."""
     return {**{f'{PREFIX}{law.name}': Spec(getattr(usual, law.name), law.text) for law in LAWS},
             **_specs(GAIN_OF, usual)}
 
@@ -110,7 +110,7 @@ BIPED_GAINS = _specs(BIPED_GAIN_OF, BipedGains())
 
 
 def specs(robot: Robot) -> dict[str, Spec]:
-    """Return all parameters of a robot's feedback but its switch.
+    """Return all parameters of a robot's feedback except its switch.
 
     Raises:
         InputError: the robot file has gains of a biped that cannot be used.
@@ -127,7 +127,7 @@ def specs(robot: Robot) -> dict[str, Spec]:
 
 
 def missing_requirements(robot: Robot) -> str:
-    """Return the requirement of feedback that this machine or the robot file lacks, or ''."""
+    """Return a requirement of feedback that the machine or the robot file lacks, or ''."""
     if not COMPILED:
         return 'it needs numba, which is not installed'
     if robot.biped is not None:
@@ -150,13 +150,13 @@ def partial_legs(robot: Robot) -> list[str]:
 
 
 def default_enabled(node: Any, robot: Robot, combined: str, commands: bool) -> Spec:
-    """Return the parameter that enables the feedback, by default true where nothing prevents it.
+    """Return the parameter that enables the feedback; its default is true if nothing prevents it.
 
-    On a robot's controllers the user enables it, who has checked the signs of its sensors.
+    With controllers it is false: the user enables it after a check of the sensors' signs.
 
     Args:
         node: that has declared the feedback's topics.
-        robot: to be corrected.
+        robot: to correct.
         combined: topic of all joints that the node publishes, or ''.
         commands: whether the node commands controllers.
 
@@ -172,12 +172,11 @@ def default_enabled(node: Any, robot: Robot, combined: str, commands: bool) -> S
 
 
 class FeedbackSwitch:
-    """The feedback of a generator, made when it is first switched on.
+    """Feedback of a generator, created when it is first switched on.
 
     Attributes:
-        loop: a FeedbackLoop, or the BalanceLoop of a robot with soles; None as long as it has not
-            been on.
-        blocks: messages that ``tick.c`` publishes of it.
+        loop: a FeedbackLoop, or the BalanceLoop of a robot with soles; None until it is first on.
+        blocks: its messages, which ``tick.c`` publishes.
 
     """
 
@@ -186,12 +185,12 @@ class FeedbackSwitch:
 
         Args:
             node: a StartedNode.
-            pattern: to be corrected; a BalancedPattern of a robot with soles.
+            pattern: to correct; a BalancedPattern for a robot with soles.
             motion: returns the wanted motion of the robot.
             own: topics that the node publishes itself, resolved.
 
         Raises:
-            StartError: the feedback is enabled, and cannot be on.
+            StartError: the feedback is enabled, but cannot be on.
 
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
@@ -232,7 +231,7 @@ class FeedbackSwitch:
         return f'no feedback: {obstacle}' if obstacle else ''
 
     def refuses(self, plan: GaitPlan) -> str:
-        """Return why a gait cannot be run, or ''; point feet run it without an efference copy."""
+        """Return why a gait cannot run, or ''; point feet run it without an efference copy."""
         if self._biped is None or plan.balanced or not self._value('enabled'):
             return ''
         return f'gait {plan.gait} cannot be balanced (supported: {", ".join(GAIT_SPEEDS)})'
@@ -255,7 +254,7 @@ class FeedbackSwitch:
                 self.apply()
 
     def _make(self) -> FeedbackLoop:
-        """Return the loop, its kernels compiled."""
+        """Return the loop, with compiled kernels."""
         # It loads numba.
         from cpg_ros.feedback.by_address import warm_up
         robot, pattern = self._pattern.robot, self._pattern
@@ -282,7 +281,7 @@ class FeedbackSwitch:
         return loop
 
     def _make_balance(self) -> BalanceLoop:
-        """Return the loop of a biped, its kernels compiled."""
+        """Return the loop of a biped, with compiled kernels."""
         pattern, biped = self._pattern, self._biped
         assert isinstance(pattern, BalancedPattern) and biped is not None
         if self._started:
@@ -316,7 +315,7 @@ class FeedbackSwitch:
             self.loop.sense(dt, 1e-9 * stamp)
 
     def renew(self) -> None:
-        """Pass requests on to ticks outside the interpreter; log the delays once they matter."""
+        """Pass requests on to ticks outside the interpreter; log delays once they matter."""
         if self.loop is None:
             return
         self.loop.renew()
@@ -339,7 +338,7 @@ class FeedbackSwitch:
             self._held.publish(stamp, self.loop.held_angles)
 
     def restart(self) -> None:
-        """Start again, as where simulated time jumps back."""
+        """Restart after a jump back of simulated time."""
         if self.loop is not None:
             self.loop.restart()
 
@@ -350,7 +349,7 @@ class FeedbackSwitch:
 
     @property
     def recovering(self) -> bool:
-        """Whether the robot recovers from a push, with strides faster than servos follow."""
+        """Whether the robot recovers from a push, with strides faster than servos can follow."""
         return (self._biped is None and self.loop is not None
                 and bool(self.loop.feedback.memory.stiff_for[0] > 0.0))
 

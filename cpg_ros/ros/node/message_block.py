@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages that are serialised once, and whose numbers are written into the bytes every tick."""
+"""Messages that are serialised once; every tick writes the numbers into the bytes."""
 
 from array import array
 from collections.abc import Iterator, Sequence
@@ -36,7 +36,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 # Message types by name: the class, and the text of the fields.
 
 class UnknownType(CpgError):
-    """A type of messages that is not installed here; one line."""
+    """A message type is not installed here; one line."""
 
     exit_code = 1
 
@@ -77,13 +77,13 @@ STAMP, DURATION, NUMBERS = (0, 1), (2, 3), 4
 
 @dataclass
 class Template:
-    """A message whose numbers change.
+    """A message with numbers that change.
 
     Attributes:
         message: with everything else filled in.
-        stamps, durations: those parts of it that have ``sec`` and ``nanosec``.
-        numbers: part, name of its field, a double or a sequence of them, and which of the
-            block's numbers go there.
+        stamps, durations: parts with ``sec`` and ``nanosec``.
+        numbers: part, name of its field (a double or a sequence of doubles), and indices of its
+            numbers in the block.
 
     """
 
@@ -93,13 +93,13 @@ class Template:
     numbers: list[tuple[object, str, np.ndarray]] = field(default_factory=list)
 
     def serialised(self) -> tuple[bytes, np.ndarray, np.ndarray]:
-        """Return the bytes, which words of them change, and the block's words that go there.
+        """Return the bytes, the indices of the words that change, and their words in the block.
 
-        Everything that changes is given a unique value, which is then searched for in the bytes:
-        nothing need be known of the middleware's layout.
+        Each changing number gets a unique value, which is then found in the bytes, so that the
+        middleware's layout need not be known.
 
         Raises:
-            ValueError: something is not found, or not where a word begins.
+            ValueError: a value is not found, or not at the begin of a word.
 
         """
         marks: list[tuple[bytes, np.ndarray]] = []
@@ -139,7 +139,7 @@ def each(message: object, fields: str, places: np.ndarray
 
 
 def _exact(message: Any) -> bytes:
-    """Serialise a message, without the padding that rclpy's serialiser may leave at the end.
+    """Serialise a message without the padding that rclpy's serialiser may append.
 
     Typed messages are published without it, and strict readers of bags reject it.
     """
@@ -154,7 +154,7 @@ def _exact(message: Any) -> bytes:
 
 
 class MessageBlock:
-    """Publishes messages that lie in one block of memory, filled by one assignment.
+    """Publisher of messages in one block of memory, filled by one assignment.
 
     Attributes:
         topics: of the messages, resolved.
@@ -163,11 +163,11 @@ class MessageBlock:
 
     def __init__(self, node: Node, sizes: Sequence[int],
                  templates: Sequence[tuple[str, Template]]) -> None:
-        """Make a publisher for each message.
+        """Create a publisher for each message.
 
         Args:
             node: that publishes.
-            sizes: sizes of the parts of the array from which the messages are filled.
+            sizes: of the parts of the array that fills the messages.
             templates: topic and message, in the order of publishing.
 
         """
@@ -233,7 +233,7 @@ class MessageBlock:
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Keep the publishers, should another thread destroy the node meanwhile."""
+        """Keep the publishers alive, in case another thread destroys the node."""
         for handle in self._handles:
             handle.__enter__()
         try:

@@ -14,7 +14,7 @@
 
 """The part of a tick outside the interpreter: ``tick.c``, compiled, and middleware functions.
 
-Calls into the library let other threads of Python run.
+Calls into the library release the interpreter's lock.
 """
 
 import ctypes
@@ -55,7 +55,7 @@ class Counters(ctypes.Structure):
 
 
 class Output(ctypes.Structure):
-    """The struct ``output`` of ``tick.c``: a block, and where the numbers of its parts are."""
+    """The struct ``output`` of ``tick.c``: a block, and addresses of its parts' numbers."""
 
     _fields_ = (*((name, ctypes.c_void_p) for name in ('to', 'from', 'sizes')),
                 *((name, ctypes.c_int64) for name in ('parts', 'every', 'since', 'quiet')),
@@ -121,7 +121,7 @@ def library() -> ctypes.CDLL:
     """Return the library.
 
     Raises:
-        NoCompiler: it has not been compiled yet, and cannot be.
+        NoCompiler: it is not in the cache, and cannot be compiled.
 
     """
     text = _SOURCE.read_text()
@@ -137,7 +137,7 @@ def library() -> ctypes.CDLL:
 
 @cache
 def _allocator() -> Any:
-    """Return the middleware's allocator of memory, as Serialized has it."""
+    """Return the middleware's memory allocator, as in Serialized."""
     default = ctypes.CDLL(rclpy_implementation.__file__).rcutils_get_default_allocator
     default.restype = type('Allocator', (ctypes.Structure,), {
         '_fields_': [('functions', 5 * ctypes.c_void_p)]})
@@ -145,7 +145,7 @@ def _allocator() -> Any:
 
 
 def empty_message() -> Serialized:
-    """Return a serialised message that the middleware enlarges as it needs to."""
+    """Return a serialised message that the middleware enlarges as needed."""
     return Serialized(allocator=_allocator())
 
 

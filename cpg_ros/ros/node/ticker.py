@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A thread that ticks on absolute deadlines, by the steady clock or by simulated time."""
+"""A thread that ticks at absolute deadlines, by the steady clock or by simulated time."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -53,7 +53,7 @@ class NoSuchCore(CpgError):
 
 @dataclass(frozen=True)
 class RealTime:
-    """Real-time settings that are requested of the scheduler.
+    """Real-time settings to request from the scheduler.
 
     Attributes:
         priority: of SCHED_FIFO, 0 for none.
@@ -78,13 +78,13 @@ class RealTime:
 
     @classmethod
     def of(cls, priority: int, cores: Sequence[int], lock: bool) -> 'RealTime':
-        """Return the request of the parameters' values; errors as of the class."""
+        """Return the settings of the parameters; errors as of the class."""
         return cls(priority, () if list(cores) == [-1] else tuple(cores), lock)
 
     def claim(self) -> tuple[list[str], list[str]]:
-        """Request it for the calling thread; return what is granted and what is refused.
+        """Request the settings for the calling thread; return what is granted and what is refused.
 
-        Each refusal is one line with the reason and what to set.
+        Each refusal is one line with the reason and the remedy.
         """
         granted, refused = [], []
         if self.lock:
@@ -108,7 +108,7 @@ class RealTime:
         return granted, refused
 
     def request(self, logger: RcutilsLogger) -> None:
-        """Request it for the calling thread, log the result, and continue in any case."""
+        """Request the settings for the calling thread, log the result, and continue anyway."""
         granted, refused = self.claim()
         for line in refused:
             logger.warning(line)
@@ -117,9 +117,9 @@ class RealTime:
 
 
 def _raise_others() -> None:
-    """Schedule the other threads before all ordinary processes, and after the calling one.
+    """Schedule the other threads above all ordinary processes, and below the calling thread.
 
-    Any of them may hold a lock of the interpreter or the middleware; one of them serves stops.
+    They may hold a lock of the interpreter or the middleware, and one of them serves stops.
     """
     own = threading.get_native_id()
     # Once more for what has been started meanwhile by one that was still an ordinary thread.
@@ -149,7 +149,7 @@ MOST_BEHIND = 1.0
 
 
 class TickThread(threading.Thread):
-    """A thread of ticks that counts them, and reports the exception that ends it.
+    """A thread that counts its ticks, and reports the exception that ends it.
 
     Attributes:
         rate: of the ticks, Hz.
@@ -166,31 +166,31 @@ class TickThread(threading.Thread):
 
     @property
     def ticks(self) -> int:
-        """Ticks so far."""
+        """Number of ticks."""
         return self.count.ticks
 
     @property
     def late(self) -> int:
-        """Ticks that began more than a period after their deadline."""
+        """Number of ticks that began more than a period after their deadline."""
         return self.count.late
 
     @property
     def dropped(self) -> int:
-        """Periods left out."""
+        """Number of periods without a tick."""
         return self.count.dropped
 
     @property
     def worst(self) -> float:
-        """Longest delay of a tick since this was last read, s."""
+        """Longest delay of a tick since the last reading, s."""
         worst, self.count.worst = self.count.worst, 0
         return 1e-9 * worst
 
     def end(self) -> None:
-        """Stop after the tick under way."""
+        """Stop after the present tick."""
         self._ending.set()
 
     def run(self) -> None:
-        """Tick until ended; hand any exception to ``failed``."""
+        """Tick until ended; pass any exception to ``failed``."""
         try:
             self._run()
         except BaseException as error:
@@ -201,17 +201,17 @@ class TickThread(threading.Thread):
 
 
 class Ticker(TickThread):
-    """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
+    """Thread that calls ``tick(dt, stamp)`` once a period, dt in s, stamp in ns of ROS time.
 
     Deadlines stay on their grid, and stamps are deadlines. A tick that is late by less than a
-    period is made up for at once; after a stall the periods that have passed are left out, and
+    period is followed at once by the next; after a stall the missed periods are skipped, and
     ``resume`` gets its length in s. With simulated time the deadlines are instants of ``/clock``,
     and a jump back calls ``restart``; after ``stop_moving`` the ticker continues by the steady
-    clock if ``/clock`` stands still for .2 s or jumps back. All of this is done in ``tick.c``.
+    clock if ``/clock`` stands still for .2 s or jumps back. ``tick.c`` does all of this.
 
     Attributes:
-        jumps: of simulated time back.
-        paused: set by whoever ticks: the ticks go on, but nothing is done at them.
+        jumps: number of jumps back of simulated time.
+        paused: set by the tick: ticks continue but do nothing.
         loop: shared with ``tick.c``.
 
     """
@@ -224,16 +224,16 @@ class Ticker(TickThread):
         """Prepare to tick.
 
         Args:
-            node: whose clock says whether time is simulated.
+            node: whose clock decides about simulated time.
             rate: of the ticks, Hz.
             tick: called with dt and stamp.
-            restart: called where simulated time jumps back.
+            restart: called when simulated time jumps back.
             failed: called with the exception that ended the thread.
-            resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
-            begin: called first thing in the thread.
-            prepare: called with the loop in the thread, first and after ``attend``; it may fill in
-                what does the coming ticks in place of ``tick``, which is kept while the result is
-                entered.
+            resume: called after a stall; None to catch up with up to MOST_BEHIND instead.
+            begin: called first in the thread.
+            prepare: called with the loop in the thread, first and after ``attend``; it may enter
+                what does the following ticks in place of ``tick``. Its result is kept alive
+                meanwhile.
 
         """
         super().__init__('ticker', rate, failed)
@@ -263,12 +263,12 @@ class Ticker(TickThread):
         self.count.stopping = stopping
 
     def end(self) -> None:
-        """Stop after the tick under way."""
+        """Stop after the present tick."""
         super().end()
         self.attend()
 
     def stop_moving(self) -> None:
-        """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
+        """While ``stopping``, tick by the steady clock if ``/clock`` stands still."""
         self.stopping = True
 
     def attend(self) -> None:
