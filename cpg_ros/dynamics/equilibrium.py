@@ -50,7 +50,7 @@ class NoEquilibrium(CpgError):
 class Quotient(Field[Network]):
     """A network with all cells equal: a cell that is its own input, now and a delay ago.
 
-    Of parameters that each cell has of its own, the first cell's count.
+    If cells differ in a parameter, the first cell's value counts.
     """
 
     def __init__(self, network: Network) -> None:

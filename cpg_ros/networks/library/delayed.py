@@ -157,8 +157,8 @@ class Delayed(Network):
 def _presets(network: type[Delayed]) -> dict[str, Preset]:
     """Return a preset for each gait of any number of legs; the signs of c and d select it.
 
-    Of the two waves that exist, d makes the wanted one the faster (Im A > 0), which is attracting;
-    a gives all waves the same Re A, up to rounding.
+    d makes the wanted one of the two waves the faster (Im A > 0), which attracts; a gives all
+    waves the same Re A, up to rounding.
     """
     presets = {}
     for gait, (j, k) in network.modes().items():

@@ -68,7 +68,7 @@ class StartSequence(threading.Thread):
                  ) -> None:
         """Carry out ``steps``, which may raise StartRefused; then call ``on_end``.
 
-        It gets the reason why the robot was not started, or ''.
+        Its argument is the reason why the robot was not started, or ''.
         """
         super().__init__(name='start', daemon=True)
         self._steps, self._on_end = steps, on_end
@@ -274,7 +274,7 @@ class BridgeNode(StartedNode):
         return {}
 
     def dry_report(self) -> str:
-        """Return what the last command would ask of the motors, for the log of a dry run."""
+        """Return what the last command would demand of the motors, for the log of a dry run."""
         command, robot = self.supervisor.command, self.supervisor.robot
         torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
         return f'the largest torque would be {abs(torque).max():.1f} N m'
@@ -377,7 +377,7 @@ class BridgeNode(StartedNode):
         self.log_step('receiving robot state')
 
     def _others(self) -> str:
-        """Return who else commands the robot, or ''."""
+        """Return the other nodes that command the robot, or ''."""
         return others_on(self, self.topic, int(not self.dry), self._value('own_publishers'),
                          f'{self.get_namespace().rstrip("/")}/{self.interface.watchdog_name()}')
 
@@ -522,7 +522,7 @@ class BridgeNode(StartedNode):
             self._begin_start()
 
     def _leave(self, number: int, _: Any) -> None:
-        """Sit down, damp and end at a signal; damp at once at a repeated one."""
+        """Sit down, damp and end at a signal; damp at once at a second one."""
         name, now = signal.Signals(number).name, time.monotonic()
         again, self._ending = self._ending, True
         if again and now < self._ended_at + ONE_PRESS:

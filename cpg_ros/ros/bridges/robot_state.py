@@ -27,7 +27,7 @@ import numpy as np
 # The parameters that every bridge has.
 
 def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
-    """Return the specs of a bridge's parameters: ``others`` are those that only it has."""
+    """Return the specs of a bridge's parameters; ``others`` are those of this bridge alone."""
     return {
         'robot': Spec(robot, 'robot file, or the name of a shipped one',
                       constraints='a shipped name, or the path of a YAML file'),
@@ -86,7 +86,7 @@ class RobotState:
 
     @property
     def tick(self) -> int:
-        """The robot's own counter of its states, which must not stand still; 0 for none."""
+        """The robot's own counter of its states, which must advance; 0 for none."""
         return 0
 
     @property
@@ -138,15 +138,15 @@ class BridgeSettings(ShortRepr):
         names: of the joints.
         kp: N m / rad.
         kd: N m s / rad.
-        torque: largest that a command may ask for, N m.
+        torque: largest one of a command, N m.
         lower: smallest angles, rad.
         upper: largest angles, rad.
         velocity: largest speeds of commanded angles, rad/s.
         stand: pose to rise to, rad.
         lying: pose to sit down to, rad.
-        most_kp: up to which a generator's feedback may scale kp, N m / rad.
-        period: between two commands, s.
-        damping: kd with which joints are only damped, N m s / rad.
+        most_kp: limit to which a generator's feedback may scale kp, N m / rad.
+        period: of commands, s.
+        damping: kd of joints that are only damped, N m s / rad.
         rise: time from the measured pose to the stand, s.
         approach: time from the stand to the first targets, s.
         late: time at the last target after which the legs gather at the stand, s.
@@ -157,12 +157,12 @@ class BridgeSettings(ShortRepr):
         state_timeout: longest time without a fresh state, s.
         tilt: largest tilt of the body, rad.
         hottest: motor temperature at which the robot is damped, deg C.
-        margin: how far measured angles may exceed the joint limits, rad: a swinging leg runs
-            into its stop.
+        margin: tolerance of measured angles beyond the joint limits, rad: a swinging leg runs into
+            its stop.
         astray: largest distance from the stand after rising, rad.
-        tracking_error: largest mean distance of a joint from its commanded angle while it
-            follows targets, rad.
-        tracking_time: over which that mean is taken, s.
+        tracking_error: largest mean distance of a joint from its commanded angle while it follows
+            targets, rad.
+        tracking_time: time constant of that mean, s.
 
     """
 

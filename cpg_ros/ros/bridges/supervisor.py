@@ -14,8 +14,8 @@
 
 """The state machine of a bridge: rise, stand, follow, sit, damp.
 
-Only a new start leaves ``damping``. docs/how_to/unitree.md lists every way there and the times,
-in the section What the bridge does when something goes wrong.
+Only a new start leaves ``damping``. docs/how_to/unitree.md lists all transitions to it and the
+times, in the section What the bridge does when something goes wrong.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ import numpy as np
 # Checks of a robot's state; a fault that they find damps the joints at once.
 
 class SafetyChecks:
-    """Checks a state for everything that makes any motion unsafe."""
+    """Checks a state for all conditions that make any motion unsafe."""
 
     def __init__(self, settings: BridgeSettings, state: RobotState) -> None:
         """Check ``state`` against the limits of ``settings``."""
@@ -141,10 +141,10 @@ FRESH = 0.2
 
 
 class TrackingMonitor:
-    """Finds the joint that does not follow its commands: one that is far from them, or is stuck.
+    """Finds a joint that does not follow its commands: one that is far from them, or is stuck.
 
-    A joint that is stuck amid a gait is at its commanded angle twice in a stride, so the mean of
-    |commanded - measured| counts: an exponential one, of the time constant ``tracking_time``. A
+    A joint that is stuck amid a gait is at its commanded angle twice in a stride, so the criterion
+    is the exponential mean of |commanded - measured|, with the time constant ``tracking_time``. A
     joint that is late by some time has the mean error of its mean speed times that time. A joint
     that is stuck within a small swing is never far away, but its range is small.
     """
@@ -155,13 +155,13 @@ class TrackingMonitor:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all errors."""
+        """Discard all errors."""
         self._mean = np.zeros(len(self._settings.names))
         self._still, self._stuck = np.zeros((2, self._mean.size), dtype=bool)
         self._begin_window()
 
     def _begin_window(self) -> None:
-        """Forget the commanded and measured extremes, rad, (2, joints), and the time so far, s."""
+        """Discard the commanded and measured extremes, rad, (2, joints), and the time, s."""
         self._low, self._window = np.full((2, self._mean.size), math.inf), 0.0
         self._high = -self._low
 
@@ -186,7 +186,7 @@ class TrackingMonitor:
                 f'on average (tracking_error {settings.tracking_error:g} rad)')
 
     def _find_stuck(self, angles: np.ndarray, dt: float) -> str:
-        """Add commanded and measured angles, rad, (2, joints); say which joint is stuck, or ''."""
+        """Add commanded and measured angles, rad, (2, joints); name a stuck joint, '' for none."""
         settings = self._settings
         self._low, self._high = np.minimum(self._low, angles), np.maximum(self._high, angles)
         self._window += dt
@@ -234,11 +234,11 @@ class Supervisor:
 
     Attributes:
         robot: the measured state; readers of a new one then call ``state_received``.
-        command: to be sent after ``step``.
+        command: to send after ``step``.
         targets: of a generator.
         state: of the bridge.
-        reason: why it is in this state.
-        tracking: how far joints are from their commanded angles.
+        reason: for this state.
+        tracking: distances of joints from their commanded angles.
         kp_scale: factor of kp while the robot follows targets, up to the settings' most_kp.
 
     """
@@ -261,7 +261,7 @@ class Supervisor:
     # -- events ---------------------------------------------------------------------------
 
     def state_received(self, now: float) -> None:
-        """Note that ``robot`` was read now, s; unless the robot's counter stands still."""
+        """Record that ``robot`` was read now, s, unless the robot's counter stands still."""
         if self.robot.tick == 0 or self.robot.tick != self._counter:
             self._received, self._counter = now, self.robot.tick
 
@@ -287,7 +287,7 @@ class Supervisor:
             self.reject_target('a target is not a number', now)
 
     def reject_target(self, reason: str, now: float) -> None:
-        """Note that a target cannot be used; damp at once if the robot follows targets."""
+        """Record that a target cannot be used; damp at once if the robot follows targets."""
         if self.state is BridgeState.FOLLOWING:
             self.damp(now, reason)
 
@@ -337,7 +337,7 @@ class Supervisor:
 
     @property
     def damping(self) -> np.ndarray:
-        """Gains kd with which joints are only damped, N m s / rad, shape (joints,)."""
+        """Gains kd of joints that are only damped, N m s / rad, shape (joints,)."""
         return self._limited(self._settings.damping)
 
     def _limited(self, kd: float | np.ndarray) -> np.ndarray:

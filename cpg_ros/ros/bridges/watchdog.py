@@ -14,10 +14,9 @@
 
 """A process that damps the robot while its bridge is silent: see ``TickMonitor``.
 
-The bridge starts it: ``python -m cpg_ros.ros.bridges.watchdog`` INTERFACE DOMAIN NAMESPACE
-TOPIC PERIOD TIMEOUT PROCESS. It ends when a bridge reports that the robot is at rest, or when the
-bridge ends before it ever drove the robot. It accepts connections from
-processes of its own user only.
+The bridge starts it: ``python -m cpg_ros.ros.bridges.watchdog`` INTERFACE DOMAIN NAMESPACE TOPIC
+PERIOD TIMEOUT PROCESS. It ends when a bridge reports that the robot is at rest, or when the bridge
+ends before it ever drove the robot. It accepts connections only from processes of the same user.
 """
 
 import contextlib
@@ -52,7 +51,7 @@ SPARED = '-1000'
 
 
 def spared() -> bool:
-    """Ask the kernel to spare this process when memory runs out; return whether it agrees."""
+    """Ask the kernel to spare this process when memory is exhausted; return whether it agrees."""
     try:
         Path('/proc/self/oom_score_adj').write_text(SPARED)
     except OSError:

@@ -39,7 +39,7 @@ _CREDENTIALS = struct.Struct('3i')
 
 
 class NameTaken(CpgError):
-    """Another program has the name; the message says which, where that can be known."""
+    """Another program has the name; the message names it, if known."""
 
 
 def address(maker: str, kind: str, domain: int, topic: str) -> str:
@@ -170,8 +170,8 @@ class TickMonitor:
 
     Attributes:
         kd: gains for damping, N m s / rad, as sent with the last tick.
-        alarms: how often ticks have been missing.
-        ended: whether the process has announced its end, the robot at rest.
+        alarms: number of times that ticks were missing.
+        ended: whether the process has announced its end, with the robot at rest.
 
     """
 
@@ -204,7 +204,7 @@ class TickMonitor:
         return TickMonitor.HELLO + struct.pack('<d', timeout)
 
     def receive(self, message: bytes, now: float) -> None:
-        """Take a message of the process, now in s."""
+        """Process a message, now in s."""
         if message == self.END:
             self.ended = True
         elif message.startswith(self.HELLO):
@@ -338,7 +338,7 @@ class WatchdogLink:
         return ''
 
     def end(self) -> None:
-        """End the watchdog, the robot being at rest, and wait until it has ended.
+        """End the watchdog of a robot at rest, and wait until it has ended.
 
         A watchdog that damps for an earlier bridge continues if this one never drove the robot.
         """

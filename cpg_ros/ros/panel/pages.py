@@ -148,12 +148,12 @@ class Page:
 
     Attributes:
         connection: to the page.
-        number: of the page, the smallest that is free.
+        number: of the page, the smallest free one.
         stop_only: whether it can only stop the robot.
         node: the generator that it shows, '' for none.
         round_trip: upper bound from the panel to the page and back, s; 0 before it is known.
         lost_to: the page that has taken over from it, '' for none.
-        refused: the last reason it was given for not steering.
+        refused: the last given reason for not steering.
 
     """
 
@@ -188,7 +188,7 @@ class Page:
         return self.connection.transport.get_write_buffer_size()
 
     def keeps_up(self) -> bool:
-        """Return whether the page keeps up with frames; disconnect it if it never will."""
+        """Return whether the page receives frames in time; disconnect it if it never will."""
         now, waiting = time.monotonic(), self.waiting()
         if waiting < SLOW:
             self._fast = now
@@ -222,7 +222,7 @@ class Pages:
 
     @property
     def full(self) -> bool:
-        """Whether not even a page that can only stop the robot is admitted."""
+        """Whether no page is admitted any more, not even one that can only stop the robot."""
         return len(self.stopping) >= MOST_STOPPING
 
     @property
@@ -242,7 +242,7 @@ class Pages:
         return page
 
     def leave(self, page: Page) -> Page | None:
-        """Remove a page; return one that can do everything from now on, if there is one."""
+        """Remove a page; return one that is no longer limited to stopping, if there is one."""
         if page.stop_only:
             self.stopping.remove(page)
             return None

@@ -431,7 +431,7 @@ class Panel(StartedNode):
                 self._choose(page, first)
 
     def _note_starts(self, statuses: Iterable[DiagnosticStatus]) -> None:
-        """Note the progress of a node that is still starting."""
+        """Record the progress of a node that is still starting."""
         for status in statuses:
             node, _, part = status.name.partition(': ')
             if part == START:
@@ -475,7 +475,7 @@ class Panel(StartedNode):
             self._choose(page, first)
 
     def _first(self) -> str:
-        """Return the generator that a new page shows, the one in the panel's namespace, or ''.
+        """Return the generator for a new page: the one in the panel's namespace, or ''.
 
         A panel without a namespace shows any.
         """

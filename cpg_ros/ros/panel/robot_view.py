@@ -90,7 +90,7 @@ class Subscriptions:
         return list(self._topics)
 
     def receive(self, name: str) -> list[Any]:
-        """Return the messages that have arrived on a topic, none of one that is not followed."""
+        """Return the messages that have arrived on a topic; none if it is not followed."""
         topic = self._topics.get(name)
         return [message for message, _ in topic.receive()] if topic else []
 
@@ -181,7 +181,7 @@ class Controls:
 
 
 def _fitting(control: dict[str, Any], value: Any) -> Any:
-    """Return a value converted to the kind of its parameter."""
+    """Return a value converted to the type of its parameter."""
     kind, name = control['kind'], control['name']
     right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
     if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):

@@ -17,7 +17,7 @@
 A dead man's switch: the robot walks only as long as the page sends commands.
 
 The panel publishes on ``cmd_vel`` only while a page has the lease, and with a new publisher after
-every take-over. So panels on one graph see one another like any other node that steers: a
+every take-over. Panels on one graph therefore treat one another like any other node that steers: a
 publisher that has appeared since the take-over ends the steering until the holder confirms it.
 """
 
@@ -45,7 +45,7 @@ class Lease:
     """A robot's lease.
 
     Attributes:
-        holder: who may move the robot, None if nobody has the lease.
+        holder: who may move the robot, None for nobody.
         confirmed: ids of the other publishers beside which the holder has chosen to steer.
 
     """
@@ -79,7 +79,7 @@ class Lease:
             self._last_command = now
 
     def release(self, who: Hashable) -> bool:
-        """Give the lease back; return whether ``who`` held it."""
+        """End the lease of ``who``; return whether they held it."""
         held = self.holder is not None and who == self.holder
         if held:
             self._pass_to(None, 0.0)
@@ -111,8 +111,8 @@ class Teleop:
 
     Attributes:
         lease: of the robot.
-        target: forward speed in m/s and turn in rad/s, (0, 0) where nobody steers.
-        others: id -> node, of publishers on the topic that are not this one.
+        target: forward speed in m/s and yaw rate in rad/s, (0, 0) if nobody steers.
+        others: id -> node, of other publishers on the topic.
 
     """
 
@@ -171,7 +171,7 @@ class Teleop:
     # -- steering ---------------------------------------------------------------------------
 
     def steer(self, page: Page, stamp: float, now: float, speed: float, turn: float) -> None:
-        """Steer, by fractions of full deflection given after a stamp and received now, both in s.
+        """Steer by fractions of full deflection; given after a stamp and received now, both in s.
 
         Raises:
             LeaseError: another page has the lease, or other nodes steer.

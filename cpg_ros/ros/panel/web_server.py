@@ -47,16 +47,16 @@ class AccessError(CpgError):
 
 
 def token_for(host: str, setting: str, terminal: bool) -> str:
-    """Return the token to require; '' for none.
+    """Return the required token; '' for none.
 
     Args:
-        host: to listen on.
+        host: address to listen on.
         setting: the user's choice: a token, ``auto`` for a new one, or '' for none.
         terminal: whether there is a terminal to show a new token in.
 
     Raises:
-        AccessError: other machines would have access without a token; the token can be guessed;
-            or nobody would see a new one.
+        AccessError: other machines would have access without a token; the token can be guessed; or
+            nobody would see a new one.
 
     """
     if setting == AUTO:

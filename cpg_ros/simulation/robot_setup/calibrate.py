@@ -45,13 +45,13 @@ SAME = 0.02
 
 @dataclass(frozen=True)
 class Calibrated:
-    """Result of the calibration by a recording.
+    """Result of a calibration by a recording.
 
     Attributes:
         source: the bag.
-        gait: that was walked.
+        gait: of the recording.
         speed: forward, m/s.
-        cycles: strides that were averaged.
+        cycles: number of averaged strides.
         copy: of one speed.
 
     """
@@ -69,14 +69,16 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
 
     Args:
         recording: of one gait at one speed on flat ground.
-        robot: that walked.
-        gait: which it was; None lets the legs' phases tell.
-        speed: true one, m/s; None takes the estimate's, which feet that slip or are soft bias.
+        robot: of the recording.
+        gait: of the recording; None recognises it from the legs' phases.
+        speed: true one, m/s; None takes the estimate's, which is biased by feet that slip or are
+            soft.
 
     Raises:
-        InputError: the robot has no geometry, no gait can be told, or the robot does not know it.
+        InputError: the robot has no geometry, the gait is not recognised, or the robot does not
+            have it.
         NoSteadyGait: there is none in the recording.
-        Refused: the gait cannot be run.
+        Refused: the gait cannot run.
 
     """
     network, geometry = NETWORKS[robot.networks[0]], geometry_of(robot)
@@ -112,13 +114,13 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
 def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Sequence[int]) -> float:
     """Return by how many cycles the pattern's phase is ahead of the recording's.
 
-    The pattern's joints are those in place and any fraction of what full strides add.
+    The model of the joints is the stand plus any fraction of the full strides.
 
     Args:
         theta: phases of the recording, cycles, shape (m,).
         mean: angles there, rad, shape (m, joints).
         table: of the pattern.
-        columns: these joints among the pattern's.
+        columns: indices of these joints in the pattern.
 
     """
     still = table.in_place[:, columns]
@@ -134,10 +136,10 @@ def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Seque
 
 
 def with_efference(robot: Robot, calibrated: Sequence[Calibrated]) -> Robot:
-    """Return a robot that has these copies, beside those of its other speeds.
+    """Return a robot with these copies, beside its copies of other speeds.
 
-    A table takes SPEEDS of them. Where there would be more, what was recorded replaces what the
-    robot has of the nearest speeds.
+    A table takes SPEEDS of them. Beyond that, a recorded copy replaces the robot's copy of the
+    nearest speed.
 
     Raises:
         InputError: more speeds of a gait were recorded than a table takes.
@@ -222,7 +224,7 @@ def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calib
 
 
 def _comment(path: Path) -> str:
-    """Return the comment that a file begins with."""
+    """Return the comment at the beginning of a file."""
     lines = read_bytes(path, CpgError).decode().splitlines() if path.is_file() else []
     first = next((k for k, line in enumerate(lines) if not line.startswith('#')), len(lines))
     return '\n'.join(line[1:].removeprefix(' ') for line in lines[:first])

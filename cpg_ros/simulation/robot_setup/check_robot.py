@@ -145,7 +145,7 @@ def _compared(args: Namespace, description: RobotDescription) -> RobotCheck:
 
 
 def _given(texts: Sequence[str]) -> dict[str, str]:
-    """Return the legs that --legs gives, each with a part of its joints' names."""
+    """Return the legs in --legs, each with a part of its joints' names."""
     pairs = [text.partition('=') for text in texts]
     if wrong := [leg for leg, _, text in pairs if not (leg and text)]:
         raise InputError(f"--legs: '{wrong[0]}' is not LEG=TEXT, such as lf=leg1_")
@@ -201,7 +201,7 @@ def _biped(args: Namespace, robot: Robot, description: RobotDescription) -> tupl
 
 
 def _turned(args: Namespace, description: RobotDescription) -> Path:
-    """Write a URDF beside the given one with a root link that faces x; return its path."""
+    """Write a URDF beside the given one, with a root link that faces x; return its path."""
     if args.urdf is None:
         raise InputError(f'--forward {args.forward}: an MJCF file cannot be turned, as its base '
                          'moves freely: turn the parts of its base instead')

@@ -14,8 +14,8 @@
 
 """Comparison of a robot file with the robot's description: names, kinds, limits, shape, gaits.
 
-Legs are compared by forward kinematics: on which side they are, where the feet are in the stand,
-and which way they move while they are low.
+Legs are compared by forward kinematics: their side, the position of their feet in the stand, and
+the direction in which low feet move.
 """
 
 from collections.abc import Iterator, Sequence
@@ -74,7 +74,7 @@ class JointCheck:
     faults: tuple[str, ...]
 
     def as_dict(self, source: str) -> dict[str, Any]:
-        """Return it as plain types; limits in rad and rad/s, those described under a key."""
+        """Return it as plain types, limits in rad and rad/s; ``source`` keys those described."""
         keys = ('lower', 'upper', 'velocity')
         return {'name': self.joint.name, 'leg': self.joint.leg, 'matches': not self.faults,
                 'kind': self.described.kind if self.described else None,
@@ -89,12 +89,12 @@ class GaitCheck:
     """A gait on the robot.
 
     Attributes:
-        network, name: which.
-        frequency: strides per second (Hz), nan where there is no such gait.
-        room: least distance in rad of any joint from a limit; negative beyond it.
+        network, name: of the gait.
+        frequency: strides per second (Hz), nan for a gait that does not exist.
+        room: least distance of any joint from a limit, rad; negative beyond it.
         fraction: largest speed of any joint as a fraction of its limit.
-        room_at, share_at: the joints of these two.
-        faults: what does not fit.
+        room_at, share_at: joints of these two.
+        faults: of the gait.
 
     """
 
@@ -176,14 +176,14 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
     """Compare a robot file with the robot's description.
 
     Args:
-        robot: what the file says.
-        description: what a URDF or an MJCF file says of it.
+        robot: from the file.
+        description: of the robot, from a URDF or an MJCF file.
         names: of the two files, for messages.
         gaits: gaits or presets; by default all gaits of the robot's networks.
-        frequency: strides per second (Hz), 0 for the model's own time; None takes what the
-            robot file says of the gait, or else 1 Hz.
+        frequency: strides per second (Hz), 0 for the model's own time; None takes the robot file's
+            for the gait, or else 1 Hz.
         amplitude: factor on the readout weights.
-        geometry: that the description gives, if the file's is to be compared with it.
+        geometry: by the description, to compare with the file's; None for none.
 
     """
     near = _nearest(robot, description)
@@ -202,13 +202,13 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
 
 def walking_faults(robot: Robot, known: RobotDescription,
                    gaits: Sequence[tuple[str, str]] = ()) -> list[str]:
-    """Say by forward kinematics why a robot does not stand or walk forward.
+    """Return why a robot does not stand or walk forward, by forward kinematics.
 
     Args:
-        robot: what a robot file says.
+        robot: from a robot file.
         known: the description.
-        gaits: networks and their presets, of which the first that goes forward is looked at;
-            none for all gaits of the robot's first network.
+        gaits: networks and their presets, of which the first one that goes forward is checked;
+            empty for all gaits of the robot's first network.
 
     """
     own = robot.networks[0]
@@ -222,7 +222,7 @@ def walking_faults(robot: Robot, known: RobotDescription,
 
 
 def _chains(robot: Robot, known: RobotDescription) -> dict[str, LegChain]:
-    """Return the legs whose joints and foot the description has."""
+    """Return the legs with joints and foot in the description."""
     found = {}
     for leg, joints in robot.legs.items():
         if all(joint.name in known.joints and not known.joints[joint.name].flaw
@@ -234,7 +234,7 @@ def _chains(robot: Robot, known: RobotDescription) -> dict[str, LegChain]:
 
 
 def _lopsided(robot: Robot) -> Iterator[str]:
-    """Say which legs have fewer joints than those of the other side."""
+    """Return which legs have fewer joints than those of the other side."""
     for left, right in combinations(robot.legs, 2):
         sides = [robot.sides.get(leg) for leg in (left, right)]
         fewer, more = sorted((left, right), key=lambda leg: len(robot.legs[leg]))
@@ -245,7 +245,7 @@ def _lopsided(robot: Robot) -> Iterator[str]:
 
 
 def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
-    """Say which legs are on another side or end than the file says, and which do not stand."""
+    """Return which legs are on another side or end than in the file, and which do not stand."""
     chains, what = _chains(robot, known), known.format
     for one, other in combinations(chains, 2):
         x, y, _ = chains[one].anchors[0] - chains[other].anchors[0]
@@ -271,9 +271,9 @@ def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
 
 
 def sole_up(known: RobotDescription, last: str) -> np.ndarray:
-    """Return which way is up from the sole below a joint with all joints at 0, shape (3,).
+    """Return the upward direction at the sole below a joint, with all joints at 0, shape (3,).
 
-    It is the base's, unless the foot is flat on another side only.
+    It is that of the base, unless the foot is flat on another side only.
     """
     points, up = known.shapes(last), np.array([0.0, 0.0, 1.0])
     try:
@@ -286,7 +286,7 @@ def sole_up(known: RobotDescription, last: str) -> np.ndarray:
         for a, b, c in hull.simplices])
 
     def flat(down: np.ndarray) -> float:
-        """Return the area of the face on a side over that of the shadow on its plane."""
+        """Return the area of the face on a side, divided by that of the shadow on its plane."""
         return float(2.0 * areas[normals @ down > PLANE].sum()
                      / max(np.abs(normals @ down) @ areas, 1e-12))
 
@@ -298,7 +298,7 @@ def sole_up(known: RobotDescription, last: str) -> np.ndarray:
 
 
 def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator[str]:
-    """Say which feet move forward while they are low, or hardly move, in a gait forward."""
+    """Return which feet move forward while they are low, or hardly move, in a gait forward."""
     names = [joint.name for joint in robot.joints]
     readout, count = gait.readout, 64
     phases, points = np.arange(count) / count, readout.angles.shape[1]
@@ -340,7 +340,7 @@ def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
 
 
 def _differing(stated: BodyGeometry, found: BodyGeometry, what: str) -> Iterator[str]:
-    """Return lines on where a robot file's geometry differs; ``what`` is the other's format."""
+    """Return where a robot file's geometry differs, in lines; ``what`` is the other's format."""
     if found.mass > 0.0 and not 1.0 / MASS_RATIO <= stated.mass / found.mass <= MASS_RATIO:
         yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {found.mass:.4g} kg"
     for leg, own in stated.legs.items():
@@ -419,7 +419,7 @@ def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
 
 
 def unlimited(robot: Robot) -> Robot:
-    """Return a robot whose joints have no limits, so that no plan for it fails on one."""
+    """Return a robot whose joints have no limits, so that no plan for it fails at one."""
     return replace(robot, legs={leg: tuple(replace(
         joint, lower=-inf, upper=inf, velocity=inf) for joint in joints)
         for leg, joints in robot.legs.items()})
@@ -431,7 +431,7 @@ def _fastest(motion: Motion) -> float:
 
 
 def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
-    """Return for joints that the description does not have the likeliest of those it has."""
+    """Return the most similar names in the description for joints that it does not have."""
     there = {joint.name for joint in robot.joints}
     free = {name.lower(): name for name, joint in described.joints.items()
             if not joint.flaw and name not in there}
@@ -459,7 +459,7 @@ def _notes(robot: Robot, description: RobotDescription) -> Iterator[str]:
 
 
 def invented_limits(robot: Robot, what: str) -> list[str]:
-    """Say in a line which limits are guesses, if any, as the description does not have them."""
+    """Return a line on limits that are guesses because the description has none, or ''."""
     listed = [f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
               if joint.invented]
     return [f'limits that the {what} does not have are invented: {", ".join(listed)}'] * bool(

@@ -14,8 +14,8 @@
 
 """A first robot from a description: its stand by inverse kinematics, and small steps.
 
-Nothing depends on where joints have their zeros, in which sense they turn or what they are called:
-a leg is bent until its foot is below its hip, in a vertical plane, the way that the limits allow.
+Nothing depends on the joints' zeros, signs or names: a leg is bent, in a vertical plane and in the
+direction that its limits allow, until its foot is below its hip.
 """
 
 from dataclasses import dataclass, replace
@@ -73,7 +73,7 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
 
     Raises:
         DescriptionError: the links make no tree, a leg cannot be bent, a joint has no room to
-            move, or two legs have not five or six joints.
+            move, or two legs do not have five or six joints.
 
     """
     counts = {len(legs[leg]) for leg in legs}
@@ -117,16 +117,16 @@ def _range(joint: JointDescription) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class _StandingLeg:
-    """A leg that is to stand.
+    """A leg in the stand.
 
     Attributes:
         chain: its joints.
-        low, high: angles that it may have, rad, shape (joints,).
+        low, high: limits of the angles, rad, shape (joints,).
         bend: index of the first of the two joints that bend it.
-        top: of the joint below which its foot, or its ankle, is to be.
+        top: index of the joint below which its foot, or its ankle, is placed.
         end: of the foot, or of the ankle of a leg with a sole, among the points of the chain.
-        sole: which way is up from the sole with all joints at 0, None if it need not be level.
-        aside: of a leg that reaches to the side where femur and tibia are to end, m, else None.
+        sole: upward direction at the sole with all joints at 0, None if it need not be level.
+        aside: of a leg that reaches to the side, where femur and tibia end, m, else None.
         biped: whether it is one of two.
 
     """
@@ -182,13 +182,13 @@ class _StandingLeg:
 
     @property
     def height(self) -> float:
-        """From the foot or ankle up to the hip, m."""
+        """Height of the hip above the foot or ankle, m."""
         return (UPRIGHT if self.biped else CROUCHED) * float(sum(
             self.chain.lengths[self.top:self.end]))
 
     @property
     def ground(self) -> float:
-        """Where the foot would be by itself, m upward from the base."""
+        """Height of the ground that this leg would choose, m upward from the base."""
         if self.aside is not None:
             return float(self.aside[2])
         points = self.chain.posed(0.5 * (self.low + self.high))[1]
@@ -235,7 +235,7 @@ class _StandingLeg:
         return 0.0 if bulge > needed else OTHER_WAY if bulge < -needed else STRAIGHT
 
     def steps(self, angles: np.ndarray, legs: int) -> tuple[list[tuple[float, ...]], list[str]]:
-        """Return weights that swing the foot forward and up, rad, and what each joint does."""
+        """Return weights that swing the foot forward and up, rad, and the role of each joint."""
         axes, points, _ = self.chain.posed(angles)
         slopes = np.cross(axes, points[self.end] - points[:-1])
         if self.aside is not None:
@@ -263,7 +263,7 @@ class _StandingLeg:
 
 
 def _fitting(robot: Robot) -> Robot:
-    """Make weights small enough for all gaits at 1 Hz, all alike so that feet go straight."""
+    """Scale weights down to what all gaits allow at 1 Hz, all alike so that feet go straight."""
     low, high, fast = (robot.column(key) for key in ('lower', 'upper', 'velocity'))
     offset, fraction = robot.column('offset'), 1.0
     for network in robot.networks:

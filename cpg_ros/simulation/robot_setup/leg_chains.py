@@ -14,8 +14,8 @@
 
 """Legs of a robot's description: mirrored pairs of chains of joints that reach lowest.
 
-Anchors of joints and lengths between them do not depend on where joints have their zeros, so legs
-are found from these alone. Names decide only which way a robot faces and what is an arm.
+Anchors of joints and lengths between them do not depend on the joints' zeros, so they suffice to
+find the legs. Names only decide which way a robot faces, and which limbs are arms.
 """
 
 from collections.abc import Mapping, Sequence
@@ -64,12 +64,12 @@ MOST_JOINTS = 6
 
 def legs_in(description: RobotDescription, faces_x: bool = False,
             given: Mapping[str, str] | None = None) -> Legs:
-    """Find the legs of a robot; the explanation has a line for each thing that is held.
+    """Find the legs of a robot; the explanation has a line for each part that is held.
 
     Args:
         description: the description.
-        faces_x: whether x is forward, whatever names and axes say.
-        given: leg -> text that the names of its joints contain, of all legs; none to find them.
+        faces_x: whether x is forward, whatever names and axes suggest.
+        given: leg -> text in the names of its joints, for all legs; empty to find them.
 
     Raises:
         LegsError: there are no pairs of legs, or names and positions contradict each other.
@@ -102,7 +102,7 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
 
 
 def _paths(description: RobotDescription) -> list[tuple[str, ...]]:
-    """Return the joints that move from the root to each end."""
+    """Return the moving joints from the root to each end."""
     chains = {name: tuple(joint.name for joint in description.chain(name) if joint.kind != 'fixed')
               for name, joint in description.joints.items() if joint.kind != 'fixed'}
     inner = {name for chain in chains.values() for name in chain[:-1]}
@@ -147,13 +147,13 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
 
 
 def _bottom(limb: LegChain) -> float:
-    """Return how low a limb could reach, m."""
+    """Return the lowest height that a limb could reach, m."""
     return float(limb.anchors[0, 2] - sum(limb.lengths))
 
 
 def _limbs(description: RobotDescription, paths: Sequence[Sequence[str]], left: np.ndarray
            ) -> list[LegChain]:
-    """Return the longest chain of each part of the body that begins beside its middle."""
+    """Return the longest chain of each part of the body that begins off the middle plane."""
     aside = {name: abs(float(description.frame(name)[0] @ left)) for path in paths
              for name in path}
     middle = max(MIDDLE * max(aside.values(), default=0.0), 1e-6)
@@ -186,7 +186,7 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
 
 
 def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
-    """Ask which limbs are legs, with the option that says so."""
+    """Return a question about which limbs are legs, with the option that answers it."""
     axes = np.array([description.direction(name) for path in paths for name in path
                      if description.joints[name].kind in TURNING]).reshape(-1, 3)
     spread, ways = np.linalg.eigh(axes.T @ axes / max(len(axes), 1))
@@ -216,14 +216,14 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
 
 
 def _in_all(names: Sequence[str]) -> str:
-    """Return what names begin with alike, else the first of them."""
+    """Return the common beginning of names, else the first of them."""
     count = next((k for k, letters in enumerate(zip(*names, strict=False))
                   if len(set(letters)) > 1), 0)
     return names[0][:count] or names[0]
 
 
 def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return the legs whose joints' names say that they are elsewhere."""
+    """Return the legs whose joints' names contradict their positions."""
     wrong = []
     for leg, joints in legs.items():
         side, end = place_of(joints)
@@ -243,7 +243,7 @@ def _contradiction(description: RobotDescription, legs: Mapping[str, Sequence[st
 
 
 def _named(description: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
-    """Return the joints whose names contain the texts that were given."""
+    """Return the joints whose names contain the given texts."""
     if len(given) % 2 or set(given) != set(leg_names(len(given))):
         raise LegsError(f'--legs: {", ".join(given)} are not the names of two, four or six legs, '
                         f'which are {", ".join(leg_names(2))}; {", ".join(leg_names(4))}; '
@@ -284,7 +284,7 @@ def _cleaned(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -
 
 
 def _held(description: RobotDescription, leg: Sequence[str], name: str) -> str:
-    """Return why a joint of a leg is not driven, '' if it is."""
+    """Return why a joint of a leg is not driven, or ''."""
     joint = description.joints[name]
     if joint.mimic in leg:
         raise DescriptionError(f"the joint '{name}' follows '{joint.mimic}' of the same leg: legs "

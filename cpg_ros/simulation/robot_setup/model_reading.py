@@ -43,7 +43,7 @@ import numpy as np
 
 
 class SolesError(InputError):
-    """A biped's leg has nothing to stand on."""
+    """A leg of a biped has no sole."""
 
 
 def load_description(name: str) -> RobotDescription:
@@ -145,7 +145,7 @@ def _link(model: Any, data: Any, bodies: Sequence[int], place: np.ndarray, axes:
 
 
 def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
-    """Return points in the world that are a shape's corners but for a distance, both m."""
+    """Return points in the world, and the distance from them to the corners of a shape, both m."""
     mujoco, kind, round_ = engine(), model.geom_type[geom], 0.0
     size, frame = model.geom_size[geom], data.geom_xmat[geom].reshape(3, 3)
     if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
@@ -171,7 +171,7 @@ def _kind(mujoco: Any, model: Any, k: int) -> str:
 
 
 def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
-    """Return the least and the largest angle, rad (m of a slide), and velocity of a joint."""
+    """Return the smallest and largest angle, rad (m of a slide), and velocity of a joint."""
     lower, upper = _range(model, k)
     velocity = math.inf
     for motor in range(model.nu):
@@ -208,11 +208,11 @@ CROUCH = 0.01
 def read_biped(name: str, robot: Robot) -> BipedBody:
     """Return a robot file's part ``biped`` from a model.
 
-    Joints that are no leg's are held where all are at 0, or at the nearest angle they have.
+    Joints outside the legs are held at 0, or at the allowed angle nearest to it.
 
     Args:
         name: as ``robot_model.load`` takes it.
-        robot: its legs.
+        robot: with the legs.
 
     Raises:
         SimulationError: the model cannot be read.

@@ -43,9 +43,9 @@ def measure_efference(loop: ClosedLoopBatch,
     """Measure the motion of the body in a gait at several commanded speeds.
 
     Args:
-        loop: bodies, whose first gait it is.
-        speeds: commanded, m/s; by default as many as a table takes, from the slowest, which may
-            be backward, to the fastest. A gait that cannot be steered has only its own.
+        loop: bodies that walk their first gait.
+        speeds: commanded, m/s; by default as many as a table takes, from the slowest, which may be
+            backward, to the fastest. A gait without steering only has its own.
 
     """
     commanded: Sequence[float] | np.ndarray = [0.0]
@@ -69,19 +69,19 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
                kd: float | None = None) -> Robot:
     """Return a robot with the geometry of a model, and with efference copies measured on it.
 
-    A robot of whose legs feedback can displace none stays as it is.
+    A robot without a leg that feedback can displace is unchanged.
 
     Args:
         robot: whose first network is used.
         model: as of ``robot_model.load``.
-        gaits: that are measured; others keep theirs.
-        update: called with each gait when it has been measured.
-        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        gaits: to measure; others keep their copies.
+        update: called with each gait after its measurement.
+        kp: proportional gain of the joints, N m / rad; None for the default.
         kd: damping gain of the joints, N m s / rad; the same.
 
     Raises:
         SimulationError: the model cannot be used.
-        Refused: a gait cannot be run.
+        Refused: a gait cannot run.
         InputError: a robot did not go through all phases of a stride.
 
     """
@@ -113,8 +113,8 @@ class WalkRecording(ShortRepr):
         source: the bag.
         joints: names, leg by leg.
         times: of the IMU's stamps, rising, s, shape (n,).
-        senses: at these, n runs' worth.
-        phase: of the first leg's cell, as the generator told it, cycles, shape (n,), or None.
+        senses: at these times, as of n runs.
+        phase: of the first leg's cell, by the generator, cycles, shape (n,), or None.
 
     """
 
@@ -131,18 +131,18 @@ class WalkRecording(ShortRepr):
 
 
 def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> WalkRecording:
-    """Read the sensor data that feedback takes from a bag.
+    """Read the sensor data for feedback from a bag.
 
-    Unitree's LowState has all of them but the phase; it is read where the bag has no joint states.
+    Unitree's LowState has all of them except the phase; it is read if the bag has no joint states.
 
     Args:
         path: the bag.
-        robot: whose joints and legs are read.
+        robot: with the joints and legs to read.
         topics: their names, by the keys of TYPES.
 
     Raises:
-        RecordingError: the bag or a message cannot be read, a topic is missing or of another
-            type, or a joint or a leg is not in it.
+        RecordingError: the bag or a message cannot be read, a topic is missing or of another type,
+            or a joint or a leg is not in it.
 
     """
     # Loaded here: what tunes gaits needs no bags.
@@ -263,5 +263,5 @@ def _of_low_states(path: Path, robot: Robot, states: Sequence[tuple[int, bytes]]
 
 
 def _stamp(message: Any) -> float:
-    """Time of a message's header, ns."""
+    """Return the time of a message's header, ns."""
     return 1e9 * message.header.stamp.sec + message.header.stamp.nanosec

@@ -75,7 +75,7 @@ class ServoBridge(BridgeNode):
                             f'{self.get_fully_qualified_name()} {secrets.token_hex(4)}')
 
     def dry_report(self) -> str:
-        """Return how far the servos would have to go."""
+        """Return the distances that the servos would move."""
         away = np.abs(self.supervisor.command.q - self._state.q).max()
         return f'the largest way to a commanded angle would be {away:.2f} rad'
 

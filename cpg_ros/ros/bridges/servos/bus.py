@@ -67,33 +67,33 @@ def open_board(calibration: Calibration) -> ServoBoard:
 # The owner of the servos: the one sender whose commands drive them until torque is disabled.
 
 class CommandOwner:
-    """Accepts the commands of one sender and refuses those of all others.
+    """Accepts the commands of one sender and rejects those of all others.
 
-    The first sender whose command drives the servos owns them until torque is disabled. If it
-    is disabled without its doing, by its watchdog or a timeout, its commands stay refused until
-    it releases them, too: it does not know, and would move them at full speed from where they
-    have sunk to. A sender without a name, such as ``ros2 topic pub``, may go on.
+    The first sender whose command drives the servos owns them until torque is disabled. If its
+    watchdog or a timeout disables it, the sender's commands are rejected until it releases the
+    servos, too: it does not know, and would move them at full speed from where they have sunk to.
+    A sender without a name, such as ``ros2 topic pub``, may go on.
 
     Attributes:
         sender: whose commands are accepted; None while torque is disabled.
-        blocked: the sender that has to release the servos first, '' for none.
+        blocked: sender that must release the servos first, '' for none.
 
     """
 
     def __init__(self, watchdog: str) -> None:
-        """Have no owner; ``watchdog`` is a sender that may release the servos, too."""
+        """Start without an owner; ``watchdog`` is a sender that may release the servos, too."""
         self._watchdog = watchdog
         self.sender: str | None = None
         self.blocked = ''
 
     def may_drive(self, sender: str) -> bool:
-        """Take the servos for a sender if they are free; return whether it has them."""
+        """Give the servos to a sender if they are free; return whether it has them."""
         if self.sender is None and not (sender and sender == self.blocked):
             self.sender, self.blocked = sender, ''
         return sender == self.sender
 
     def may_release(self, sender: str) -> bool:
-        """Note that a sender releases the servos; return whether it may."""
+        """Record that a sender releases the servos; return whether it may."""
         if sender == self.blocked:
             self.blocked = ''
         if self.sender is None or sender not in (self.sender, self._watchdog):
@@ -102,7 +102,7 @@ class CommandOwner:
         return True
 
     def released(self, blocked: str) -> None:
-        """Have no owner any more; ``blocked`` has to release the servos first."""
+        """Remove the owner; ``blocked`` must release the servos first."""
         self.sender, self.blocked = None, blocked
 
 
@@ -247,7 +247,7 @@ class ServoBus(StartedNode):
         self.get_logger().warning(f'servo torque disabled: {reason}')
 
     def _failed(self, error: BaseException) -> None:
-        """End: in one line if it is the bus or a servo."""
+        """End the node, with a single line if the bus or a servo failed."""
         if not isinstance(error, OSError | CpgError):
             self._fail(error)
             return

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Calibration files of servos: which servo moves a joint, and how angles become its units."""
+"""Calibration files of servos: the servo of each joint, and the scale of its units."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,7 +35,7 @@ class Kind:
     Attributes:
         last: largest channel or identity.
         most: largest position in its units.
-        options: keys of the file that it has, with their defaults and limits.
+        options: its keys in the file, with defaults and limits.
 
     """
 
@@ -64,10 +64,10 @@ class Calibration(ShortRepr):
         joints: names, in the order of the file.
         channels: of the PCA9685, or identities of serial servos.
         centre: units at the angle 0.
-        per_rad: units a radian, negative where the servo turns the other way.
+        per_rad: units per radian, negative for a servo with the opposite sign.
         lower: smallest units.
         upper: largest units.
-        rest: angles in which the robot lies, rad.
+        rest: angles of the lying robot, rad.
 
     """
 

@@ -30,7 +30,7 @@ class ServoState(RobotState):
         self._names: tuple[str, ...] = ()
 
     def expect(self, names: tuple[str, ...]) -> None:
-        """Have these joints from now on, in this order."""
+        """Set the joints, in this order."""
         self._names = names
         self.q, self.dq = np.zeros((2, len(names)))
 
@@ -57,7 +57,7 @@ class ServoCommand(JointCommand):
 
 
 def sender_of(command: Float64MultiArray) -> str:
-    """Return who sent a command, '' if it does not say so."""
+    """Return the sender of a command, '' if it is not given."""
     dimensions = command.layout.dim
     return dimensions[0].label if dimensions else ''
 

@@ -67,7 +67,7 @@ def prescale(frequency: float) -> int:
 
 
 class Pca9685(ServoBoard):
-    """Up to 16 servos by pulses, in microseconds; where they are cannot be measured."""
+    """Up to 16 servos driven by pulses, in microseconds; their positions cannot be measured."""
 
     def __init__(self, bus: LinuxI2c, channels: tuple[int, ...], frequency: float) -> None:
         """Switch all pulses off, and set their frequency, Hz; channels are 0 to 15."""

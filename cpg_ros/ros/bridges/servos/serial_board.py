@@ -29,7 +29,7 @@ import numpy as np
 # The interface of every board of servos, and its error.
 
 class ServoError(CpgError):
-    """A servo or its bus cannot be used; the message says which, and why."""
+    """A servo or its bus cannot be used; the message names it and the reason."""
 
 
 class ServoBoard(Protocol):
@@ -48,13 +48,13 @@ class ServoBoard(Protocol):
         """Disable the torque of all servos."""
 
     def close(self) -> None:
-        """Give the bus back."""
+        """Close the board."""
 
 
 # A serial port without a library: raw bytes at a baud rate, by termios.
 
 class SerialPort:
-    """A serial port that never waits for longer than it is told to."""
+    """A serial port with a time limit for every operation."""
 
     def __init__(self, path: str, baud: int) -> None:
         """Open a port such as ``/dev/ttyUSB0``.
@@ -90,7 +90,7 @@ class SerialPort:
         termios.tcflush(self._file, termios.TCIFLUSH)
 
     def receive(self, until: float) -> bytes:
-        """Return what arrives next; b'' if nothing does before an instant of the steady clock."""
+        """Return the next bytes; b'' if none arrive before an instant of the steady clock."""
         ready, _, _ = select.select([self._file], [], [], max(0.0, until - time.monotonic()))
         return os.read(self._file, 4096) if ready else b''
 
@@ -105,7 +105,7 @@ ANSWER = 0.015
 
 @dataclass(frozen=True)
 class Reply:
-    """A servo's answer: its identity, the byte that reports errors, and the data asked for."""
+    """A servo's answer: its identity, the byte that reports errors, and the requested data."""
 
     servo: int
     error: int
@@ -135,12 +135,12 @@ class SerialBoard(ServoBoard):
     """Servos of one maker on one port."""
 
     def __init__(self, port: SerialPort, protocol: ServoProtocol, servos: Sequence[int]) -> None:
-        """Talk to servos by their identities; their torque stays as it is."""
+        """Address servos by their identities; their torque stays as it is."""
         self._port, self._protocol, self._servos = port, protocol, servos
         self._attached = False
 
     def write(self, units: np.ndarray) -> None:
-        """Set the goals; the first time, switch the torque on once the goals are there."""
+        """Set the goals; the first time, enable torque after that."""
         self._port.send(self._protocol.goals(self._servos, units.tolist()))
         if not self._attached:
             self._port.send(self._protocol.torque(self._servos, True))
@@ -169,7 +169,7 @@ class SerialBoard(ServoBoard):
         return self._protocol.position(reply)
 
     def detach(self) -> None:
-        """Switch the torque off, also where it was not switched on from here."""
+        """Disable torque, even if it was not enabled here."""
         self._attached = False
         self._port.send(self._protocol.torque(self._servos, False))
 

@@ -144,10 +144,10 @@ class LowCmd(JointCommand):
     """
 
     def __init__(self, joints: int = 12) -> None:
-        """Make a command under which nothing is driven.
+        """Make a command that drives nothing.
 
         Args:
-            joints: how many of the motors the robot has.
+            joints: number of motors of the robot.
 
         """
         self._bytes = bytearray(HEADER + bytes(COMMAND_SIZE))
@@ -243,11 +243,11 @@ class LowState(RobotState):
 
     Attributes:
         torque: estimated, N m, shape (joints,).
-        lost: packets that each motor has lost so far.
+        lost: number of lost packets of each motor.
         quaternion: orientation, w x y z.
         gyroscope: rad/s.
         accelerometer: m/s^2.
-        feet: what the feet feel, in the units of the robot, in the order FR FL RR RL.
+        feet: readings of the foot sensors, in the units of the robot, in the order FR FL RR RL.
 
     """
 
@@ -324,7 +324,7 @@ class LowState(RobotState):
 
     @property
     def cells(self) -> list[float]:
-        """Voltages of the battery's cells that are there, V."""
+        """Voltages of the battery's present cells, V."""
         return [value / 1000.0 for value in self._all['cells'].tolist() if value]
 
     @property
