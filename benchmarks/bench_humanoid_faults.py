@@ -20,7 +20,8 @@ begin in the walk do so at 3 s and a fifth of a stride later with each seed. A r
 the fault, or at 6.5 s if it lasts, in a 'walk', a 'stand', a 'crouch', or a 'fall':
 the base leans by more than 60 degrees or lies on the floor at any time.
 
-usage: bench_humanoid_faults.py [--robot humanoid] [--seeds 5] [--only NAME] [--jobs 2]
+usage: bench_humanoid_faults.py [--robot humanoid] [--seeds 5] [--first-seed 0] [--only NAME]
+                                [--jobs 2]
 """
 
 import argparse
@@ -52,11 +53,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--robot', default='humanoid')
     parser.add_argument('--seeds', type=int, default=5)
+    parser.add_argument('--first-seed', type=int, default=0)
     parser.add_argument('--only', default='', help='faults with this in their names')
     parser.add_argument('--jobs', type=int, default=2)
     given = parser.parse_args()
     jobs = [(given.robot, fault, seed) for fault in FAULTS if given.only in fault
-            for seed in range(given.seeds)]
+            for seed in range(given.first_seed, given.first_seed + given.seeds)]
     found: dict[str, Counter[str]] = {fault: Counter() for _, fault, _ in jobs}
     crossed: Counter[str] = Counter()
     with ProcessPoolExecutor(given.jobs, multiprocessing.get_context('spawn')) as pool:
@@ -66,6 +68,7 @@ def main() -> None:
             if sum(found[fault].values()) == given.seeds:
                 log(f'{fault}: {dict(found[fault])}, {crossed[fault]} limits crossed')
     emit(benchmark='humanoid_faults', robot=given.robot, seeds=given.seeds,
+         first_seed=given.first_seed,
          **{fault: {**ends, 'crossed': crossed[fault]} for fault, ends in found.items()},
          passed=not any(crossed.values()))
 

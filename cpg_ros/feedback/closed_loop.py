@@ -38,8 +38,8 @@ from cpg_ros.feedback.input_checks import (
     judge_imu,
     judge_joints,
     judge_loads,
-    LATEST,
     note,
+    NUMBERS,
 )
 from cpg_ros.feedback.kinematics import LegArrays
 from cpg_ros.feedback.laws import virtual_stiffness
@@ -68,7 +68,7 @@ class Senses(NamedTuple):
     each.
 
     Attributes:
-        monitors: see input_checks.BELIEVED, shape (inputs, LATEST + 1).
+        monitors: see input_checks.BELIEVED, shape (inputs, NUMBERS).
         news: 1 for a new message with the same numbers, 2 for one with others, else 0, (inputs,).
         stamps: of the messages, s, NaN without, (inputs,).
         unreadable: verdict on messages of a layout that cannot be used, else 0, (inputs,).
@@ -109,7 +109,7 @@ class Senses(NamedTuple):
         kind, joints = CONTACTS.index(contacts), limits.shape[1]
         inputs = 2 + (1, legs, 0)[kind]
         never, whole = np.full(max(IMU, JOINT * joints), math.nan), np.int64
-        return cls(np.zeros((inputs, LATEST + 1)), np.zeros(inputs, whole), np.zeros(inputs),
+        return cls(np.zeros((inputs, NUMBERS)), np.zeros(inputs, whole), np.zeros(inputs),
                    np.zeros(inputs, whole), never[:IMU].copy(),
                    never[:JOINT * joints].reshape(JOINT, joints).copy(),
                    np.full((legs, FORCE) if kind == 1 else (1, legs), math.nan),
@@ -230,7 +230,7 @@ def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
     numbers, out = instant.numbers, 0
     dt = numbers[DT]
     for k in range(len(senses.monitors)):
-        out += is_out(senses.monitors[k], numbers[NOW], True)
+        out += is_out(senses.monitors[k], numbers[NOW])
     state[OUT], state[MOUNT], state[CONTRARY] = out, 0.0, 0.0
     if out == 0:
         state[MOUNT] = compare_rates(legs, sensors, dt, rates[0], rates[1], rates[2])

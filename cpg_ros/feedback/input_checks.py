@@ -47,8 +47,10 @@ FADE, GOOD = 0.15, 0.3
 #: valid one;
 #: USED: the last update of its age; SINCE: the failure of the input. AGE: low-passed age; IS_LATE:
 #: whether it is too large; WRONG: verdict on the last message; LAG: age of its stamp; LATEST:
-#: largest age.
-BELIEVED, CHANGED, CAME, MEASURED, USED, AGE, SINCE, IS_LATE, WRONG, LAG, LATEST = range(11)
+#: largest age; PEAKS: whether the age rises at once, and only falls as low-passed. NUMBERS: how
+#: many values these are.
+(BELIEVED, CHANGED, CAME, MEASURED, USED, AGE, SINCE, IS_LATE, WRONG, LAG, LATEST, PEAKS,
+ NUMBERS) = range(13)
 
 
 @jit
@@ -77,11 +79,8 @@ def note(monitor, now, stamp, same, verdict, patience):
 
 
 @jit
-def is_out(monitor, now, peaks):
-    """Update the low-passed age of the measurements, s; return whether the input is out.
-
-    With peaks the age rises at once, and falls low-passed.
-    """
+def is_out(monitor, now):
+    """Update the low-passed age of the measurements, s; return whether the input is out."""
     stale, late = now - monitor[BELIEVED] > STALE, False
     if stale:
         # After a gap the low-pass starts anew: earlier ages do not matter.
@@ -92,7 +91,7 @@ def is_out(monitor, now, peaks):
             monitor[AGE] = age
         else:
             monitor[AGE] += min((now - monitor[USED]) / AGE_MEMORY, 1.0) * (age - monitor[AGE])
-            if peaks:
+            if monitor[PEAKS]:
                 monitor[AGE] = max(monitor[AGE], age)
         monitor[USED] = now
         late = monitor[AGE] > monitor[LATEST] * (IN_TIME if monitor[IS_LATE] else 1.0)
@@ -114,18 +113,28 @@ class InputMonitor:
 
     """
 
-    def __init__(self, name: str, latest: float = math.inf, numbers: np.ndarray | None = None
-                 ) -> None:
-        """Monitor an input whose measurements are valid up to an age in s."""
-        self.name, self._latest, self.other = name, latest, ''
-        self.numbers = np.empty(LATEST + 1) if numbers is None else numbers
+    def __init__(self, name: str, latest: float = math.inf, numbers: np.ndarray | None = None,
+                 peaks: bool = True) -> None:
+        """Monitor an input.
+
+        Args:
+            name: of the input.
+            latest: age up to which measurements are valid, s.
+            numbers: to be used, see BELIEVED and what follows it, shape (NUMBERS,).
+            peaks: whether a larger age counts at once, as gaits fall that are late for moments;
+                else as low-passed.
+
+        """
+        self.name, self._latest, self._peaks, self.other = name, latest, peaks, ''
+        self.numbers = np.empty(NUMBERS) if numbers is None else numbers
         self.restart()
 
     def restart(self) -> None:
         """Forget all messages."""
         self.numbers[:] = math.nan
         self.numbers[[BELIEVED, CHANGED, CAME]] = -math.inf
-        self.numbers[[IS_LATE, WRONG, LAG]], self.numbers[LATEST] = 0.0, self._latest
+        self.numbers[[IS_LATE, WRONG, LAG]] = 0.0
+        self.numbers[[LATEST, PEAKS]] = self._latest, self._peaks
 
     @property
     def believed(self) -> float:
@@ -154,7 +163,7 @@ class InputMonitor:
 
     def fault(self, now: float) -> str:
         """Return why the input is out, or ''."""
-        is_out(self.numbers, now, False)
+        is_out(self.numbers, now)
         return self.reason
 
     @property

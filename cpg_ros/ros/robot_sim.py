@@ -419,7 +419,7 @@ class RobotSim(StartedNode):
         self._time = body.time
         self._measurements.publish(stamp)
         self._run_log.update(self._now / self._rate)
-        if body.fallen:
+        if fallen := body.fallen and not body.sits:
             if not self._fallen:
                 self.get_logger().error(f'the robot has fallen: {self._summary()}; ~/reset '
                                         'stands it up')
@@ -427,7 +427,7 @@ class RobotSim(StartedNode):
             self._upright_from = self._now + self._rate * BOUNCE
         elif self._fallen and self._now > self._upright_from:
             self.get_logger().info('the robot is upright again')
-        self._fallen = body.fallen or self._now <= self._upright_from
+        self._fallen = fallen or self._now <= self._upright_from
         if self._now == self._last:
             self.stop.set()
             self.ticker.end()

@@ -26,6 +26,9 @@ import numpy as np
 
 #: FALLEN: lean of the base above which the robot has fallen, rad.
 FALLEN = math.radians(60.0)
+#: LEVEL: largest lean of the base of a robot that sits on the floor, rad; FOLDED: height of the
+#: base over the feet by the joints' targets, as a share of the stand's, below which it sits.
+LEVEL, FOLDED = 0.35, 0.6
 
 
 def add_payload(model: Any, base: int, mass: float) -> None:
@@ -62,6 +65,8 @@ class Body:
         self.robot = robot
         self.model: Any = load(name, robot, kp, kd, timestep, add=add, say=say)
         self.data: Any = mujoco.MjData(self.model)
+        #: The joints at their targets.
+        self._posed: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.places]
         self._kp, self._kp_scale = self.model.actuator_gainprm[:, 0].copy(), 1.0
@@ -104,13 +109,13 @@ class Body:
         self._pose[:] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
         if self._height is None:
             mujoco.mj_kinematics(self.model, data)
-            self._height = -self._clearance()
+            self._height = -self._clearance(data)
         self._pose[2] = self._height
         self.command(self.stand)
         mujoco.mj_forward(self.model, data)
 
-    def _clearance(self) -> float:
-        """Height of the body's lowest point above the floor, m."""
+    def _clearance(self, data: Any) -> float:
+        """Height of the body's lowest point above the floor, m, by an MjData."""
         mujoco, model = engine(), self.model
         planes = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == 0
                   and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
@@ -120,7 +125,7 @@ class Body:
         if not planes or not own:
             raise SimulationError(f"the model of '{self.robot.name}' has no "
                                   + ('shapes that could touch the floor' if planes else 'floor'))
-        return min(mujoco.mj_geomDistance(model, self.data, plane, geom, 100.0, None)
+        return min(mujoco.mj_geomDistance(model, data, plane, geom, 100.0, None)
                    for plane in planes for geom in own)
 
     def command(self, angles: np.ndarray) -> None:
@@ -238,8 +243,25 @@ class Body:
     @property
     def fallen(self) -> bool:
         """Whether the base leans more than FALLEN or lies on the floor."""
+        return self._upright < math.cos(FALLEN) or self._trunk[0] > 0.0
+
+    @property
+    def sits(self) -> bool:
+        """Whether the base lies level on the floor, and the legs are to be folded."""
+        if self._trunk[0] <= 0.0 or self._upright < math.cos(LEVEL):
+            return False
+        assert self._height is not None
+        mujoco, posed = engine(), self._posed
+        posed.qpos[self._at] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+        posed.qpos[self._angles] = self._control
+        mujoco.mj_kinematics(self.model, posed)
+        return -self._clearance(posed) < FOLDED * self._height
+
+    @property
+    def _upright(self) -> float:
+        """Cosine of the base's lean."""
         _, x, y, _ = self.quaternion
-        return 1.0 - 2.0 * (x * x + y * y) < math.cos(FALLEN) or self._trunk[0] > 0.0
+        return 1.0 - 2.0 * (x * x + y * y)
 
     @property
     def axes(self) -> np.ndarray:

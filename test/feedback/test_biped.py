@@ -179,8 +179,6 @@ def test_the_clock_shares_the_weight():
         for leg in range(2):
             if phases[leg] < 1.0 - gains.duty:
                 assert fractions[leg] == 0.0
-    # The flexor's peak is the middle of the swing.
-    assert stepping.stride_phase(0.0, gains) == pytest.approx(0.5 * (1.0 - gains.duty))
 
 
 def test_the_ground_force_turns_the_body_by_what_is_wanted():

@@ -129,6 +129,23 @@ def test_measurements_that_are_old_when_they_are_used_are_out(delay, late):
             ) is late
 
 
+@pytest.mark.parametrize(('peaks', 'late'), [(True, True), (False, False)])
+def test_a_moment_of_late_measurements_counts_at_once_where_the_gait_falls_by_it(peaks, late):
+    monitor = InputMonitor('imu', latest=LATE, peaks=peaks)
+    for k in range(20):
+        now = 1.0 + 0.002 * k
+        note(monitor.numbers, now, now - (0.03 if k == 19 else 0.004), False, 0, 0.0)
+        fault = monitor.fault(now)
+    assert bool(fault) is late
+    # A restart forgets the messages, not what kind of input it is.
+    monitor.restart()
+    assert monitor.fault(2.0) == 'no message yet'
+    note(monitor.numbers, 2.0, 1.996, False, 0, 0.0)
+    assert not monitor.fault(2.0)
+    note(monitor.numbers, 2.002, 1.972, False, 0, 0.0)
+    assert bool(monitor.fault(2.002)) is late
+
+
 def test_the_age_before_a_gap_does_not_count_after_it():
     monitor, now = late_monitor(0.02, 1.0)
     assert monitor.fault(now + 1.0) == 'no messages' and np.isnan(monitor.age)

@@ -152,6 +152,23 @@ def test_lying_on_its_belly_it_has_fallen(body):
     assert body.fallen
 
 
+def test_a_body_that_was_to_fold_its_legs_sits_and_one_that_collapsed_does_not(body):
+    assert not body.sits
+    # To the ends of the calves' range, where the trunk touches the floor.
+    folded = np.tile([0.0, 1.6, -2.72], 4)
+    for k in range(500):
+        body.command(body.stand + 0.002 * (k + 1) * (folded - body.stand))
+        body.step()
+    stood(body, 0.5)
+    assert body.sits == body.fallen
+    body.model.actuator_gainprm[:] = body.model.actuator_biasprm[:] = 0.0
+    stood(body, 1.0)
+    assert body.sits and body.fallen
+    # The same on the floor with legs that are to stand.
+    body.command(body.stand)
+    assert body.fallen and not body.sits
+
+
 @pytest.mark.parametrize('name', ['go1', 'aliengo', 'mini_cheetah'])
 def test_other_models_stand_too(name):
     body = stood(Body(name, ROBOT, kp=200.0))

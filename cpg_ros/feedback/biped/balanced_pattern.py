@@ -400,7 +400,7 @@ class BalancedPattern(Pattern):
         The soles of a robot that is pushed lean, too: it crouches, and as they are level there,
         the IMU counts again.
         """
-        if self.balancing and balance.mode == WALK:
+        if self.fallen or (self.balancing and balance.mode == WALK):
             self._settles = SETTLED
             return
         weight = GRAVITY * balance.links.masses.sum()
@@ -449,6 +449,9 @@ class BalancedPattern(Pattern):
                 # A person moves more than one joint.
                 self.release()
             return
+        if self.crouching and lean > LEANS and (self._leant or not (self.failed or self.doubts)):
+            # A push has felled it, which made the soles lean or the IMU show no gravity.
+            self._fall()
         if self._stops or self._lowers:
             self._stood = 0.0
             return
@@ -472,4 +475,4 @@ class BalancedPattern(Pattern):
         self.fallen = True
         # A fall contradicts everything: inputs are judged anew once the robot is on its feet.
         self.doubts.clear()
-        self._contrary = 0.0
+        self._contrary, self._leant = 0.0, False

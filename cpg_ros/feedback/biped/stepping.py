@@ -123,12 +123,6 @@ def swing_share(gains):
 
 
 @jit
-def stride_phase(phase, gains):
-    """Return a leg's phase from its lift-off on, cycles, by that of its flexor (peak at 0)."""
-    return (phase + 0.5 * swing_share(gains)) % 1.0
-
-
-@jit
 def time_in_step(phase, gains):
     """Return how long ago the other foot took over, s, by the phase of the leg that swings."""
     swing = swing_share(gains)

@@ -77,12 +77,16 @@ class SensorLoop:
     def state(self) -> str:
         """State of the feedback while it is wanted, for /diagnostics."""
         if self.faults:
-            return f'{"waiting" if self.waiting else "out"}: {self.faults}'
+            return f'{self._faulty_state}: {self.faults}'
         return self._active_state
 
     @property
     def _active_state(self) -> str:
         return f'{100.0 * self.fraction:.0f} %'
+
+    @property
+    def _faulty_state(self) -> str:
+        return 'waiting' if self.waiting else 'out'
 
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
@@ -303,6 +307,14 @@ class BalanceLoop(SensorLoop):
             return 'crouching'
         return ('the robot has fallen: put it on its feet' if pattern.fallen else
                 'holding the stand until the robot stands on its feet')
+
+    @property
+    def _faulty_state(self) -> str:
+        pattern = self._pattern
+        if pattern.balancing:
+            return 'coming to a stand'
+        return ('crouching' if pattern.crouching and not pattern.fallen else
+                super()._faulty_state)
 
     def news(self) -> str:
         """Return how the robot has lost its balance since the last call, or ''."""

@@ -198,7 +198,8 @@ class SensorInput:
             feet: topic of the Float64MultiArray, or suffix to each leg's name for its
                 WrenchStamped.
             mount: roll, pitch and yaw of the IMU in the base's frame, rad.
-            latest: largest age of stamped measurements when they are used, s.
+            latest: largest age of stamped measurements when they are used, s; of a robot with a
+                geometry also for moments.
 
         """
         self._geometry = geometry.arrays if isinstance(geometry, Geometry) else LegArrays(
@@ -227,8 +228,10 @@ class SensorInput:
         self.structs = (native.Input * len(topics))()
         self.inputs = [
             _Input(PolledSubscription(node, kind, topic, raw=True),
-                   InputMonitor(topic, latest, senses.monitors[k]), self.structs[k],
-                   senses.unreadable[k:k + 1]) for k, (kind, topic, _) in enumerate(topics)]
+                   InputMonitor(topic, latest, senses.monitors[k],
+                                peaks=isinstance(geometry, Geometry)),
+                   self.structs[k], senses.unreadable[k:k + 1])
+            for k, (kind, topic, _) in enumerate(topics)]
         for k, (struct, (kind, _, values)) in enumerate(zip(self.structs, topics, strict=True)):
             struct.message, struct.values = native.empty_message(), values.ctypes.data
             struct.stamp, struct.news = (part[k:].ctypes.data

@@ -35,6 +35,14 @@ def test_it_goes_on_walking_after(fault):
     assert not humanoid.crossed and not humanoid.pattern.falls
 
 
+def test_its_state_says_what_it_does_beside_the_fault():
+    humanoid = HumanoidUnderFault('dropped imu', speed=0.0, begins=1.0)
+    for until, doing in ((0.9, 'on'), (1.1, 'coming to a stand: imu: no messages for '),
+                         (2.1, 'crouching: imu: no messages for ')):
+        humanoid.run(until)
+        assert humanoid.loop.state.startswith(doing)
+
+
 @pytest.mark.skipif(importlib.util.find_spec('mjlab') is None,
                     reason='mjlab, which has the G1, is not installed')
 @pytest.mark.parametrize('fault, end', [('0.2 s without imu', 'walk'), ('NaN imu', 'crouch')])
@@ -90,3 +98,17 @@ def test_a_push_is_not_taken_for_an_imu_that_is_mounted_otherwise():
         doubts.extend(humanoid.pattern.doubts.values())
     assert any('a push' in one for one in doubts) and not humanoid.fell
     assert humanoid.pattern.balancing and not humanoid.loop.faults
+
+
+def test_after_a_push_that_felled_a_stand_it_walks_at_once():
+    humanoid = HumanoidUnderFault('none', 1, speed=0.0)
+    humanoid.run(1.5)
+    humanoid.body.push(np.array([0.0, 1500.0, 0.0]), 0.1)
+    humanoid.run(3.5)
+    assert humanoid.fell and humanoid.pattern.fallen
+    # Like robot_sim's ~/reset.
+    humanoid.body.reset()
+    humanoid.pattern.enable(True, 1.0)
+    # It balances within .5 s, and shifts its weight for 1 s before the first step.
+    humanoid.run(5.2)
+    assert humanoid.pattern.level and not humanoid.loop.faults and humanoid.pattern.falls == 1
