@@ -22,7 +22,7 @@ numbered from the head: L1_coxa ... R3_tibia. Bipeds: left, right, LT, RT, L or 
 L_hip, hip_rt, LHipPitch. An R after the side stands for roll: LLEG_HIP_R.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 import re
 
@@ -128,9 +128,14 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
     return (sides.pop() if len(sides) == 1 else '', ends.pop() if len(ends) == 1 else '')
 
 
-def no_leg(joints: Sequence[str], words: Collection[str]) -> bool:
-    """Return whether a limb's joints, except the last, have words of an arm, a head and so on."""
-    return any(not set(words).isdisjoint(_moved(words_of(name))) for name in joints[:-1] or joints)
+def limb_of(joints: Sequence[str]) -> str:
+    """Return what names of a limb's joints, but the last, say it is, '' for nothing.
+
+    Either ``other``, which is no leg, ``arm``, or ``upper``, an arm or a fore leg.
+    """
+    words = {word for name in joints[:-1] or joints for word in _moved(words_of(name))}
+    return next((kind for kind, known in (('other', APPENDAGES), ('arm', ARMS), ('upper', UPPER))
+                 if words & known), '')
 
 
 def role_of(name: str) -> str:

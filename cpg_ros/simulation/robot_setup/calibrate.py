@@ -213,16 +213,6 @@ def _parser() -> Parser:
     return parser
 
 
-def _recorded(robot: Robot, args: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
-    topics = {key: getattr(args, key) for key in TYPES}
-    gaits = args.gaits * len(args.bags) if len(args.gaits) < 2 else args.gaits
-    none = [None] * len(args.bags)
-    calibrated = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait,
-                  speed
-             in zip(args.bags, gaits or none, args.speed or none, strict=True)]
-    return with_efference(robot, calibrated), calibrated
-
-
 def _comment(path: Path) -> str:
     """Return the comment at the beginning of a file."""
     lines = read_bytes(path, CpgError).decode().splitlines() if path.is_file() else []
@@ -252,7 +242,13 @@ def _calibrate(args: argparse.Namespace) -> int:
                   '') for gait in gaits
                  if (measured := robot.motions[gait].efference) is not None]
     else:
-        robot, walks = _recorded(robot, args)
+        topics = {key: getattr(args, key) for key in TYPES}
+        count = len(args.bags)
+        walks = [efference_from(read_walk(bag, robot, topics), robot, gait, speed)
+                 for bag, gait, speed in zip(
+                     args.bags, args.gaits * (count // (len(args.gaits) or 1)) or [None] * count,
+                     args.speed or [None] * count, strict=True)]
+        robot = with_efference(robot, walks)
         rows += [(walk.source, walk.gait, f'{walk.speed:.3f}', str(walk.cycles))
                  for walk in walks]
     write_robot(out, robot, _comment(Path(args.robot)))

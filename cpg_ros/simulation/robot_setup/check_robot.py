@@ -44,12 +44,7 @@ from cpg_ros.simulation.robot_setup.description_match import (
 )
 from cpg_ros.simulation.robot_setup.first_robot import robot_from
 from cpg_ros.simulation.robot_setup.leg_chains import FACING, legs_in
-from cpg_ros.simulation.robot_setup.model_reading import (
-    geometry_from,
-    load_mjcf,
-    read_biped,
-    SolesError,
-)
+from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_mjcf, read_biped
 
 DESCRIPTION = """\
 Compare a robot file with the robot's URDF or MuJoCo model (MJCF): report joints that are missing
@@ -185,19 +180,15 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
 
 def _biped(args: Namespace, robot: Robot, description: RobotDescription) -> tuple[Robot, str]:
     """Return a biped with its links and soles, and a line on its feedback."""
-    last = max((joint.name for joint in next(iter(robot.legs.values()))),
-               key=lambda name: len(description.chain(name)))
-    if sole_up(description, last)[2] < 1.0:
+    leg = description.leg(joint.name for joint in next(iter(robot.legs.values())))
+    if sole_up(description, leg.joints[-1])[2] < 1.0:
         return robot, ('feedback: none, as the soles are not level with all joints at 0: turn the '
                        'feet in the description so that they are')
     try:
         return (replace(robot, biped=read_biped(args.mjcf or str(args.urdf), robot)),
                 'feedback: of a biped with soles')
-    except SolesError as error:
-        return robot, (f'feedback: none, as {error}: where meshes are missing, install their '
-                       'package or give feet a <collision> shape')
     except SimulationError as error:
-        return robot, f'feedback: none: {error}'
+        return robot, f'feedback: none, as {error}'
 
 
 def _turned(args: Namespace, description: RobotDescription) -> Path:

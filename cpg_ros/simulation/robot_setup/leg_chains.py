@@ -20,15 +20,7 @@ find the legs. Names only decide which way a robot faces, and which limbs are ar
 
 from collections.abc import Mapping, Sequence
 
-from cpg_ros.fitting.gaits.leg_names import (
-    APPENDAGES,
-    ARMS,
-    Legs,
-    LegsError,
-    no_leg,
-    place_of,
-    UPPER,
-)
+from cpg_ros.fitting.gaits.leg_names import Legs, LegsError, limb_of, place_of
 from cpg_ros.motion.description import (
     DescriptionError,
     JointDescription,
@@ -126,10 +118,10 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
     ahead = np.round([np.cos(quarter * np.pi / 2), np.sin(quarter * np.pi / 2), 0.0])
     left = np.array([-ahead[1], ahead[0], 0.0])
     pairs = [pair for pair in _pairs(_limbs(description, paths, left), left) if all(
-        not no_leg(limb.joints, APPENDAGES) and 1 < sum(
+        limb_of(limb.joints) != 'other' and 1 < sum(
             not description.joints[name].flaw for name in limb.joints) <= MOST_JOINTS
         for limb in pair)]
-    legs = [pair for pair in pairs if not any(no_leg(limb.joints, ARMS) for limb in pair)]
+    legs = [pair for pair in pairs if not any(limb_of(limb.joints) == 'arm' for limb in pair)]
     if not legs and len(pairs) > 1:
         # Some call the links of a fore leg arm and hand.
         legs = pairs
@@ -140,7 +132,7 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
     legs = [pair for pair in legs if _bottom(pair[0]) <= _bottom(lowest) + SHORTER * length
             and pair[0].anchors[0, 2] <= lowest.anchors[0, 2] + HIGHER * length]
     legs.sort(key=lambda pair: float(pair[0].anchors[0] @ ahead))
-    if len(legs) > 3 or (len(legs) == 1 and no_leg(legs[0][0].joints, UPPER)):
+    if len(legs) > 3 or (len(legs) == 1 and limb_of(legs[0][0].joints) == 'upper'):
         return {}
     return dict(zip(leg_names(2 * len(legs)), (limb.joints for pair in legs for limb in pair),
                     strict=True))

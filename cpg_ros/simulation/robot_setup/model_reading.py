@@ -19,7 +19,6 @@ from dataclasses import replace
 import math
 from typing import Any
 
-from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import one_line, opened
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, links_of
 from cpg_ros.feedback.kinematics import GRAVITY
@@ -40,10 +39,6 @@ from cpg_ros.motion.description import (
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.robot_model import engine, find_model, load, SimulationError
 import numpy as np
-
-
-class SolesError(InputError):
-    """A leg of a biped has no sole."""
 
 
 def load_description(name: str) -> RobotDescription:
@@ -107,8 +102,11 @@ def _described(mujoco: Any, model: Any) -> RobotDescription:
                 continue
             name = model.joint(k).name or f'joint {k} without a name'
             lower, upper, velocity = _limits(mujoco, model, k)
+            bounded = max(abs(lower), abs(upper)) < math.inf
+            kind = {kinds.mjJNT_HINGE: 'revolute' if bounded else 'continuous',
+                    kinds.mjJNT_SLIDE: 'prismatic'}.get(kinds(model.jnt_type[k]), 'ball')
             found[name] = JointDescription(
-                name, _kind(mujoco, model, k), lower, upper, velocity, '', link, f'{name} link',
+                name, kind, lower, upper, velocity, '', link, f'{name} link',
                 tuple(((data.xanchor[k] - origins[link]) @ axes).tolist()),
                 axis=tuple((data.xaxis[k] @ axes).tolist()))
             link = f'{name} link'
@@ -162,14 +160,6 @@ def _points(model: Any, data: Any, geom: int) -> tuple[np.ndarray, float]:
     return data.geom_xpos[geom] + corners @ frame.T, float(round_)
 
 
-def _kind(mujoco: Any, model: Any, k: int) -> str:
-    """Return a joint's type by URDF's names."""
-    if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE:
-        return 'revolute' if max(map(abs, _limits(mujoco, model, k)[:2])) < math.inf \
-            else 'continuous'
-    return 'prismatic' if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE else 'ball'
-
-
 def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
     """Return the smallest and largest angle, rad (m of a slide), and velocity of a joint."""
     lower, upper = _range(model, k)
@@ -215,8 +205,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         robot: with the legs.
 
     Raises:
-        SimulationError: the model cannot be read.
-        SolesError: a leg has no sole.
+        SimulationError: the model cannot be read, or a leg has no sole.
 
     """
     mujoco, model = engine(), load(name, robot)
@@ -240,8 +229,9 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         if k < 0:
             mass, center = heavy, middle
             continue
-        joint, before = model.joint(k).name, _before(model, mover, k)
-        parent = BASE if before < 0 else model.joint(before).name
+        joint = model.joint(k).name
+        before = model.dof_jntid[model.dof_parentid[model.jnt_dofadr[k]]]
+        parent = BASE if before == free else model.joint(before).name
         effort = (float(model.jnt_actfrcrange[k, 1]) if model.jnt_actfrclimited[k]
                   else round(LEVER * weight))
         angle = None if joint in driven else float(np.clip(0.0, *_range(model, k)))
@@ -298,12 +288,6 @@ def _movers(model: Any, hinges: list[int]) -> dict[int, int]:
     return mover
 
 
-def _before(model: Any, mover: dict[int, int], k: int) -> int:
-    """Return the joint before a joint, -1 for the base."""
-    body = int(model.jnt_bodyid[k])
-    return k - 1 if k > model.body_jntadr[body] else mover[int(model.body_parentid[body])]
-
-
 def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the middle, length and width, m, of a sole: the lowest part of a foot."""
     points = []
@@ -313,7 +297,8 @@ def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarra
             # A round shape touches the floor below its axis.
             points.append(places - [0.0, 0.0, round_])
     if not points:
-        raise SolesError(f'leg {leg} has no shape that could touch the floor')
+        raise SimulationError(f'leg {leg} has no shape that could touch the floor: where meshes '
+                              'are missing, install their package or give feet a <collision>')
     cloud = np.concatenate(points)
     lowest = cloud[:, 2].min()
     flat = cloud[cloud[:, 2] < lowest + FLAT]
