@@ -21,6 +21,7 @@ in which order, the robot file says.
 from collections.abc import Callable, Mapping
 import difflib
 import importlib.util
+import math
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -38,35 +39,42 @@ import numpy as np
 # Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
 
 #: The Unitree Go2. KP: stiffness of its joints, N m/rad; KD: damping, N m s/rad; BORNE: mass per
-#: leg, kg.
-KP, KD, BORNE = 60.0, 2.0, 15.206 / 4.0
+#: leg, kg; SPEED: speed of the joints in its trot, rad/s.
+KP, KD, BORNE, SPEED = 60.0, 2.0, 15.206 / 4.0, 12.0
 #: STEADY: least inertia of a motor, as a multiple of kp timestep^2, with which control is stable.
 STEADY = 2.0
 
 
-def usual_gains(mass: float, legs: int) -> tuple[float, float]:
+def usual_gains(mass: float, legs: int, speed: float = math.inf) -> tuple[float, float]:
     """Return kp in N m / rad and kd in N m s / rad for a robot, in two digits.
+
+    Joints slower than a Go2's at this size are geared down, as hobby servos are, and as much
+    stiffer.
 
     Args:
         mass: of all of it, kg.
         legs: that bear it.
+        speed: limit of the joints, rad/s.
 
     """
     larger = mass / legs / BORNE
-    return float(f'{KP * larger**(4.0 / 3.0):.2g}'), float(f'{KD * larger**1.5:.2g}')
+    geared = max(1.0, SPEED / larger**(1.0 / 6.0) / speed)
+    return (float(f'{geared * KP * larger**(4.0 / 3.0):.2g}'),
+            float(f'{geared * KD * larger**1.5:.2g}'))
 
 
-def set_gains(model: Any, kp: float | None, kd: float | None, legs: int) -> None:
+def set_gains(model: Any, kp: float | None, kd: float | None, robot: Robot) -> None:
     """Set the gains with which the actuators of a ``mujoco.MjModel`` hold angles.
 
     Args:
         model: its actuators are those of joints.
         kp: N m / rad; None takes that of ``usual_gains``.
         kd: N m s / rad; the same.
-        legs: of the robot.
+        robot: its legs, and the speed limits of its joints.
 
     """
-    usual = usual_gains(float(model.body_mass.sum()), legs)
+    usual = usual_gains(float(model.body_mass.sum()), len(robot.legs),
+                        float(np.median(robot.column('velocity'))))
     stiff, damped = usual[0] if kp is None else kp, usual[1] if kd is None else kd
     model.actuator_gainprm[:, 0] = stiff
     model.actuator_biasprm[:, 1:3] = -stiff, -damped
@@ -227,7 +235,7 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
         model = spec.compile()
         if visual:
             model = _coarsened(spec, model)
-        set_gains(model, kp, kd, len(robot.legs))
+        set_gains(model, kp, kd, robot)
         if robot.biped is not None:
             set_servos(model, robot.biped.links, kp, kd)
         mujoco.mj_setConst(model, mujoco.MjData(model))

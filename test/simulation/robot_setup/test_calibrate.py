@@ -187,6 +187,6 @@ def test_a_gait_that_cannot_be_has_its_own_code_whatever_the_error_is_called(
     def fail(*_):
         raise type('Another', (kind,), {})('for a reason')
 
-    monkeypatch.setattr(calibrate, '_recorded', fail)
+    monkeypatch.setattr(calibrate, 'read_walk', fail)
     assert calibrate.main(['a.bag', '--robot', 'unitree_go2', '--out', 'none.yaml']) == code
     assert capsys.readouterr().err == 'calibrate: for a reason\n'
