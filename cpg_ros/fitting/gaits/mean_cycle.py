@@ -146,7 +146,6 @@ class PhaseAverage(ShortRepr):
             complex, shape (n + 1, joints).
         spread: standard deviation of a cycle about the mean, rad, (joints, m).
         error: standard error of the mean, rad, (joints, m).
-        counts: number of samples used, (joints,).
         spikes: number of samples dropped, (joints,).
         left: variance about the mean over all variance, (joints,).
 
@@ -156,7 +155,6 @@ class PhaseAverage(ShortRepr):
     coefficients: np.ndarray
     spread: np.ndarray
     error: np.ndarray
-    counts: np.ndarray
     spikes: np.ndarray
     left: np.ndarray
 
@@ -227,7 +225,7 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
     turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
     spread, error = (np.array(values) for values in zip(*scatter, strict=True))
-    return PhaseAverage(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
+    return PhaseAverage(zero, turned, spread, error, spikes, left)
 
 
 def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:

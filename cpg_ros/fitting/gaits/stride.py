@@ -200,7 +200,6 @@ class Stride(ShortRepr):
         mean: mean cycle, rad, shape (joints, m).
         spread: standard deviation of a cycle about it, rad, (joints, m).
         error: standard error of the mean, rad, (joints, m).
-        counts: samples used, (joints,).
         phases: leg -> cycles in [0, 1) by which it is ahead of the first leg, in the order of
             the network's legs: x_leg(t) = x_first(t + phase T).
         scatter: leg -> how well its phase is known, and kept from stride to stride.
@@ -227,7 +226,6 @@ class Stride(ShortRepr):
     mean: np.ndarray
     spread: np.ndarray
     error: np.ndarray
-    counts: np.ndarray
     phases: dict[str, float]
     scatter: dict[str, PhaseScatter]
     gait: str | None
@@ -355,7 +353,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                                    'same phases; name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
-                  mean, average.spread, average.error, average.counts, ahead,
+                  mean, average.spread, average.error, ahead,
                   phase_scatter(phases, x, average, leading, names), gait.gait,
                   gait.nearest, gait.alike, gait.distance, gait.margin,
                   gait.probability * float(np.prod([issue.factor for issue in issues])),

@@ -52,14 +52,6 @@ KEPT = 64
 ERRORS = 4
 
 
-@dataclass(frozen=True)
-class Period:
-    """A measured period, in model time, and its standard error."""
-
-    value: float
-    error: float
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class ReadoutFit(ShortRepr):
     """The best readouts for some values.
@@ -108,9 +100,9 @@ class CycleProblem:
 
     def __init__(self, joints: Joints, sizes: np.ndarray, network: Network, gait: str,
                  free: Sequence[Free], order: int, readout: GaitReadout,
-                 period: Period | None = None, orbits: Orbits | None = None) -> None:
+                 orbits: Orbits | None = None) -> None:
         self.joints, self.sizes, self.free = joints, sizes, tuple(free)
-        self.network, self.gait, self._period = network, gait, period
+        self.network, self.gait = network, gait
         self._symmetry = network.symmetry(gait)
         self.coordinates = Coordinates(network, gait, self.free)
         self.order, self.readout = order, readout
@@ -298,23 +290,15 @@ class CycleProblem:
             columns: rad, shape (m, joints, n).
 
         Returns:
-            An array of shape (residuals, n), with an entry of 0 for a period that is data.
+            An array of shape (residuals, n).
 
         """
-        rows = (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
-        return rows if self._period is None else np.vstack([rows, np.zeros(rows.shape[-1])])
+        return (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
 
     def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Residual over its standard errors, joint by joint within each instant, and derivative.
-
-        The last entry is that of the period, where it is data.
-        """
+        """Return residuals over their standard errors, instant by instant, and derivatives."""
         placed = self.best_readouts(values)
         both = self.weighted(np.concatenate([placed.residual[..., None], placed.jacobian], -1))
-        if self._period is not None:
-            both[-1, 0] = placed.orbit.period - self._period.value
-            both[-1, 1:-1] = placed.orbit.d_period @ self._members
-            both[-1] /= self._period.error
         return both[:, 0], both[:, 1:]
 
     def cost(self, values: np.ndarray) -> float:

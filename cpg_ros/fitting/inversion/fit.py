@@ -428,17 +428,6 @@ class Fit(ShortRepr):
         """Mean over the joints that move; 0 if none does."""
         return mean_share(self.recorded, self.errors)
 
-    def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
-        """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.
-
-        Returns:
-            Cycles, shape (points,), and errors, rad, shape (joints, points).
-
-        """
-        theta = np.arange(points) / points
-        return theta, np.array([np.interp(theta, self.theta, row, period=1.0)
-                                for row in self.errors])
-
     @cached_property
     def hopf(self) -> HopfPoint | None:
         """Hopf point from which the gait emerges as the delay grows; None without delay."""

@@ -231,14 +231,6 @@ class MeanCycle(Protocol):
     def error(self) -> np.ndarray:
         """Standard errors of the mean, rad, shape (joints, m)."""
 
-    @property
-    def frequency(self) -> float:
-        """Strides per second, Hz."""
-
-    @property
-    def frequency_error(self) -> float:
-        """Its standard error, Hz."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Joints(ShortRepr):

@@ -38,8 +38,6 @@ COLUMNS = 3
 #: COLUMN: most columns of the picture of a recording; SEAM: by how much phases are shown beyond
 #: the ends of the cycle, cycles.
 COLUMN, SEAM = 1200, 0.12
-#: POINTS: points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
-POINTS = 20
 
 
 def _text() -> str:
@@ -119,19 +117,6 @@ def stride_curves(result: RecordingFit) -> Figure:
     return figure
 
 
-def errors(result: RecordingFit) -> Figure:
-    """Fitted minus recorded at even instants of the cycle, joint by joint."""
-    theta, values = result.fit.synchronisation(POINTS)
-    figure, grid = _grid(len(result.fit.joints), 1.5)
-    for axes, name, row in zip(grid, result.fit.joints, values, strict=True):
-        axes.axhline(0.0, color=BAND, linewidth=1.0)
-        axes.plot(theta, row, 'o-', color=FITTED, markersize=3, linewidth=0.9)
-        axes.set_title(f'{name}: {row.min():.3f} to {row.max():.3f} rad', fontsize=8, loc='left')
-        axes.set_ylabel('error [rad]', fontsize=8)
-    figure.suptitle('Synchronisation error: fitted minus recorded', fontsize=10)
-    return figure
-
-
 def phases(result: RecordingFit) -> Figure:
     """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
     figure = Figure((6.0, 0.9 + 0.45 * len(result.stride.phases)), layout='constrained')
@@ -190,30 +175,9 @@ def stretch(result: RecordingFit) -> Figure:
     return figure
 
 
-def convergence(result: RecordingFit) -> Figure:
-    """Objective and parameters over the iterations of each start."""
-    names = result.fit.free
-    trials = [trial for trial in result.fit.starts if len(trial.path)]
-    figure = Figure((3.4 * (1 + len(names)), 2.6), layout='constrained')
-    grid = figure.subplots(1, 1 + len(names), squeeze=False)
-    for number, trial in enumerate(trials):
-        steps = np.arange(len(trial.path))
-        for k, axes in enumerate(grid.flat):
-            axes.plot(steps, trial.path[:, k], 'o-', markersize=3, linewidth=1.0,
-                      color=LINES[number % len(LINES)])
-    grid.flat[0].set_yscale('log')
-    for axes, label in zip(grid.flat, ('half the sum of squares [1]', *names), strict=True):
-        axes.set_xlabel('iteration')
-        axes.set_ylabel(label)
-    figure.suptitle('Convergence of each start', fontsize=10)
-    return figure
-
-
 FIGURES = (('The recording', stretch),
            ('Recorded and fitted', joint_figure),
-           ('Error over the cycle', errors),
-           ('Phases', phases),
-           ('Convergence', convergence))
+           ('Phases', phases))
 
 
 def _stride(result: RecordingFit) -> list[str]:

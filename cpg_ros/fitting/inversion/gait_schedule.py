@@ -38,14 +38,15 @@ from cpg_ros.fitting.inversion.parameter_files import (
 from cpg_ros.fitting.inversion.recording_fit import (
     fit_recording,
     leg_joints,
-    network_of,
+    network_for,
+    network_name,
     RecordingFit,
     stride_of,
 )
 from cpg_ros.fitting.recordings.recording import Recording, RecordingError
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import write_robot
-from cpg_ros.networks.registry import find_network, NetworkError, reference, with_legs_of
+from cpg_ros.networks.registry import reference
 import numpy as np
 import yaml
 
@@ -162,10 +163,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
 
     """
     legs, _ = leg_joints(recording, robot)
-    try:
-        kind = with_legs_of(find_network(_network(recording, robot, network)), legs)
-    except NetworkError as error:
-        raise InputError(f'network {error}') from error
+    kind = network_for(network, legs, robot)
     strides: list[tuple[float, float, Stride]] = []
     remains = [(0.0, float(recording.times[-1]))]
     why: NoSteadyGait | None = None
@@ -202,12 +200,6 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
     return sorted(strides, key=lambda piece: piece[0])
 
 
-def _network(recording: Recording, robot: Robot | None, network: str) -> str:
-    if network or robot is None:
-        return network or network_of(leg_joints(recording, robot)[0])
-    return robot.networks[0]
-
-
 def _longer(*parts: tuple[float, float]) -> list[tuple[float, float]]:
     return [(begin, end) for begin, end in parts if end - begin >= SHORTEST]
 
@@ -228,7 +220,7 @@ def fit_stretches(recording: Recording, robot: Robot | None = None, network: str
         CpgError: as of cut.
 
     """
-    name, fits = _network(recording, robot, network), []
+    name, fits = network_name(network, leg_joints(recording, robot)[0], robot), []
     stretches = cut(recording, robot, network)
     for k, (begin, end, stride) in enumerate(stretches):
         part = replace(recording.between(begin, end),

@@ -26,7 +26,7 @@ from dataclasses import replace
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Orbits, Period
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Orbits
 from cpg_ros.fitting.inversion.fit import (
     correlation_length,
     Estimate,
@@ -141,8 +141,6 @@ def _listed(names: Sequence[str]) -> str:
 
 #: EVEN: duty of legs that stand as long as they swing.
 EVEN = 0.5
-#: KNOWN_FREQUENCY: least relative error of a frequency.
-KNOWN_FREQUENCY = 1e-4
 #: TOLERANCE: relative change at which a trust region stops; LAST: the same for the last one.
 TOLERANCE, LAST = 1e-5, 1e-8
 #: NEARLY: cost of a minimum, as a multiple of the least, up to which it is compared with the best.
@@ -163,7 +161,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            free: Sequence[str] = (), order: int = 3,
            starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
            bounds: Mapping[str, tuple[float, float]] | None = None,
-           time_scale: float = 0.0, orbits: Orbits | None = None,
+           orbits: Orbits | None = None,
            straight: bool = False, loaded: bool = False,
            done: Callable[[float], None] = lambda fraction: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
@@ -180,8 +178,6 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             default from these, and from the best of many values all over the ranges.
         readout: how the generator reads the gait; by default legs stand as the cells do.
         bounds: free number -> lower and upper bound, where narrower than the range.
-        time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
-            as the generator's frequency does.
         orbits: of earlier fits of the same parameters, gait and readout.
         straight: whether intervals are quadratic however wide they are, which is quicker.
         loaded: whether the feet bore loads to which joints gave way: the model is then off by
@@ -196,7 +192,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     """
     numbers = _numbers(network, gait, free or network.free, bounds)
     problem = _problem(cycle, joints_of(cycle, cells, network), network, gait, numbers, order,
-                       readout or GaitReadout.of(type(network), gait), time_scale, orbits)
+                       readout or GaitReadout.of(type(network), gait), orbits)
     problem.loaded = loaded
     trials = _trials(problem, starts, done)
     best = min(trials, key=lambda trial: trial.cost)
@@ -220,7 +216,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
 
 
 def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
-             numbers: tuple[Free, ...], order: int, readout: GaitReadout, time_scale: float,
+             numbers: tuple[Free, ...], order: int, readout: GaitReadout,
              orbits: Orbits | None) -> CycleProblem:
     """Return what is to be solved, checked; arguments as of ``invert``."""
     if order not in WEIGHTS:
@@ -229,13 +225,7 @@ def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
     if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
                          f'determine readouts of order {order} and {len(numbers)} parameters')
-    period = None
-    if time_scale > 0.0:
-        value = 1.0 / (cycle.frequency * time_scale)
-        fraction = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
-        period = Period(value, value * fraction)
-    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period,
-                        orbits)
+    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, orbits)
 
 
 def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],

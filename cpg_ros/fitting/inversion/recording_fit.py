@@ -358,11 +358,21 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
     return estimates
 
 
-def _kind(network: str, legs: Mapping[str, Sequence[str]], robot: Robot | None) -> type[Network]:
-    """Return the network of a name, or by default the robot's first, or the first for the legs."""
+def network_name(network: str, legs: Iterable[str], robot: Robot | None) -> str:
+    """Return the name given, or by default that of the robot's first, or of one for the legs."""
+    return network or (robot.networks[0] if robot is not None else network_of(legs))
+
+
+def network_for(network: str, legs: Mapping[str, Sequence[str]], robot: Robot | None
+                ) -> type[Network]:
+    """Return the network of a name, or by default the robot's first, or the first for the legs.
+
+    Raises:
+        InputError: there is none of this name, or for these legs.
+
+    """
     try:
-        return with_legs_of(find_network(network or (
-            robot.networks[0] if robot is not None else network_of(legs))), legs)
+        return with_legs_of(find_network(network_name(network, legs, robot)), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
 
@@ -401,7 +411,7 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if np.isnan(recording.cycle):
         recording = repeat_stride(recording)
     legs, read = leg_joints(recording, robot)
-    kind = _kind(network, legs, robot)
+    kind = network_for(network, legs, robot)
     recording, cells, stride, warnings = _steady(recording, legs, kind, robot, gait)
     if not (gait or stride.gait or network or kind.offsets):
         warnings.append(_none_of(kind, stride))

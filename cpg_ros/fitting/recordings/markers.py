@@ -374,25 +374,29 @@ def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: S
         points: of the markers, nan where missing, shape (n, markers, 2 or 3).
 
     """
+    recording = recording_of(source, markers.stamps, joints, angles, notes)
     there = set(markers.names)
     body = [markers.names.index(name) for name in segments.body if name in there]
     feet = {leg: [markers.names.index(name) for name in names]
             for leg, names in segments.feet.items() if set(names) <= there}
-    solid = points.shape[2] == 3 and body and feet
-    below = points[:, body].mean(axis=1, keepdims=True) - points[:, [
-        marker for own in feet.values() for marker in own]] if solid else np.empty(0)
-    if not np.isfinite(below).any():
-        return recording_of(source, markers.stamps, joints, angles, notes)
+    if points.shape[2] < 3 or not body or not feet:
+        return recording
+    place, times = points[:, body].mean(axis=1), 1e-9 * markers.stamps
+    below = place[:, None] - points[:, [marker for own in feet.values() for marker in own]]
+    if not np.isfinite(below).all(axis=2).any():
+        return recording
+    # The last axis from the feet upward.
     below = np.nanmean(below, axis=(0, 1))
     up = int(np.argmax(np.abs(below)))
-    # The last axis from the feet upward.
-    points = np.sign(below[up]) * np.roll(points, 2 - up, axis=2)
-    place = points[:, body].mean(axis=1)
-    recording = recording_of(
-        source, markers.stamps, joints, angles, notes,
-        body=None if math.isnan(markers.unit) else markers.unit * place)
-    loads = contacts(footfalls(1e-9 * markers.stamps, place, {
-        leg: points[:, own] for leg, own in feet.items()}), recording.start, recording.times)
+    points, place = (np.sign(below[up]) * np.roll(array, 2 - up, axis=-1)
+                     for array in (points, place))
+    if not math.isnan(markers.unit):
+        seen = np.isfinite(place).all(axis=1)
+        recording = replace(recording, body=markers.unit * np.column_stack([
+            np.interp(recording.times, times[seen] - recording.start, column)
+            for column in place[seen].T]))
+    loads = contacts(footfalls(times, place, {leg: points[:, own] for leg, own in feet.items()}),
+                     recording.start, recording.times)
     return recording if loads is None else replace(recording,
                                                    loads=replace(loads, by_motion=True))
 

@@ -234,8 +234,7 @@ def unwrapped(angles: np.ndarray) -> np.ndarray:
 
 
 def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: np.ndarray,
-                 notes: Sequence[str] = (), joints: Sequence[str] = (),
-                 body: np.ndarray | None = None) -> Recording:
+                 notes: Sequence[str] = (), joints: Sequence[str] = ()) -> Recording:
     """Make a recording of all angles of a file.
 
     Args:
@@ -245,7 +244,6 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
         angles: rad, shape (n, names).
         notes: initial notes.
         joints: names or patterns, in the order to return; all if empty.
-        body: as of Recording, at these stamps, nan where missing; None if unknown.
 
     Raises:
         RecordingError: see `merged` and `matching`.
@@ -254,10 +252,6 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
     require(names, names, str(path))
     recording = merged([(stamps, names, angles)], printable(str(path)),
                    matching(joints, names, str(path)))
-    if body is not None and (there := np.isfinite(body).all(axis=1)).any():
-        times = 1e-9 * stamps[there] - recording.start
-        body = np.column_stack([np.interp(recording.times, times, one) for one in body[there].T])
-        recording = replace(recording, body=body)
     return replace(recording, notes=(*map(printable, notes), *recording.notes))
 
 

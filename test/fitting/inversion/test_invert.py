@@ -18,7 +18,7 @@ from dataclasses import replace
 
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.fitting.inversion import invert as inversion
-from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Period
+from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
 from cpg_ros.fitting.inversion.fit import correlation_length
 from cpg_ros.fitting.inversion.fit_data import cells_of, Joints
 from cpg_ros.fitting.inversion.free_parameters import free_numbers
@@ -48,11 +48,11 @@ def test_the_jacobian_is_that_of_the_residual(name, gait, free):
     data = np.random.default_rng(0).standard_normal((32, 4))
     joints = Joints(tuple('abcd'), theta, data, cells, np.ones(4))
     problem = CycleProblem(joints, np.array([0.5, 1.0, 2.0, 1.0]), network, gait, numbers, 3,
-                           GaitReadout(), Period(11.0, 0.1))
+                           GaitReadout())
     values = np.array([*(one.value(network) for one in numbers), 0.13])
     problem.begin(values)
     slopes = problem(values)[1]
-    assert slopes.shape == (4 * 32 + 1, len(free) + 1)
+    assert slopes.shape == (4 * 32, len(free) + 1)
     for k in range(values.size):
         step = 1e-5 * max(1.0, abs(values[k])) * (np.arange(values.size) == k)
         ahead, behind = problem(values + step)[0], problem(values - step)[0]
@@ -91,16 +91,6 @@ def test_lower_orders_fit_what_they_can():
     fractions = [invert(cubic, cells, TROT, 'trot', ('c',), order).mean_rms_share
               for order in (1, 2, 3)]
     assert fractions[0] > fractions[1] > fractions[2] and fractions[0] > 0.02
-
-
-def test_a_period_is_fitted_where_time_has_a_scale():
-    recording, cells = trot(1, frequency=1.6)
-    orbit = solve_orbit(TROT, 'trot')
-    scale = 1.0 / (1.6 * orbit.period)
-    free = invert(recording, cells, TROT, 'trot', ('c', 'tau'))
-    bound = invert(recording, cells, TROT, 'trot', ('c', 'tau'), time_scale=scale)
-    assert bound.orbit.period == pytest.approx(orbit.period, rel=2e-3)
-    assert bound.parameters['tau'].stderr < 0.5 * free.parameters['tau'].stderr
 
 
 # -- a model that is not the truth ---------------------------------------------------------------
@@ -288,8 +278,6 @@ def test_verdicts_come_with_a_fit():
     fit = invert(recording, cells, TROT, 'trot', ('c',))
     assert fit.hopf.value == pytest.approx(0.2852, abs=1e-4)
     assert not fit.verdict.stable and fit.verdict.stable_with_default_gain
-    theta, errors = fit.synchronisation()
-    assert theta == pytest.approx(np.arange(20) / 20) and errors.shape == (6, 20)
 
 
 # -- nonsense ----------------------------------------------------------------------------------
