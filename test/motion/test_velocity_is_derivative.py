@@ -128,7 +128,7 @@ def test_steps_are_between_velocities_where_a_network_turns_within_a_tick():
     robot, rate, draws = load_robot('unitree_go2'), 500.0, np.random.default_rng(10)
     gaits = [plan_gait(robot, gait, frequency, network='delayed')
              for gait in PRESETS['delayed'] for frequency in (0.5, 1.3, 2.2)]
-    pattern, limit = Pattern(gaits[0], 0.2, drive=StrideCommand(4)), robot.column('velocity')
+    pattern, limit = Pattern(gaits[0], 0.2, strides=StrideCommand(4)), robot.column('velocity')
     for _ in range(400):
         draw = draws.random()
         if draw < 0.4:
