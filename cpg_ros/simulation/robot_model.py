@@ -39,8 +39,10 @@ import numpy as np
 # Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
 
 #: The Unitree Go2. KP: stiffness of its joints, N m/rad; KD: damping, N m s/rad; BORNE: mass per
-#: leg, kg; SPEED: speed of the joints in its trot, rad/s.
+#: leg, kg; SPEED: largest speed of the joints in its trot, rad/s.
 KP, KD, BORNE, SPEED = 60.0, 2.0, 15.206 / 4.0, 12.0
+#: SERVO: limit up to which joints are taken for hobby servos, rad/s.
+SERVO = 10.0
 #: STEADY: least inertia of a motor, as a multiple of kp timestep^2, with which control is stable.
 STEADY = 2.0
 
@@ -48,7 +50,7 @@ STEADY = 2.0
 def usual_gains(mass: float, legs: int, speed: float = math.inf) -> tuple[float, float]:
     """Return kp in N m / rad and kd in N m s / rad for a robot, in two digits.
 
-    Joints slower than a Go2's at this size are geared down, as hobby servos are, and as much
+    Hobby servos that are slower than a Go2's joints at this size are geared down, and as much
     stiffer.
 
     Args:
@@ -58,7 +60,7 @@ def usual_gains(mass: float, legs: int, speed: float = math.inf) -> tuple[float,
 
     """
     larger = mass / legs / BORNE
-    geared = max(1.0, SPEED / larger**(1.0 / 6.0) / speed)
+    geared = max(1.0, SPEED / larger**(1.0 / 6.0) / speed) if speed <= SERVO else 1.0
     return (float(f'{geared * KP * larger**(4.0 / 3.0):.2g}'),
             float(f'{geared * KD * larger**1.5:.2g}'))
 

@@ -285,14 +285,16 @@ def test_gains_go_with_the_mass():
     assert usual_gains(7.6, 2) == (60.0, 2.0)
 
 
-def test_joints_that_are_slow_for_their_robot_are_taken_for_geared_ones():
+def test_servos_that_are_slow_for_their_robot_are_taken_for_geared_ones():
     """Half as fast as a Go2's in a trot, 12 rad/s, and twice as stiff."""
     assert usual_gains(15.2, 4, 6.0) == (120.0, 4.0)
     assert usual_gains(15.2, 4, 20.0) == (60.0, 2.0)
     # A 64th of the mass is a quarter of the length, where 24 rad/s are as fast.
     kp, kd = usual_gains(15.2 / 64.0, 4)
-    assert usual_gains(15.2 / 64.0, 4, 12.0) == (pytest.approx(2.0 * kp, rel=0.05),
-                                                 pytest.approx(2.0 * kd, rel=0.05))
+    assert usual_gains(15.2 / 64.0, 4, 8.0) == (pytest.approx(3.0 * kp, rel=0.05),
+                                                pytest.approx(3.0 * kd, rel=0.05))
+    # No servo.
+    assert usual_gains(15.2 / 64.0, 4, 12.0) == (kp, kd)
 
 
 def test_gains_are_guessed_where_they_are_not_given(tmp_path):

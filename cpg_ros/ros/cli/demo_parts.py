@@ -236,7 +236,7 @@ def add_options(parser: ArgumentParser) -> None:
                         f'designs to try for each gait (default: {EVALUATIONS})')
     parser.add_argument('--kp', type=number, metavar='NM', help='with --urdf or --mjcf: '
                         'proportional gain of the joints, N m/rad, to tune and to drive it with '
-                        "(default: a Go2's, scaled to the robot's mass; servos are stiffer)")
+                        "(default: a Go2's, scaled to the robot's mass, higher for slow servos)")
     parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
                         'N m s/rad, likewise')
 
