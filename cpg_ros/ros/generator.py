@@ -426,8 +426,7 @@ class Generator(StartedNode):
 
     def _walk(self, walking: bool) -> str:
         """Ramp into the gait, standing up first, or down to the stand; return ''."""
-        if walking:
-            self.ticker.stopping = False
+        self.ticker.stop_moving(False)
         self._posture.walks = False
         if walking and self._posture.seated:
             self._posture.rise(True)
@@ -564,9 +563,9 @@ class Generator(StartedNode):
     def look(self) -> float:
         """Pass the wanted motion, and whether it rests, on to ticks outside the interpreter."""
         self._feedback.renew()
-        if self.ticker.stopping and self.pattern.standing:
-            self.ticker.stopping = False
-        return 0.02 if self._feedback.active or self.ticker.stopping else 0.1
+        if self.pattern.standing:
+            self.ticker.stop_moving(False)
+        return 0.02 if self._feedback.active else 0.1
 
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.

@@ -148,9 +148,9 @@ def test_a_stop_does_not_wait_for_a_clock_that_stands_still(start, number):
     process.signal(number)
     assert process.wait() == 0
     stamps, positions, velocities = check(settled(watcher), 100)
-    # Stamps go on from the last one.
+    # Stamps go on from the last one; a busy machine leaves some out, and ends later.
     assert off_grid(stamps, 0.01) < 1e-6
-    assert stamps[-1] - before[-1][0] == pytest.approx(0.5, abs=0.1)
+    assert 0.4 < stamps[-1] - before[-1][0] < 1.2
     assert np.abs(positions[-1] - stand(watcher)).max() < 1e-6
     assert np.abs(velocities[-1]).max() < 1e-6
 

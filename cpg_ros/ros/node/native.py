@@ -32,78 +32,76 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 _SOURCE = Path(__file__).with_name('tick.c')
 
 
+def _fields(*fields: tuple[Any, str]) -> list[tuple[str, Any]]:
+    """Return the fields of a struct, from pairs of a type and names."""
+    return [(name, kind) for kind, names in fields for name in names.split()]
+
+
+_POINTER, _LONG, _INT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32
+
+
 class Serialized(ctypes.Structure):
     """``rcutils_uint8_array_t``."""
 
-    _fields_ = (('buffer', ctypes.c_void_p), ('length', ctypes.c_size_t),
-                ('capacity', ctypes.c_size_t), ('allocator', 5 * ctypes.c_void_p))
+    _fields_ = _fields((_POINTER, 'buffer'), (ctypes.c_size_t, 'length capacity'),
+                       (5 * _POINTER, 'allocator'))
 
 
 class SerializedMessages(ctypes.Structure):
     """The struct ``block`` of ``tick.c``."""
 
-    _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'send', 'publisher', 'message', 'memory', 'words', 'place', 'source')),
-        ('messages', ctypes.c_int64), ('changes', ctypes.c_int64))
+    _fields_ = _fields((_POINTER, 'send publisher message memory words place source'),
+                       (_LONG, 'messages changes'))
 
 
 class Counters(ctypes.Structure):
     """The struct ``counters`` of ``tick.c``."""
 
-    _fields_ = (*((name, ctypes.c_int64) for name in ('ticks', 'late', 'dropped', 'worst')),
-                *((name, ctypes.c_int32) for name in ('resuming', 'wanted', 'stopping')))
+    _fields_ = _fields((_LONG, 'ticks late dropped worst'), (_INT, 'resuming wanted stopping'))
 
 
 class Output(ctypes.Structure):
     """The struct ``output`` of ``tick.c``: a block, and addresses of its parts' numbers."""
 
-    _fields_ = (*((name, ctypes.c_void_p) for name in ('to', 'from', 'sizes')),
-                *((name, ctypes.c_int64) for name in ('parts', 'every', 'since', 'quiet')),
-                ('while_not_0', ctypes.c_void_p), ('first', ctypes.c_double))
+    _fields_ = _fields((_POINTER, 'to from sizes'), (_LONG, 'parts every since quiet'),
+                       (_POINTER, 'while_not_0'), (ctypes.c_double, 'first'))
 
 
 class Input(ctypes.Structure):
     """The struct ``input`` of ``tick.c``."""
 
-    _fields_ = (('subscription', ctypes.c_void_p), ('message', Serialized),
-                *((name, ctypes.c_void_p) for name in (
-                    'known', 'same', 'place', 'values', 'stamp', 'news')),
-                *((name, ctypes.c_int64) for name in ('ranges', 'count', 'depth', 'length')),
-                ('stamped', ctypes.c_int32), ('unread', ctypes.c_int32))
+    _fields_ = _fields((_POINTER, 'subscription'), (Serialized, 'message'),
+                       (_POINTER, 'known same place values stamp news'),
+                       (_LONG, 'ranges count depth length'), (_INT, 'stamped unread'))
 
 
 class Copy(ctypes.Structure):
     """The struct ``copy`` of ``tick.c``."""
 
-    _fields_ = ('to', ctypes.c_void_p), ('from', ctypes.c_void_p), ('size', ctypes.c_int64)
+    _fields_ = _fields((_POINTER, 'to from'), (_LONG, 'size'))
 
 
 class Correction(ctypes.Structure):
     """The struct ``correction`` of ``tick.c``."""
 
-    _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'close', 'finish', 'arguments', 'report', 'plan', 'follow', 'take', 'forget', 'numbers',
-        'gaits', 'inputs', 'resets')), ('count', ctypes.c_int64), ('parts', ctypes.c_int64))
+    _fields_ = _fields((_POINTER, 'close finish arguments report plan follow take forget numbers '
+                        'gaits inputs resets'), (_LONG, 'count parts'))
 
 
 class Simulated(ctypes.Structure):
     """The struct ``simulated`` of ``tick.c``."""
 
-    _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'subscription', 'set', 'clear', 'add', 'wait', 'take', 'forget')),
-                ('message', Serialized),
-                *((name, ctypes.c_int64) for name in ('time', 'step', 'moved', 'deadline')))
+    _fields_ = _fields((_POINTER, 'subscription set clear add wait take forget'),
+                       (Serialized, 'message'), (_LONG, 'time step moved deadline'))
 
 
 class Loop(ctypes.Structure):
     """The struct ``loop`` of ``tick.c``."""
 
-    _fields_ = (*((name, ctypes.c_void_p) for name in (
-        'count', 'asked', 'advance', 'resume', 'what')),
-                *((name, ctypes.c_int64) for name in (
-                    'deadline', 'period', 'stall', 'stamp', 'behind')),
-                *((name, ctypes.c_void_p) for name in ('offset', 'clock', 'correct')),
-                ('outputs', 4 * ctypes.c_void_p), ('due', ctypes.c_int32))
+    _fields_ = _fields((_POINTER, 'count asked advance resume what'),
+                       (_LONG, 'deadline period stall stamp behind'),
+                       (_POINTER, 'offset clock correct'), (4 * _POINTER, 'outputs'),
+                       (_INT, 'due'))
 
 
 class _ErrorText(ctypes.Structure):

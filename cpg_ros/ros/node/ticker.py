@@ -253,23 +253,14 @@ class Ticker(TickThread):
         """Whether it has not been started, or is paused."""
         return self.paused or not self.is_alive()
 
-    @property
-    def stopping(self) -> bool:
-        """Whether the ticks do not wait for ``/clock``; set it False at rest."""
-        return bool(self.count.stopping)
-
-    @stopping.setter
-    def stopping(self, stopping: bool) -> None:
-        self.count.stopping = stopping
-
     def end(self) -> None:
         """Stop after the present tick."""
         super().end()
         self.attend()
 
-    def stop_moving(self) -> None:
-        """While ``stopping``, tick by the steady clock if ``/clock`` stands still."""
-        self.stopping = True
+    def stop_moving(self, stopping: bool = True) -> None:
+        """Tick by the steady clock if ``/clock`` stands still, until called with False."""
+        self.count.stopping = stopping
 
     def attend(self) -> None:
         """Let ``prepare`` be called before the next tick."""

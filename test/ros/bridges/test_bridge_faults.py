@@ -129,15 +129,15 @@ def test_servos_keep_their_torque_while_a_bridge_stalls(robot, seconds):
 
 
 @pytest.mark.parametrize(('bus', 'bridge', 'words'), [
-    (SLOW_BUS, 'watchdog_timeout:=0.3', 'damping: the watchdog has damped the robot'),
-    ('command_timeout:=0.3', 'watchdog_timeout:=5.0', 'damping: no fresh state of the robot')])
+    (SLOW_BUS, 'watchdog_timeout:=1.0', 'damping: the watchdog has damped the robot'),
+    ('command_timeout:=1.0', 'watchdog_timeout:=5.0', 'damping: no fresh state of the robot')])
 def test_servos_that_were_let_go_stay_so_until_a_new_start(robot, bus, bridge, words):
     one, watcher = robot(bus)
-    one.start('state_timeout:=2.0', bridge)
+    one.start(SLOW, bridge)
     with Sender(one.domain, f'/a/{TARGETS}', swinging(0.2)):
         one.bridge.wait_for('following: targets have come')
         begun = len(one.chain.torques)
-        stall(one.bridge, 0.8)
+        stall(one.bridge, 2.0)
         one.bridge.wait_for(words)
         assert words in error_of(watcher)
         packets = one.chain.packets
