@@ -35,6 +35,7 @@ smartquotes = False
 html_theme = 'furo'
 html_static_path = ['static']
 html_css_files = ['site.css']
+html_search_scorer = str(HERE / 'static' / 'scorer.js')
 html_title = f'cpg_ros {release}'
 exclude_patterns = ['_build', 'playground']
 

@@ -214,13 +214,13 @@ class Commands:
                positions: Sequence[float]) -> None:
         layout = self._known.get(topic)
         if layout is None or layout[0] != names:
-            layout = list(names), self._places(topic, joints, names)
+            layout = list(names), self._indices(topic, joints, names)
             self._known[topic] = layout
         if len(positions) != len(names):
             raise _Bad(f'{topic}: {len(positions)} positions for {len(names)} joints')
         self._write(topic, names, layout[1], positions)
 
-    def _places(self, topic: str, joints: tuple[str, ...], names: list[str]) -> np.ndarray:
+    def _indices(self, topic: str, joints: tuple[str, ...], names: list[str]) -> np.ndarray:
         for name in names:
             if name not in joints:
                 raise _Bad(f"{topic}: joint '{name}' is not one of {', '.join(joints)}")

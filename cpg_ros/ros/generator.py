@@ -99,7 +99,7 @@ class Diagnostics:
         new = {key: counts[key] - before[key] for key in counts}
         plan = pattern.plan
         self._silent = 0 if new['ticks'] and not self._ticker.paused else self._silent + 1
-        misfit = self._cmd_vel.look_for_misfits() if self._cmd_vel else ''
+        misfit = self._cmd_vel.find_misfits() if self._cmd_vel else ''
         if new['watchdog re-seeds'] or pattern.recovering:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
             if plan.gain == 0.0:
@@ -219,7 +219,7 @@ class Generator(StartedNode):
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
                                         self._cmd_vel, self._feedback, lambda: self._awaited,
                                         lambda: self._tracking.text if self._tracking else '')
-        self.add_on_set_parameters_callback(self._judge)
+        self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
         if self._value('exclusive') and self._others.seek(joined + DISCOVERY - time.monotonic()):
@@ -300,7 +300,7 @@ class Generator(StartedNode):
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
         return self._planner.complete(super()._complete(parameters), self._values())
 
-    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+    def _validate(self, parameters: list[Parameter]) -> SetParametersResult:
         """Return whether a batch can run as a whole, without changing anything."""
         plan = self.pattern.plan
         if any(p.name in self._planner.names for p in parameters):
@@ -308,9 +308,9 @@ class Generator(StartedNode):
                 plan = self._planner.plan(self._values(parameters))
             except PlanError as error:
                 return SetParametersResult(successful=False, reason=str(error))
-            if reason := self._feedback.refuses(plan):
+            if reason := self._feedback.validate_plan(plan):
                 return SetParametersResult(successful=False, reason=reason)
-        reason = self._posture.judge(parameters, plan) or self._feedback.judge(parameters)
+        reason = self._posture.validate(parameters, plan) or self._feedback.judge(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
@@ -387,9 +387,9 @@ class Generator(StartedNode):
         """Start publishing; return why not, or '', and the name of the initial pose."""
         if self._value('exclusive') and self._others.check():
             return self._others.text, ''
-        refusal, pose = self._find_pose()
-        if refusal:
-            return refusal, ''
+        reason, pose = self._find_pose()
+        if reason:
+            return reason, ''
         self._end_search()
         if self.ticker.paused:
             self.pattern.restart(self._value('ramp'), False)
@@ -402,14 +402,14 @@ class Generator(StartedNode):
             self.ticker.start()
         return '', 'the stand' if pose is None else 'the measured pose'
 
-    def _look_for_pose(self) -> None:
+    def _await_pose(self) -> None:
         """Start publishing as soon as the pose is measured; log changes of the reason why not."""
-        refusal, pose = self._start_publishing()
-        if not refusal:
+        reason, pose = self._start_publishing()
+        if not reason:
             self.get_logger().info(f'beginning from {pose}')
-        elif refusal != self._unmeasured:
-            self.get_logger().warning(f'waiting: {refusal}')
-        self._unmeasured = refusal
+        elif reason != self._unmeasured:
+            self.get_logger().warning(f'waiting: {reason}')
+        self._unmeasured = reason
 
     def _end_search(self) -> None:
         """Stop waiting for the pose."""
@@ -475,9 +475,9 @@ class Generator(StartedNode):
                 self._end_search()
                 response.message = 'nothing is published yet'
                 return response
-            refusal, pose = self._start_publishing()
-            if refusal:
-                response.success, response.message = False, refusal
+            reason, pose = self._start_publishing()
+            if reason:
+                response.success, response.message = False, reason
                 return response
             response.message += f' from {pose}'
         self._walk(request.data)
@@ -553,14 +553,14 @@ class Generator(StartedNode):
         elif self._value('autostart') and self._needs_pose and self._measured is not None:
             self.get_logger().info('publishing nothing until the pose is measured on '
                                    f'{self._measured.topic}, then {at}')
-            self._search = self.create_timer(SEARCH, self._look_for_pose, clock=STEADY)
+            self._search = self.create_timer(SEARCH, self._await_pose, clock=STEADY)
         elif self._value('autostart'):
             self.get_logger().info(f'publishing {at}')
             self.ticker.start()
         else:
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
-    def look(self) -> float:
+    def poll(self) -> float:
         """Pass the wanted motion, and whether it rests, on to ticks outside the interpreter."""
         self._feedback.renew()
         if self.pattern.standing:

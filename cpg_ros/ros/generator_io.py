@@ -215,10 +215,10 @@ class CmdVel:
         self._misfit = ''
         node.create_subscription(
             TwistStamped if self._stamped else Twist, 'cmd_vel',
-            self._take_stamped if self._stamped else self._take, QoSProfile(depth=10),
+            self._receive_stamped if self._stamped else self._receive, QoSProfile(depth=10),
             qos_overriding_options=OVERRIDABLE)
         # A system clock that is set must not stop the robot, nor keep it going.
-        node.create_timer(LOOK, self._look, clock=STEADY)
+        node.create_timer(LOOK, self._check, clock=STEADY)
 
     @property
     def walking(self) -> bool:
@@ -247,7 +247,7 @@ class CmdVel:
         clock: Any = self._node.get_clock()
         return (clock if clock.ros_time_is_active else STEADY).now().nanoseconds * 1e-9
 
-    def look_for_misfits(self) -> str:
+    def find_misfits(self) -> str:
         """Return who publishes commands of the other type, which do not arrive; log changes."""
         own, other = ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist')[
             ::1 if self._stamped else -1]
@@ -262,7 +262,7 @@ class CmdVel:
         self._misfit = text
         return text
 
-    def _take_stamped(self, message: TwistStamped) -> None:
+    def _receive_stamped(self, message: TwistStamped) -> None:
         """Accept a fresh command in the base's frame; a stamp of 0 counts as fresh."""
         stamp, frame = message.header.stamp, message.header.frame_id
         base = self._node.get_parameter('feedback.base_frame').value
@@ -276,9 +276,9 @@ class CmdVel:
             self._log.warning(f'cmd_vel ignored: its stamp is {abs(age):.3g} s {side}; the clocks '
                               'of sender and generator must agree', throttle_duration_sec=QUIET)
             return
-        self._take(message.twist)
+        self._receive(message.twist)
 
-    def _take(self, message: Twist) -> None:
+    def _receive(self, message: Twist) -> None:
         speed, turn, aside = message.linear.x, message.angular.z, message.linear.y
         if not all(math.isfinite(value) for value in (speed, turn, aside)):
             self._log.warning(f'cmd_vel ignored: {speed} m/s forward, {aside} m/s to the left, '
@@ -298,7 +298,7 @@ class CmdVel:
             self._target, self._when, self._stale = (speed, aside, turn), self._now(), False
             self._act()
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         age = self._now() - self._when
         stale = not 0.0 <= age <= self._timeout()
         if stale == self._stale:

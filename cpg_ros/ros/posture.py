@@ -82,11 +82,11 @@ class Posture:
         self.seated = self.walks = self._rises = False
         self._timer = node.create_timer(LOOK, self._go_on, clock=STEADY, autostart=False)
         self._pose = self._asked({})
-        if reason := self.judge([], plan()):
+        if reason := self.validate([], plan()):
             raise InputError(reason)
         if any(self._pose):
             self._aim(self._pose)
-        node.create_subscription(Pose, 'body_pose', self._take, QoSProfile(depth=1),
+        node.create_subscription(Pose, 'body_pose', self._receive, QoSProfile(depth=1),
                                  qos_overriding_options=OVERRIDABLE)
         self._serve('sit', 'sitting down', self._sit)
         self._serve('stand', 'standing up: ~/enable walks', lambda: self.rise(False))
@@ -96,7 +96,7 @@ class Posture:
         return tuple(changes.get(name, self._node.get_parameter(name).value)
                      for name in (f'{PREFIX}{number}' for number in POSE))
 
-    def judge(self, parameters: Sequence[Parameter], plan: GaitPlan) -> str:
+    def validate(self, parameters: Sequence[Parameter], plan: GaitPlan) -> str:
         """Return why a batch of changes, or a plan, is rejected, or ''."""
         changes = {parameter.name: parameter.value for parameter in parameters}
         end = changes.get('end', self._node.get_parameter('end').value)
@@ -128,7 +128,7 @@ class Posture:
     def _move(self, pose: Sequence[float] | np.ndarray) -> None:
         self._body.go_to(pose, self._node.get_parameter('ramp').value)
 
-    def _take(self, message: Pose) -> None:
+    def _receive(self, message: Pose) -> None:
         """Accept a pose in champ's convention: z above the stand's height, and an orientation."""
         place, q = message.position, message.orientation
         numbers = np.array([q.w, q.x, q.y, q.z])

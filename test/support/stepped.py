@@ -96,7 +96,7 @@ class SteppedGenerator:
         while not self._node.stop.is_set():
             try:
                 self._executor.spin_once(timeout_sec=0.02)
-                self._node.look()
+                self._node.poll()
             except ExternalShutdownException:
                 return
 

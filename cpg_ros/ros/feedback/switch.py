@@ -230,7 +230,7 @@ class FeedbackSwitch:
         obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
-    def refuses(self, plan: GaitPlan) -> str:
+    def validate_plan(self, plan: GaitPlan) -> str:
         """Return why a gait cannot run, or ''; point feet run it without an efference copy."""
         if self._biped is None or plan.balanced or not self._value('enabled'):
             return ''

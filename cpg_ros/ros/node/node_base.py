@@ -283,7 +283,7 @@ class StartedNode(Node):
     def begin(self) -> None:
         """Start the thread."""
 
-    def look(self) -> float:
+    def poll(self) -> float:
         """Do periodic work in the main thread; return the time until the next call, s."""
         return 0.1
 
@@ -427,7 +427,7 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     os.set_blocking(waking, False)
     signal.set_wakeup_fd(waking, warn_on_full_buffer=False)
     while not signals and not node.stop.is_set():
-        select.select([woken], [], [], node.look())
+        select.select([woken], [], [], node.poll())
     node.stop.set()
     node.parameter_service.end()
     node.finish()

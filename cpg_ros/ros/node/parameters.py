@@ -330,7 +330,7 @@ class StrictParameterService(ParameterService):
             waiting = _thinned(waiting, self._get_node().SETS_OTHERS)
             if waiting and not self._ending:
                 change = waiting.pop(0)
-                result = self._judged(change.parameters)
+                result = self._validated(change.parameters)
                 change.answer(result)
                 if not result.successful:
                     waiting[:0] = change.replaced
@@ -339,7 +339,7 @@ class StrictParameterService(ParameterService):
                     earlier.answer(_refused('superseded: a later request that came while this '
                                             'one was waiting sets the same'))
 
-    def _judged(self, parameters: list[Parameter]) -> SetParametersResult:
+    def _validated(self, parameters: list[Parameter]) -> SetParametersResult:
         node = self._get_node()
         try:
             return node.set_parameters_atomically(parameters)

@@ -1,0 +1,13 @@
+// Scores of the site's search: guides come before pages of Python modules.
+
+var Scorer = {
+  score: ([page, , , , score]) => page.startsWith('reference/python') ? score - 25 : score,
+  objNameMatch: 11,
+  objPartialMatch: 6,
+  objPrio: { 0: 15, 1: 5, 2: -5 },
+  objPrioDefault: 0,
+  title: 15,
+  partialTitle: 7,
+  term: 5,
+  partialTerm: 2,
+};
