@@ -21,9 +21,13 @@ import ctypes
 from typing import Any
 
 from cpg_ros.dynamics.integration.machine_code import machine_function
+from cpg_ros.feedback.biped.balance import balance, take_measurements
+from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
+from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.closed_loop import (
     close,
     closing_arguments,
+    DT,
     finish,
     Instant,
     STATE,
@@ -31,7 +35,8 @@ from cpg_ros.feedback.closed_loop import (
 )
 from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.kinematics import Geometry, LegArrays
+from cpg_ros.motion.robot import Robot
 from numba.extending import intrinsic
 import numpy as np
 
@@ -74,6 +79,23 @@ def finishing_function(arguments: tuple) -> Any:
     return machine_function(_finish, arguments)
 
 
+def _balance(arguments):
+    (senses, sensors, legs, numbers, rows, watch, biped) = _loaded(arguments)
+    take_measurements(senses, sensors, legs, numbers, rows, watch)
+    balance(biped, watch, numbers[DT])
+    return 0
+
+
+def balancing_function(arguments: tuple) -> Any:
+    """Compile ``take_measurements`` and ``balance`` as closing_function does ``close``.
+
+    Args:
+        arguments: of the first, then a Biped.
+
+    """
+    return machine_function(_balance, arguments)
+
+
 def memory_of(value: Any) -> Any:
     """Return an array, a number or a tuple of such as that function takes it.
 
@@ -89,6 +111,17 @@ def memory_of(value: Any) -> Any:
         return kind(*parts)
     kinds = {bool: ctypes.c_bool, int: ctypes.c_int64, float: ctypes.c_double}
     return kinds[type(value)](value)
+
+
+def warm_up_balance(robot: Robot) -> None:
+    """Compile what a generator uses of a robot with soles."""
+    feedback = BipedFeedback(robot)
+    pattern = BalancedPattern(feedback.plan)
+    pattern.prepare(feedback)
+    senses, sensors = warm_up_senses(len(robot.legs), len(feedback.order))
+    nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)
+    balancing_function((senses, sensors, nothing, np.zeros(2), feedback.biped.servos.rows,
+                        pattern.watch, feedback.biped))
 
 
 def warm_up(geometry: Geometry, joints: int) -> None:

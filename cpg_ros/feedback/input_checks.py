@@ -151,16 +151,6 @@ class InputMonitor:
         """Age of the newest measurement when it is used, by its stamp, low-passed, s, or nan."""
         return float(self.numbers[AGE])
 
-    @property
-    def refused(self) -> bool:
-        """Whether messages have come, but none was valid."""
-        return self.believed == -math.inf and bool(self.numbers[WRONG])
-
-    def latency(self, now: float) -> float:
-        """Return the time since the last valid measurement by its stamp, s; 0 without stamps."""
-        measured = float(self.numbers[MEASURED])
-        return 0.0 if math.isnan(measured) else max(now - measured, 0.0)
-
     def fault(self, now: float) -> str:
         """Return why the input is out, or ''."""
         is_out(self.numbers, now)

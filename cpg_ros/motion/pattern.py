@@ -41,13 +41,13 @@ SETTLING = 40.0
 KICK = 0.05
 
 
-def _shared(name: str) -> Any:
-    """Return a property that reads and writes a number of the core's struct."""
+def shared(name: str, struct: str = '_struct') -> Any:
+    """Return a property that reads and writes a number of a struct, which it has by name."""
     def read(self: Any) -> Any:
-        return getattr(self._struct, name)
+        return getattr(getattr(self, struct), name)
 
     def write(self: Any, value: float) -> None:
-        setattr(self._struct, name, value)
+        setattr(getattr(self, struct), name, value)
     return property(read, write)
 
 
@@ -81,7 +81,7 @@ class GaitRunner:
 
     """
 
-    phase, progress, settling = _shared('phase'), _shared('progress'), _shared('settling')
+    phase, progress, settling = shared('phase'), shared('progress'), shared('settling')
     strides = _steered('stride', lambda strides: strides.stride.ctypes.data)
 
     def __init__(self, plan: GaitPlan, transition: float,
@@ -170,8 +170,8 @@ class Pattern:
 
     """
 
-    faults, held = _shared('faults'), _shared('ticks_held')
-    frequency_scale, substep = _shared('frequency_scale'), _shared('substep')
+    faults, held = shared('faults'), shared('ticks_held')
+    frequency_scale, substep = shared('frequency_scale'), shared('substep')
     strides = _steered('strides', lambda strides: strides.address)
 
     def __init__(self, plan: GaitPlan, ramp: float = 1.0, enabled: bool = True,

@@ -77,17 +77,11 @@ class KpScaleSubscription:
 HELD_TOPIC = 'held/joint_states'
 
 
-class HeldPublisher:
-    """Publishes where held joints are to be driven."""
-
-    def __init__(self, node: Node, robot: Robot) -> None:
-        sizes = [len(robot.held)]
-        self._block = MessageBlock(node, sizes, [
-            (HELD_TOPIC, joint_state(tuple(robot.held), *indices(sizes)))])
-
-    def publish(self, stamp: int, angles: np.ndarray) -> None:
-        """Publish angles in rad, in the order of ``robot.held``; stamp in ns."""
-        self._block.publish(stamp, (angles,))
+def held_block(node: Node, robot: Robot, angles: np.ndarray) -> MessageBlock:
+    """Return the message of where held joints are driven, rad, in the order of ``robot.held``."""
+    sizes = [len(robot.held)]
+    return MessageBlock(node, sizes, [
+        (HELD_TOPIC, joint_state(tuple(robot.held), *indices(sizes)))]).feed(angles)
 
 
 class HeldSubscription:

@@ -212,7 +212,7 @@ class Generator(StartedNode):
         self._posture = Posture(self, self.pattern, lambda: self._planner.plan(self._values()),
                                 self._walk, self._cannot_sit)
         real_time = RealTime.of(*map(self._value, SPECS))
-        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
+        self.ticker = Ticker(self, self._value('rate'), lambda *_: None, self._restart, self._fail,
                              self.pattern.resume, partial(real_time.request, self.get_logger()),
                              self._prepare)
         self._others = OtherPublishers(self, self._outputs.topics)
@@ -502,15 +502,6 @@ class Generator(StartedNode):
         else:
             self.get_logger().info('all joints follow again')
 
-    def _tick(self, dt: float, stamp: int) -> None:
-        """Tick in the interpreter, where robots with soles balance."""
-        if self.ticker.paused:
-            return
-        self._feedback.sense(dt, stamp)
-        self.pattern.advance(dt)
-        self.ticker.publish()
-        self._feedback.publish(stamp)
-
     @contextmanager
     def _prepare(self, loop: native.Loop) -> Iterator[None]:
         """Give ``tick.c`` all that its ticks need until ``Ticker.attend``; see Ticker."""
@@ -521,13 +512,12 @@ class Generator(StartedNode):
         with ExitStack() as kept:
             if not self.ticker.paused:
                 self._sent = self.pattern.position
-                if self.pattern.robot.biped is None:
-                    for name in ('asked', 'advance', 'resume', 'what'):
-                        setattr(loop, name, pattern[name])
-                    if feedback is not None:
-                        self._sent = feedback.target
-                        loop.correct = ctypes.addressof(feedback.compiled())
-                        kept.enter_context(feedback.inputs.held())
+                for name in ('asked', 'advance', 'resume', 'what'):
+                    setattr(loop, name, pattern[name])
+                if feedback is not None:
+                    self._sent = feedback.target
+                    loop.correct = ctypes.addressof(feedback.compiled())
+                    kept.enter_context(feedback.inputs.held())
                 self._outputs.block.feed(self._sent, pattern['velocity'], pattern['legs'])
                 blocks = [self._outputs.block, self._cells, *self._feedback.blocks]
                 for k, block in enumerate(blocks):

@@ -72,7 +72,7 @@ class StartProgress:
 
 #: Durations of compilation on one core of 2023, s. FEEDBACK: the kernels of the feedback; BALANCE:
 #: those of a biped's balance; NETWORK: a network in C.
-FEEDBACK, BALANCE, NETWORK = 25.0, 15.0, 2.0
+FEEDBACK, BALANCE, NETWORK = 25.0, 40.0, 2.0
 #: How often it is seen whether a compiling process has ended, s.
 LOOK = 0.05
 

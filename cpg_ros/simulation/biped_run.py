@@ -165,7 +165,7 @@ class BipedRun:
             work += dt * float(motor_power(body.torque, body.velocity)
                                + motor_power(held_torques, held_speeds))
             if time > began + SETTLING:
-                c, s = math.cos(feedback.memory.heading[0]), math.sin(feedback.memory.heading[0])
+                c, s = math.cos(feedback.memory.heading), math.sin(feedback.memory.heading)
                 x, y = body.rates[:2]
                 moved += c * x + s * y, c * y - s * x
                 count += 1
@@ -173,7 +173,7 @@ class BipedRun:
             if k % round(0.01 / dt) == 0:
                 path.append((time, *body.base, body.yaw))
                 poses.append(body.data.qpos.copy())
-            height = feedback.memory.center[0, 2] - feedback.memory.pose.soles[:, 2].min()
+            height = feedback.memory.center[0, 2] - feedback.pose.soles[:, 2].min()
             if body.fallen or height < LOW * feedback.gains.height:
                 outcome.fell = time
                 break

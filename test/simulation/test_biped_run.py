@@ -96,7 +96,7 @@ def test_it_stands_walks_and_stands_again(rounds):
     commands += [(8.0 * k + 5.0, *STOP) for k in range(rounds)]
     found = runner().run(8.0 * rounds, tuple(commands), feedback=feedback, seed=10)
     # The network is where its clock is from the first step of every walk, not of the first only.
-    assert math.isinf(found.fell) and not feedback.faults
+    assert math.isinf(found.fell) and not feedback.state.faults
     time, x = found.path[:, 0], found.path[:, 1]
     for k in range(rounds):
         # It walks in between, and stands at the end of each round.
@@ -112,7 +112,7 @@ def test_it_runs_and_hops_off_the_ground(name, gait, speed, flight):
     run = runner(name)
     feedback = BipedFeedback(run.robot, plan=gait_plan(run.robot, gait))
     found = run.run(10.0, ((1.0, speed, 0.0, 0.0),), feedback=feedback, seed=13)
-    assert math.isinf(found.fell) and not feedback.faults
+    assert math.isinf(found.fell) and not feedback.state.faults
     assert found.speed[0] == pytest.approx(speed, abs=0.03)
     assert found.flight > flight and found.tilt < 0.25
 
@@ -125,8 +125,8 @@ def test_it_changes_between_walk_run_hop_and_stand():
     commands = ((1.0, 0.3, 0.0, 0.0), (12.0, *STOP), (15.0, 0.0, 0.0, 0.0), (22.0, 0.3, 0.0, 0.0),
                 (26.0, *STOP), (30.0, 0.2, 0.0, 0.0))
     found = run.run(34.0, commands, feedback=feedback, seed=14, gaits=gaits)
-    assert math.isinf(found.fell) and found.tilt < 0.25 and not feedback.faults
-    assert feedback.plan.gait == 'walk' and feedback.mode == WALK and not feedback.changing
+    assert math.isinf(found.fell) and found.tilt < 0.25 and not feedback.state.faults
+    assert feedback.plan.gait == 'walk' and feedback.state.mode == WALK and not feedback.changing
     time, x = found.path[:, 0], found.path[:, 1]
     # It stands still before the hop, and after the run that was told to stand.
     for begin, end in ((14.5, 15.0), (29.5, 30.0)):
@@ -150,7 +150,7 @@ def test_a_fast_run_slows_down_before_it_becomes_a_walk(name, wish, gait):
     assert np.ptp(x[ran]) == pytest.approx(1.0, abs=0.05)
     # A walk goes no faster than it can, whatever is wished of it.
     assert np.ptp(x[after]) == pytest.approx(0.6 if gait == 'walk' else 0.0, abs=0.08)
-    assert not feedback.changing and not feedback.faults
+    assert not feedback.changing and not feedback.state.faults
 
 
 def test_arms_swing_by_the_cells_and_take_yaw_from_the_walk():
@@ -209,7 +209,7 @@ def test_the_velocity_is_estimated_without_bias():
 
     def noted(sensors, dt):
         command = advance(sensors, dt)
-        found.append((feedback.memory.base - run.body.rates[:3]).copy())
+        found.append((feedback.memory.velocity - run.body.rates[:3]).copy())
         return command
 
     feedback.advance = noted

@@ -17,7 +17,7 @@
 import ctypes
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.ros.feedback.loop import FeedbackLoop
+from cpg_ros.ros.feedback.loop import SensorLoop
 from cpg_ros.ros.node import native
 
 #: Return code of rcl if no message waits.
@@ -32,7 +32,7 @@ class CTicks:
 
     """
 
-    def __init__(self, pattern: Pattern, loop: FeedbackLoop, dt: float) -> None:
+    def __init__(self, pattern: Pattern, loop: SensorLoop, dt: float) -> None:
         """Tick every dt in s; the loop's subscriptions have a method ``newest``."""
         self.learnt, self._loop, self._kept = 0, loop, {}
         addresses = pattern.addresses

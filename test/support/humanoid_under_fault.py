@@ -17,6 +17,7 @@
 from collections import deque
 from functools import cache
 
+from c_ticks import CTicks
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import gait_plan
 from cpg_ros.feedback.input_checks import LATE_BALANCE
@@ -70,6 +71,7 @@ class HumanoidUnderFault:
             sensor_input.PolledSubscription = subscription
         self.loop = BalanceLoop(self.pattern, inputs, lambda: (speed, 0.0, 0.0))
         self.loop.wanted = True
+        self._ticks = CTicks(self.pattern, self.loop, DT)
         # As many as the robot has, with the names of what it holds.
         self._names = (*robot.order, *robot.held)
         self.faults = FaultySensors(fault, seed, begins)
@@ -95,7 +97,7 @@ class HumanoidUnderFault:
 
     def step(self) -> None:
         """Take a step of physics and feedback."""
-        body, pattern, now = self.body, self.pattern, self.time
+        body, pattern = self.body, self.pattern
         self._late.append(self._measured())
         if len(self._late) > round(DELAY / DT):
             self.faults.put(self.time, self._late.popleft())
@@ -104,8 +106,7 @@ class HumanoidUnderFault:
             if self._gap > 1.5 * DT:
                 # As the generator's ticker does it.
                 pattern.resume(self._gap - DT)
-            self.loop.sense(DT, now)
-            pattern.advance(DT)
+            self._ticks.tick(round(1e9 * self.time))
             self._check(DT)
             self._gap = 0.0
         body.command(pattern.position[pattern.robot.places])

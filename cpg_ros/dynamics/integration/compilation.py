@@ -19,6 +19,7 @@ numba, kernels are plain Python, too slow for feedback and simulation.
 """
 
 from contextlib import AbstractContextManager, nullcontext
+import ctypes
 from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 import math
@@ -48,6 +49,12 @@ class Kernel:
         """The compiled function, or without numba the function itself."""
         return getattr(_numba(), self._decorator)(self.py_func) if COMPILED else self.py_func
 
+    @cached_property
+    def entry(self):
+        """The same for calls from Python."""
+        whole = COMPILED and self._decorator == 'jit'
+        return _numba().jit_for_python(self.py_func) if whole else self.code
+
     @property
     def _numba_type_(self):
         """Type that numba infers where another kernel calls it."""
@@ -56,7 +63,7 @@ class Kernel:
     def __call__(self, *arguments):
         """Return the function's result; nan where plain Python raises an arithmetic error."""
         if COMPILED:
-            return self.code(*arguments)
+            return self.entry(*arguments)
         try:
             return self.py_func(*arguments)
         except (ArithmeticError, ValueError):
@@ -79,12 +86,30 @@ def specialised(kernel: Kernel, *arguments):
     It skips the type dispatch, which takes longer than a small kernel. Later arguments must have
     the same types, dimensions and memory orders.
     """
-    return _numba().specialised(kernel.code, *arguments) if COMPILED else kernel
+    return _numba().specialised(kernel.entry, *arguments) if COMPILED else kernel
 
 
 def on_compile(compiling) -> AbstractContextManager:
     """Call a function before each compilation of a function that is not in the cache."""
     return _numba().on_compile(compiling) if COMPILED else nullcontext()
+
+
+# Memory and functions of C, by their addresses. Compiled kernels have them as machine code.
+
+def number_at(address: int) -> float:
+    """Return the double at an address."""
+    return ctypes.c_double.from_address(int(address)).value
+
+
+def whole_at(address: int) -> int:
+    """Return the 64-bit integer, such as a pointer, at an address."""
+    return ctypes.c_int64.from_address(int(address)).value
+
+
+def call_at(function: int, struct: int, number: float) -> int:
+    """Call a C function of a pointer and a double; return its int, arbitrary if it is void."""
+    kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_double)
+    return int(kind(int(function))(int(struct), number))
 
 
 _LOG2E = 1.0 / math.log(2.0)

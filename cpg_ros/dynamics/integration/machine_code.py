@@ -20,20 +20,26 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.common.cache_folder import writing
+from cpg_ros.dynamics.integration import compilation
 from cpg_ros.networks import equations
+from llvmlite import ir
 from numba import config, njit, prange, typeof
 from numba.core import event, types
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
+from numba.extending import intrinsic, overload
 
-__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'machine_function',
-           'on_compile', 'prange', 'renamed', 'specialised']
+__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'jit_for_python',
+           'machine_function', 'on_compile', 'prange', 'renamed', 'specialised']
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
-jit = njit(**OPTIONS)
+#: For functions that kernels call, without the wrapper for Python: with many arguments it takes
+#: longer to compile than the function.
+jit = njit(**{**OPTIONS, 'no_cpython_wrapper': True, 'no_cfunc_wrapper': True})
+jit_for_python = njit(**OPTIONS)
 
 
 class _Disk(FunctionCache):
@@ -120,6 +126,32 @@ def machine_function(function, arguments: tuple) -> Any:
             numba.CACHE_DIR = others
     compiled.compile()
     return compiled
+
+
+def _reads(function: Callable, kind: Any) -> None:
+    """Compile a function of an address that reads a number of a kind there."""
+    def read(_, address):
+        def code(target, builder, signature, arguments):
+            pointer = target.get_value_type(kind).as_pointer()
+            return builder.load(builder.inttoptr(arguments[0], pointer))
+        return kind(types.int64), code
+    reading: Any = intrinsic(read)
+    overload(function)(lambda address: lambda address: reading(address))
+
+
+def _call(_, function, struct, number):
+    def code(target, builder, signature, arguments):
+        whole = ir.IntType(32)
+        kind = ir.FunctionType(whole, [ir.IntType(64), ir.DoubleType()])
+        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), arguments[1:])
+    return types.int32(types.int64, types.int64, types.float64), code
+
+
+_called: Any = intrinsic(_call)
+_reads(compilation.number_at, types.float64)
+_reads(compilation.whole_at, types.int64)
+overload(compilation.call_at)(lambda function, struct, number: (
+    lambda function, struct, number: _called(function, struct, number)))
 
 
 class _Notice(event.Listener):

@@ -14,5 +14,5 @@
 
 """Balance of legs with soles: stepping, support and arms on the clock of a network."""
 
-__all__ = ['balanced_pattern', 'crouch', 'feedback', 'gains', 'links', 'stepping', 'substitutes',
-           'support', 'tick']
+__all__ = ['balance', 'balanced_pattern', 'crouch', 'feedback', 'gains', 'links', 'modes',
+           'stepping', 'substitutes', 'support', 'tick']

@@ -39,75 +39,58 @@ import numpy as np
 STAND, SHIFT, WALK = 0, 1, 2
 
 
+#: What the laws remember; world axes, places from the base unless stated otherwise.
+#: velocity: of the base, m/s; center: of mass, m, then its velocity, m/s; turning: angular
+#: velocity of the base, rad/s; soles: velocities of the soles from the base's, m/s and rad/s;
+#: loads: share of the weight on each foot; wanted: velocity forward and left as it is approached,
+#: m/s; heading: wanted, rad; integral: of the missing speed, m; phases, before: of the legs from
+#: their lift-off on, now and at the last tick, cycles; swinging, landed: whether each leg swings
+#: and has landed early; lift_off: where each swing began, from the other sole, or, in gaits with
+#: flight, from the base, m; target: where it is to end, likewise; ground: height of the ground, m;
+#: fractions: of the weight that each leg is to bear; dcm_error: of the capture point, forward and
+#: left, m; force: that the ground is to exert on all feet, N; reaction: moment that the swing leg
+#: takes, N m; path: of a swinging foot, scratch; clock: factor of the clock, and by how much it is
+#: to leap, cycles; crouch: how much lower than usual the centre of mass is to be, m.
+LAWS = np.dtype([
+    *((name, float, shape) for name, shape in (
+        ('velocity', 3), ('center', (2, 3)), ('turning', 3), ('soles', (2, 6)), ('loads', 2),
+        ('wanted', 2), ('phases', 2), ('before', 2), ('lift_off', (2, 3)), ('target', (2, 3)),
+        ('fractions', 2), ('dcm_error', 2), ('force', 3), ('reaction', 3), ('path', (3, 3)),
+        ('clock', 2))),
+    *((name, float) for name in ('heading', 'integral', 'ground', 'crouch')),
+    ('swinging', np.int8, 2), ('landed', np.int8, 2)])
+
+
 class BipedMemory(NamedTuple):
-    """Arrays that a tick changes; world axes, places from the base unless stated otherwise.
+    """What a tick changes.
 
     Attributes:
         pose: of the links.
-        base: velocity of the base, m/s, shape (3,).
-        center: of mass, m, then its velocity, m/s, shape (2, 3).
-        turning: angular velocity of the base, rad/s, shape (3,).
-        soles: velocities of the soles from the base's, m/s and rad/s, shape (2, 6).
-        loads: share of the weight on each foot, shape (2,).
-        wanted: velocity forward and left as it is approached, m/s, shape (2,).
-        heading: wanted, rad, shape (1,).
-        integral: of the missing speed, m, shape (1,).
-        phases: of the legs from their lift-off on, cycles, shape (2,).
-        swinging: whether each leg swings, shape (2,).
-        landed: whether it has landed early, shape (2,).
-        lift_off: where each swing began, from the other sole, or, in gaits with flight, from the
-            base, m, shape (2, 3).
-        target: where it is to end, likewise.
-        ground: height of the ground, m, shape (1,).
-        fractions: of the weight that each leg is to bear, shape (2,).
-        dcm_error: of the capture point, forward and left, m, shape (2,).
-        force: that the ground is to exert on all feet, N, shape (3,).
-        reaction: moment that the swing leg takes, N m, shape (3,).
-        path: of a swinging foot, scratch, shape (3, 3).
-        clock: factor of the clock, and by how much it is to leap, cycles, shape (2,).
-        crouch: how much lower than usual the centre of mass is to be, m, shape (1,).
+        laws: LAWS, shape (1,).
         torque: of the legs' joints, N m, shape (2, joints of a leg).
 
     """
 
     pose: Pose
-    base: np.ndarray
-    center: np.ndarray
-    turning: np.ndarray
-    soles: np.ndarray
-    loads: np.ndarray
-    wanted: np.ndarray
-    heading: np.ndarray
-    integral: np.ndarray
-    phases: np.ndarray
-    swinging: np.ndarray
-    landed: np.ndarray
-    lift_off: np.ndarray
-    target: np.ndarray
-    ground: np.ndarray
-    fractions: np.ndarray
-    dcm_error: np.ndarray
-    force: np.ndarray
-    reaction: np.ndarray
-    path: np.ndarray
-    clock: np.ndarray
-    crouch: np.ndarray
+    laws: np.ndarray
     torque: np.ndarray
 
     @classmethod
     def empty(cls, links: Links) -> 'BipedMemory':
         """Return the memory of a biped that has not moved yet."""
-        return cls(blank_pose(links), np.zeros(3), np.zeros((2, 3)), np.zeros(3),
-                   np.zeros((2, 6)), np.zeros(2), np.zeros(2), np.zeros(1), np.zeros(1),
-                   np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2, dtype=bool),
-                   np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1), np.full(2, 0.5), np.zeros(2),
-                   np.array([0.0, 0.0, GRAVITY * links.masses.sum()]), np.zeros(3),
-                   np.zeros((3, 3)), np.array([1.0, 0.0]), np.zeros(1),
-                   np.zeros((2, links.chains.shape[1])))
+        laws = np.zeros(1, LAWS).view(np.recarray)
+        laws.fractions[:], laws.clock[0, 0] = 0.5, 1.0
+        laws.force[0, 2] = GRAVITY * links.masses.sum()
+        return cls(blank_pose(links), laws, np.zeros((2, links.chains.shape[1])))
 
 
 GAINS: Mapping[str, Gain] = {**CLOCK_GAINS, **FLIGHT_GAINS, **PLACEMENT_GAINS, **STANCE_GAINS,
                              **SWING_GAINS, **VELOCITY_GAINS}
+#: A gait as compiled code takes it: its gains by their names, slow and fast: range of its speed
+#: forward, m/s; kind: WALKS, RUNS or HOPS; name: its place in KINDS; track: address of its
+#: network's struct in the core.
+GAIT = np.dtype([*((name, float) for name in (*GAINS, 'slow', 'fast')),
+                 *((name, np.int64) for name in ('kind', 'name', 'track'))])
 #: Gains that differ from the walk's, by gait; found on a simulated Unitree G1.
 _HOP = {
     'frequency': 2.626, 'duty': 0.597, 'lift': 0.0535, 'swing_end': 0.8685,

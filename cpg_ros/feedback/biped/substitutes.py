@@ -22,13 +22,24 @@ must for soles that stand to be still and those that swing to be on their paths,
 moves as the inertial unit says.
 """
 
-from cpg_ros.dynamics.integration.compilation import specialised
-from cpg_ros.feedback.biped.feedback import BipedFeedback
-from cpg_ros.feedback.biped.gains import BipedMemory, WALK
-from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
+import math
+from typing import NamedTuple
+
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.feedback.biped.gains import WALK
+from cpg_ros.feedback.biped.links import (
+    blank_pose,
+    carry,
+    center_velocity,
+    column,
+    Links,
+    place,
+    Pose,
+    sole_velocity,
+)
 from cpg_ros.feedback.biped.stepping import WALKS
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.feedback.kinematics import cross, GRAVITY
 import numpy as np
 
 #: Inputs in the order of their ages.
@@ -49,176 +60,274 @@ LEANT = 0.025
 ADOPTED = 0.02
 
 
-#: KEPT: ticks that are kept of the last stride.
-KEPT = 512
+#: KEPT: ticks that are kept of the last stride; SAME: largest difference of a kept tick's phase
+#: from the present one, cycles.
+KEPT, SAME = 512, 0.02
 
 
-class LastStride:
+class LastStride(NamedTuple):
     """The commands of the last stride of a walk, which are repeated where nothing is measured.
 
     A steady walk is periodic: its own last commands hold the torques that legs and body need of
     each other, which no prediction of a moment later does.
-    """
-
-    def __init__(self, joints: int) -> None:
-        self._commands, self._phases = np.zeros((KEPT, joints)), np.full(KEPT, np.inf)
-        self._row = 0
-
-    def record(self, balance: BipedFeedback, blind: bool, command: np.ndarray) -> None:
-        """Keep the command of a tick of a walk, rad, shape (joints,), if sensors are valid."""
-        if balance.mode != WALK or balance.kind != WALKS:
-            self._phases[:] = np.inf
-        elif not blind:
-            self._commands[self._row] = command
-            self._phases[self._row] = balance.memory.phases[0]
-            self._row = (self._row + 1) % KEPT
-
-    def replay(self, balance: BipedFeedback, blind: bool, command: np.ndarray) -> np.ndarray:
-        """Return the command to give in place of another, rad, shape (joints,)."""
-        if not blind:
-            return command
-        off = np.abs((self._phases - balance.memory.phases[0] + 0.5) % 1.0 - 0.5)
-        row = int(np.argmin(np.where(np.isfinite(off), off, 1.0)))
-        return self._commands[row] if off[row] < 0.02 else command
-
-
-class Substitutes:
-    """Fills the gaps in the measurements of one biped; a tick allocates little.
 
     Attributes:
-        sensors: measurements with the gaps filled, overwritten by ``fill``.
-        suspect: the joint whose own measurement is not to be used, in the links' order; None for
-            none.
+        commands: of the legs' joints in ``robot.order``, rad, shape (KEPT, joints).
+        phases: of the first leg at these, cycles, infinite for none, shape (KEPT,).
+        row: that comes next, shape (1,).
 
     """
 
-    def __init__(self, links: Links) -> None:
-        """Prepare for a robot's links."""
-        joints = len(links.masses) - 1
-        self._links, self._pose = links, blank_pose(links)
-        self.suspect: int | None = None
-        self.sensors = SensorData.zeros(1, len(links.chains), joints)
-        self._still, self._angles = np.zeros(3), np.zeros(joints)
-        self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
-        self._kinematics = specialised(kinematics, links, self._still,
-                                       self.sensors.joint_positions[0],
-                                 (self._still, self.sensors.joint_velocities[0]), self._pose,
-                                 self._center, self._soles, self._weights)
+    commands: np.ndarray
+    phases: np.ndarray
+    row: np.ndarray
 
-    def fill(self, measured: SensorData, ages: np.ndarray, latencies: np.ndarray,
-             memory: BipedMemory, dt: float) -> SensorData:
-        """Return the present measurements, with substitutes for those that are late.
+    @classmethod
+    def empty(cls, joints: int) -> 'LastStride':
+        """Return one without any command."""
+        return cls(np.zeros((KEPT, joints)), np.full(KEPT, math.inf),
+                   np.zeros(1, dtype=np.int64))
 
-        Args:
-            measured: the last valid ones.
-            ages: time since those of inertial unit, joints and feet arrived, s, shape (3,).
-            latencies: time since they were measured, s, shape (3,).
-            memory: of the feedback at its last tick.
-            dt: of a tick, s; younger measurements are taken as they are.
 
-        """
-        sensors = self.sensors
-        for own, newest in zip(sensors, measured, strict=True):
-            own[:] = newest
-        late = ages > 1.5 * dt
-        if late[JOINTS]:
-            self._move(memory, dt)
-        else:
-            self._take_joints(latencies[JOINTS], memory, dt)
-        time = max(ages[IMU], latencies[IMU])
-        if late[IMU] or time > PROMPT:
-            self._turn(measured, min(time, EXTRAPOLATED))
-        begins = EXTRAPOLATED if late[JOINTS] else LEANT
-        if ages[IMU] > begins:
-            # In a stand, one that arrives but is not believed may be that of a robot on its edges.
-            pushed = latencies[IMU] < LEANT and not memory.swinging.any()
-            self._lean_on_sole(memory, min((ages[IMU] - begins) / ADOPTED, 1.0), dt, pushed)
-        if late[IMU] and late[JOINTS]:
-            # Neither input tells how the base turns: let its angular velocity fade.
-            sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
-        if ages[FEET] > EXTRAPOLATED:
-            weight = GRAVITY * memory.pose.carried[0]
-            sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.fractions)
-        return sensors
+@jit
+def record(stride, mode, kind, phase, position, places):
+    """Keep the command of a tick of a walk.
 
-    def sole_tilts(self, sensors: SensorData) -> np.ndarray:
-        """Return how far each sole leans forward and left by IMU and joints, rad, shape (2, 2)."""
-        rpy = np.array([*sensors.rpy[0, :2], 0.0])
-        self._kinematics(self._links, rpy, sensors.joint_positions[0],
-                         (self._still, sensors.joint_velocities[0]), self._pose, self._center,
-                         self._soles, self._weights)
-        return self._pose.rotations[self._links.chains[:, -1], :2, 2].copy()
+    Args:
+        stride: LastStride, changed in place.
+        mode: of the feedback.
+        kind: of its gait.
+        phase: of the first leg, cycles.
+        position: of all joints, rad.
+        places: of the legs' joints among these, in ``robot.order``, shape (joints,).
 
-    def _take_joints(self, latency: float, memory: BipedMemory, dt: float) -> None:
-        """Take the joints as measured a latency in s ago, but for the suspect."""
-        angles, rates = self.sensors.joint_positions[0], self.sensors.joint_velocities[0]
-        if latency > PROMPT:
-            angles += min(latency, EXTRAPOLATED) * rates
-        suspect = self.suspect
-        if suspect is None:
-            self._angles[:] = angles
-            return
-        measured, measured_rates = angles.copy(), rates.copy()
-        self._move(memory, dt)
-        predicted, rate = self._angles[suspect], rates[suspect]
-        angles[:], rates[:] = measured, measured_rates
+    """
+    if mode != WALK or kind != WALKS:
+        stride.phases[:] = math.inf
+        return
+    row = stride.row[0]
+    for k in range(len(places)):
+        stride.commands[row, k] = position[places[k]]
+    stride.phases[row] = phase
+    stride.row[0] = (row + 1) % KEPT
+
+
+@jit
+def replay(stride, phase, command):
+    """Replace a command, rad, shape (joints,), by the kept one nearest in phase, cycles."""
+    nearest, row = SAME, -1
+    for k in range(KEPT):
+        if math.isfinite(stride.phases[k]):
+            off = abs((stride.phases[k] - phase + 0.5) % 1.0 - 0.5)
+            if off < nearest:
+                nearest, row = off, k
+    if row >= 0:
+        command[:] = stride.commands[row]
+
+
+class Substitutes(NamedTuple):
+    """Fills the gaps in the measurements of one biped.
+
+    Attributes:
+        sensors: measurements with the gaps filled.
+        angles: of the joints as they are predicted, rad, shape (joints,).
+        pose: of the links, scratch.
+        center: velocity of the centre of mass, scratch, shape (3,).
+        sole: velocity of a sole, scratch, shape (6,).
+        rpy: of the base, scratch, shape (3,).
+        columns: of a leg's Jacobian, scratch, shape (joints of a leg, 6).
+        system: of equations, scratch, shape (6, 7).
+
+    """
+
+    sensors: SensorData
+    angles: np.ndarray
+    pose: Pose
+    center: np.ndarray
+    sole: np.ndarray
+    rpy: np.ndarray
+    columns: np.ndarray
+    system: np.ndarray
+
+    @classmethod
+    def empty(cls, links: Links) -> 'Substitutes':
+        """Return those of a robot that was not measured yet."""
+        joints, (legs, size) = len(links.masses) - 1, links.chains.shape
+        return cls(SensorData.zeros(1, legs, joints), np.zeros(joints), blank_pose(links),
+                   np.zeros(3), np.zeros(6), np.zeros(3), np.zeros((size, 6)), np.zeros((6, 7)))
+
+
+@jit
+def fill(links, measured, known, memory, own, dt):
+    """Fill the present measurements, with substitutes for those that are late.
+
+    Args:
+        links: Links of the robot.
+        measured: SensorData, the last valid ones.
+        known: of them: used: time since those of inertial unit, joints and feet arrived, s,
+            shape (3,); latencies: time since they were measured, s, shape (3,); suspect: the joint
+            whose own measurement is not to be used, -1 for none.
+        memory: BipedMemory at the last tick.
+        own: Substitutes, of which the sensors are filled.
+        dt: of a tick, s; younger measurements are taken as they are.
+
+    """
+    laws, ages, latencies = memory.laws[0], known.used, known.latencies
+    sensors = own.sensors
+    sensors.joint_positions[:], sensors.joint_velocities[:] = (measured.joint_positions,
+                                                               measured.joint_velocities)
+    sensors.foot_forces[:], sensors.rpy[:] = measured.foot_forces, measured.rpy
+    sensors.angular_velocity[:] = measured.angular_velocity
+    sensors.acceleration[:] = measured.acceleration
+    late_imu, late_joints = ages[IMU] > 1.5 * dt, ages[JOINTS] > 1.5 * dt
+    if late_joints:
+        _move(links, memory, own, dt)
+    else:
+        _take_joints(links, latencies[JOINTS], memory, known.suspect, measured, own, dt)
+    time = max(ages[IMU], latencies[IMU])
+    if late_imu or time > PROMPT:
+        _turn(measured, sensors.rpy[0], min(time, EXTRAPOLATED))
+    begins = EXTRAPOLATED if late_joints else LEANT
+    if ages[IMU] > begins:
+        # In a stand, one that arrives but is not believed may be that of a robot on its edges.
+        pushed = latencies[IMU] < LEANT and not (laws.swinging[0] or laws.swinging[1])
+        _lean_on_sole(links, memory, own, min((ages[IMU] - begins) / ADOPTED, 1.0), dt, pushed)
+    if late_imu and late_joints:
+        # Neither input tells how the base turns: let its angular velocity fade.
+        fading = max(1.0 - min(ages[IMU], ages[JOINTS], ages[FEET]) / EXTRAPOLATED, 0.0)
+        for k in range(3):
+            sensors.angular_velocity[0, k] *= fading
+    if ages[FEET] > EXTRAPOLATED:
+        weight = GRAVITY * memory.pose.carried[0]
+        for leg in range(2):
+            sensors.foot_forces[0, leg] = (0.0 if laws.swinging[leg]
+                                           else weight * laws.fractions[leg])
+
+
+@jit
+def sole_tilts(links, sensors, own, tilts):
+    """Fill how far each sole leans forward and left by IMU and joints, rad, shape (2, 2)."""
+    rpy = own.rpy
+    rpy[0], rpy[1], rpy[2] = sensors.rpy[0, 0], sensors.rpy[0, 1], 0.0
+    place(links, rpy, sensors.joint_positions[0], own.pose)
+    for leg in range(2):
+        turn = own.pose.rotations[links.chains[leg, -1]]
+        tilts[leg, 0], tilts[leg, 1] = turn[0, 2], turn[1, 2]
+
+
+@jit
+def _take_joints(links, latency, memory, suspect, measured, own, dt):
+    """Take the joints as measured a latency in s ago, but for the suspect."""
+    angles, rates = own.sensors.joint_positions[0], own.sensors.joint_velocities[0]
+    ahead = min(latency, EXTRAPOLATED) if latency > PROMPT else 0.0
+    predicted, rate = 0.0, 0.0
+    if suspect >= 0:
+        _move(links, memory, own, dt)
+        predicted, rate = own.angles[suspect], rates[suspect]
+    for k in range(len(rates)):
+        rates[k] = measured.joint_velocities[0, k]
+        angles[k] = measured.joint_positions[0, k] + ahead * rates[k]
+    if suspect >= 0:
         angles[suspect], rates[suspect] = predicted, rate
-        self._angles[:] = angles
+    own.angles[:] = angles
 
-    def _move(self, memory: BipedMemory, dt: float) -> None:
-        """Predict the joints of the legs dt in s later."""
-        pose, rates = memory.pose, self.sensors.joint_velocities[0]
-        rates[:] = 0.0
-        for leg, chain in enumerate(self._links.chains):
-            sole = pose.soles[leg]
-            columns = np.vstack([np.cross(pose.axes[chain], sole - pose.places[chain]).T,
-                                 pose.axes[chain].T])
-            moved = -np.concatenate([memory.base + np.cross(memory.turning, sole),
-                                     memory.turning])
-            if memory.swinging[leg]:
-                moved[:3] += memory.path[1] + FOLLOWED * (memory.path[0] - sole)
-            rates[chain - 1] = columns.T @ np.linalg.solve(
-                columns @ columns.T + DAMPED * np.eye(6), moved)
-        self._angles += dt * np.clip(rates, -FASTEST, FASTEST)
-        self.sensors.joint_positions[0] = self._angles
 
-    def _turn(self, measured: SensorData, time: float) -> None:
-        """Extrapolate the orientation by the angular velocity for a time in s."""
-        roll, pitch, _ = measured.rpy[0]
-        x, y, z = measured.angular_velocity[0]
-        c, s, cosine = np.cos(roll), np.sin(roll), max(np.cos(pitch), 0.1)
-        about = (s * y + c * z) / cosine
-        self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
+@jit
+def _solve(system):
+    """Solve a symmetric positive definite system in place; the solution is its last column."""
+    size = len(system)
+    for k in range(size):
+        for row in range(size):
+            if row != k:
+                factor = system[row, k] / system[k, k]
+                for entry in range(k, size + 1):
+                    system[row, entry] -= factor * system[k, entry]
+    for k in range(size):
+        system[k, size] /= system[k, k]
 
-    def _lean_on_sole(self, memory: BipedMemory, fraction: float, dt: float,
-                      pushed: bool) -> None:
-        """Set lean and rates of the base from the joints of the leg that bears more."""
-        sensors, pose = self.sensors, self._pose
-        self._kinematics(self._links, self._still, sensors.joint_positions[0],
-                         (self._still, sensors.joint_velocities[0]), pose, self._center,
-                         self._soles, self._weights)
-        # By the loads, as a foot that is late is not level yet when the clock has it land.
-        leg = int(memory.loads[1] > memory.loads[0])
-        # The base seen from the sole: the sole's rotation from the base, transposed.
-        up = pose.rotations[self._links.chains[leg, -1]][:, 2]
-        lean = np.array([np.arctan2(up[1], up[2]), np.arcsin(-np.clip(up[0], -1.0, 1.0))])
-        rpy = sensors.rpy[0]
-        rpy[:2] += fraction * (lean - rpy[:2])
-        rpy[2] = memory.heading[0]
-        turning = -self._soles[leg, 3:]
-        sensors.angular_velocity[0] += fraction * (turning - sensors.angular_velocity[0])
-        # The centre of mass goes as the force of the last tick moves it, and the base as it has
-        # to while legs move against it.
-        turn = memory.pose.rotations[0]
-        self._kinematics(self._links, rpy, sensors.joint_positions[0],
-                         (turn @ sensors.angular_velocity[0], sensors.joint_velocities[0]), pose,
-                         self._center, self._soles, self._weights)
-        moved = memory.force / pose.carried[0] - (
-            self._center[3:] - memory.center[1] + memory.base) / dt
-        moved[2] += GRAVITY - memory.force[2] / pose.carried[0]
-        if pushed:
-            # Feet on their edges do not exert that force: it topples about the middle of a sole.
-            center, sole = memory.center[0], memory.pose.soles[int(np.argmax(memory.fractions))]
-            moved = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
-            moved[2] = GRAVITY
-        sensors.acceleration[0] = turn.T @ moved
+
+@jit
+def _move(links, memory, own, dt):
+    """Predict the joints of the legs dt in s later."""
+    laws = memory.laws[0]
+    pose, rates, columns, system = (memory.pose, own.sensors.joint_velocities[0], own.columns,
+                                    own.system)
+    rates[:] = 0.0
+    for leg in range(2):
+        chain, sole = links.chains[leg], pose.soles[leg]
+        turned = cross(laws.turning, sole)
+        for k in range(3):
+            system[k, 6], system[3 + k, 6] = -(laws.velocity[k] + turned[k]), -laws.turning[k]
+            if laws.swinging[leg]:
+                system[k, 6] += laws.path[1, k] + FOLLOWED * (laws.path[0, k] - sole[k])
+        for j in range(len(chain)):
+            moved, axis = column(pose, chain[j], sole), pose.axes[chain[j]]
+            for k in range(3):
+                columns[j, k], columns[j, 3 + k] = moved[k], axis[k]
+        for row in range(6):
+            for k in range(6):
+                system[row, k] = DAMPED if row == k else 0.0
+                for j in range(len(chain)):
+                    system[row, k] += columns[j, row] * columns[j, k]
+        _solve(system)
+        for j in range(len(chain)):
+            rate = 0.0
+            for k in range(6):
+                rate += columns[j, k] * system[k, 6]
+            rates[chain[j] - 1] = rate
+    for k in range(len(rates)):
+        own.angles[k] += dt * min(max(rates[k], -FASTEST), FASTEST)
+    own.sensors.joint_positions[0] = own.angles
+
+
+@jit
+def _turn(measured, rpy, time):
+    """Extrapolate roll, pitch and yaw, rad, by the angular velocity for a time in s."""
+    roll, pitch, turning = measured.rpy[0, 0], measured.rpy[0, 1], measured.angular_velocity[0]
+    c, s, cosine = math.cos(roll), math.sin(roll), max(math.cos(pitch), 0.1)
+    about = (s * turning[1] + c * turning[2]) / cosine
+    rpy[0] += time * (turning[0] + math.sin(pitch) * about)
+    rpy[1] += time * (c * turning[1] - s * turning[2])
+    rpy[2] += time * about
+
+
+@jit
+def _lean_on_sole(links, memory, own, fraction, dt, pushed):
+    """Set lean and rates of the base from the joints of the leg that bears more."""
+    laws = memory.laws[0]
+    sensors, pose, still = own.sensors, own.pose, own.rpy
+    joints, rates, rpy = sensors.joint_positions[0], sensors.joint_velocities[0], sensors.rpy[0]
+    angular = sensors.angular_velocity[0]
+    still[:] = 0.0
+    place(links, still, joints, pose)
+    # By the loads, as a foot that is late is not level yet when the clock has it land.
+    leg = 1 if laws.loads[1] > laws.loads[0] else 0
+    sole_velocity(links, pose, leg, still, rates, own.sole)
+    # The base seen from the sole: the sole's rotation from the base, transposed.
+    turned = pose.rotations[links.chains[leg, -1]]
+    rpy[0] += fraction * (math.atan2(turned[1, 2], turned[2, 2]) - rpy[0])
+    rpy[1] += fraction * (math.asin(-min(max(turned[0, 2], -1.0), 1.0)) - rpy[1])
+    rpy[2] = laws.heading
+    for k in range(3):
+        angular[k] += fraction * (-own.sole[3 + k] - angular[k])
+    # The centre of mass goes as the force of the last tick moves it, and the base as it has to
+    # while legs move against it.
+    turn, turning = memory.pose.rotations[0], own.sole
+    for k in range(3):
+        turning[k] = carry(turn, angular, k)
+    place(links, rpy, joints, pose)
+    center_velocity(pose, turning, rates, own.center)
+    mass, moved = pose.carried[0], own.center
+    for k in range(3):
+        moved[k] = laws.force[k] / mass - (moved[k] - laws.center[1, k] + laws.velocity[k]) / dt
+    moved[2] += GRAVITY - laws.force[2] / mass
+    if pushed:
+        # Feet on their edges do not exert that force: it topples about the middle of a sole.
+        foot = 1 if laws.fractions[1] > laws.fractions[0] else 0
+        center, sole = laws.center[0], memory.pose.soles[foot]
+        pull = GRAVITY / max(center[2] - sole[2], 0.1)
+        moved[0], moved[1] = pull * (center[0] - sole[0]), pull * (center[1] - sole[1])
+        moved[2] = GRAVITY
+    for k in range(3):
+        sensors.acceleration[0, k] = turn[0, k] * moved[0] + turn[1, k] * moved[1] + (
+            turn[2, k] * moved[2])

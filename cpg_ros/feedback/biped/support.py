@@ -20,8 +20,9 @@ share it, and each leg's joints get J' F.
 """
 
 import math
+from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.dynamics.integration.compilation import jit, number_at
 from cpg_ros.feedback.biped.links import carry
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.feedback.laws.law import Gain
@@ -94,7 +95,7 @@ FASTEST = 10.0
 SAMPLES = 256
 
 
-class Arms:
+class Arms(NamedTuple):
     """Target angles of the joints that a robot file holds, which may swing with the cells.
 
     One with a cell and a swing goes by that many radians about its angle as the cell's last
@@ -104,54 +105,67 @@ class Arms:
     swing.
 
     Attributes:
-        names: of all held joints, in the order of the robot file.
-        rest: where they are held, rad, shape (joints,).
+        rest: where they are held, rad, shape (joints,), in the order of the robot file.
+        swings: how far they go from there, rad, the same.
+        cells: index of the cell of each, the same.
+        places: index of that variable in the state of each gait's network, shape (gaits, joints).
+        middle, half: of its range, the same.
+        waves: of the variables, -1 to 1, shape (joints,).
+        level: 0 at rest to 1 in full swing, shape (1,).
         positions: where they are to be driven, rad, shape (joints,).
-        swing: whether any of them swings.
 
     """
 
-    def __init__(self, robot: Robot) -> None:
-        """Prepare for the joints that the robot file holds."""
-        links = robot.biped.links if robot.biped is not None else {}
-        self.names = tuple(robot.held)
-        self.rest = np.array(list(robot.held.values()))
-        self.positions = self.rest.copy()
-        self._swings = np.array([links[name].swing for name in self.names])
-        self._cells = np.array([max(links[name].cell - 1, 0) for name in self.names], dtype=int)
-        # Index of each joint's cell in the network's state.
-        self._places = self._cells
-        self.swing = bool(self._swings.any())
-        self._level, self._waves = 0.0, np.zeros(len(self.names))
-        self._middle, self._half = np.zeros(len(self.names)), np.ones(len(self.names))
+    rest: np.ndarray
+    swings: np.ndarray
+    cells: np.ndarray
+    places: np.ndarray
+    middle: np.ndarray
+    half: np.ndarray
+    waves: np.ndarray
+    level: np.ndarray
+    positions: np.ndarray
 
-    def follow(self, plan: GaitPlan) -> None:
-        """Read the cells of another gait from now on."""
-        if not self.swing:
-            return
+    @classmethod
+    def of(cls, robot: Robot, gaits: int) -> 'Arms':
+        """Return those of a robot at rest, with room for a number of gaits."""
+        links = robot.biped.links if robot.biped is not None else {}
+        rest, room = np.array(list(robot.held.values())), (gaits, len(robot.held))
+        return cls(rest, np.array([links[name].swing for name in robot.held]),
+                   np.array([max(links[name].cell - 1, 0) for name in robot.held], dtype=np.int64),
+                   np.zeros(room, dtype=np.int64), np.zeros(room), np.ones(room),
+                   np.zeros(rest.size), np.zeros(1), rest.copy())
+
+    def learn(self, slot: int, plan: GaitPlan) -> None:
+        """Read the cells of a gait, in a place among the gaits, from its own orbit."""
         orbit = plan.orbit
         network = orbit.network
-        self._places = self._cells + network.cells * (len(network.states) - 1)
-        waves = orbit(np.arange(SAMPLES) / SAMPLES * orbit.period)[:, self._places]
+        places = self.cells + network.cells * (len(network.states) - 1)
+        waves = orbit(np.arange(SAMPLES) / SAMPLES * orbit.period)[:, places]
         low, high = waves.min(axis=0), waves.max(axis=0)
-        self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
+        self.places[slot], self.middle[slot] = places, 0.5 * (low + high)
+        self.half[slot] = 0.5 * (high - low)
 
-    def advance(self, dt: float, moving: bool, state: np.ndarray | None = None) -> None:
-        """Fill the positions dt in s later.
 
-        Args:
-            dt: s.
-            moving: whether arms are to swing; where they are not, they return to rest.
-            state: of the network, shape (components,); None where it does not move.
+@jit
+def swing_arms(arms, slot, state, moving, dt):
+    """Advance the arms' positions by dt in s.
 
-        """
-        if not self.swing:
-            return
-        self._level = min(max(self._level + (dt if moving else -dt) / RISE, 0.0), 1.0)
-        if state is not None:
-            self._waves = (state[self._places] - self._middle) / self._half
-        target = self.rest + self._level * self._swings * self._waves
-        self.positions += np.clip(target - self.positions, -FASTEST * dt, FASTEST * dt)
+    Args:
+        arms: Arms, changed in place.
+        slot: place of the gait among the gaits.
+        state: address of its network's state; 0 where it does not move.
+        moving: whether arms are to swing; where they are not, they return to rest.
+        dt: s.
+
+    """
+    arms.level[0] = min(max(arms.level[0] + (dt if moving else -dt) / RISE, 0.0), 1.0)
+    for k in range(len(arms.rest)):
+        if state:
+            value = number_at(state + 8 * arms.places[slot, k])
+            arms.waves[k] = (value - arms.middle[slot, k]) / arms.half[slot, k]
+        target = arms.rest[k] + arms.level[0] * arms.swings[k] * arms.waves[k]
+        arms.positions[k] += min(max(target - arms.positions[k], -FASTEST * dt), FASTEST * dt)
 
 
 STANCE_GAINS = {

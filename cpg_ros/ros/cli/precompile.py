@@ -27,9 +27,6 @@ import time
 
 from cpg_ros.common.command_line import say
 from cpg_ros.dynamics.integration.compilation import COMPILED
-from cpg_ros.feedback.biped.feedback import BipedFeedback
-from cpg_ros.feedback.closed_loop import warm_up_senses
-from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.core import precompile
 from cpg_ros.motion.robot_file import load_robot
@@ -52,10 +49,8 @@ def compile_part(part: str) -> None:
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
     elif part == 'balance':
-        biped = BipedFeedback(load_robot(BIPED))
-        warm_up_senses(len(biped.robot.legs), len(biped.order))
-        # The first tick compiles.
-        biped.advance(SensorData.zeros(1, len(biped.robot.legs), len(biped.order)), 1e-3)
+        from cpg_ros.feedback.by_address import warm_up_balance
+        warm_up_balance(load_robot(BIPED))
     else:
         for network in SHIPPED if part == 'networks' else [part]:
             precompile(network)

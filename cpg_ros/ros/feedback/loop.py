@@ -22,7 +22,7 @@ from typing import Any
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import BipedGains
-from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
+from cpg_ros.feedback.biped.substitutes import FEET
 from cpg_ros.feedback.closed_loop import (
     closing_arguments,
     CONTRARY,
@@ -52,7 +52,7 @@ Motion = Callable[[], tuple[float, float, float]]
 class SensorLoop:
     """Feeds the robot's sensors back to a pattern at every tick.
 
-    Call ``sense`` from the thread of the ticks; all other methods are for any thread.
+    Its methods are for any thread; ``tick.c`` does the ticks, see ``compiled``.
 
     Attributes:
         inputs: the robot's sensors.
@@ -65,13 +65,14 @@ class SensorLoop:
     """
 
     feedback: Any
+    _correction: native.Correction
     wanted: Any
     faults: Any
     waiting: Any
     fraction: Any
 
-    def __init__(self, inputs: SensorInput, motion: Motion) -> None:
-        self.inputs, self._motion = inputs, motion
+    def __init__(self, pattern: Any, inputs: SensorInput, motion: Motion) -> None:
+        self._pattern, self.inputs, self._motion = pattern, inputs, motion
 
     @property
     def state(self) -> str:
@@ -88,11 +89,34 @@ class SensorLoop:
     def _faulty_state(self) -> str:
         return 'waiting' if self.waiting else 'out'
 
+    def _corrects(self, numbers: np.ndarray, **others: Any) -> native.Correction:
+        """Return how ``tick.c`` corrects by the inputs; numbers begin with dt and time, s."""
+        inputs = self.inputs.structs
+        return native.Correction(
+            take=native.address('rcl_take_serialized_message'),
+            forget=native.address('rcutils_reset_error'), numbers=numbers.ctypes.data,
+            inputs=ctypes.addressof(inputs), count=len(inputs), **others)
+
     def learn(self, plan: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
 
     def renew(self) -> None:
         """Take over the wanted motion."""
+
+    def compiled(self) -> native.Correction:
+        """Read messages of new layouts; return how ``tick.c`` corrects the pattern."""
+        self.inputs.read()
+        self.renew()
+        return self._correction
+
+    @property
+    def target(self) -> np.ndarray:
+        """The angles to send, rad, shape (joints,), overwritten at every tick."""
+        return self._pattern.position
+
+    def news(self) -> str:
+        """Return what has happened to the robot since the last call, or ''."""
+        return ''
 
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
@@ -123,8 +147,7 @@ class FeedbackLoop(SensorLoop):
             odometry: to be advanced, None for none.
 
         """
-        super().__init__(inputs, motion)
-        self._pattern = pattern
+        super().__init__(pattern, inputs, motion)
         planned, goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._instant = Instant.empty(len(pattern.robot.legs), scale)
@@ -139,27 +162,20 @@ class FeedbackLoop(SensorLoop):
         self._by_address = by_address
         self._finish: Any = None
         self._memories: list[Any] = []
-        self._correction = self._corrects()
+        memory, self._blank = self.feedback.memory, Memory.empty(1, len(pattern.robot.legs))
+        self._resets = (native.Copy * len(memory))(*[
+            native.Copy(part.ctypes.data, blank.ctypes.data, part.nbytes)
+            for part, blank in zip(memory, self._blank, strict=True)])
+        addresses = pattern.addresses
+        self._correction = self._corrects(
+            self._instant.numbers, gaits=self._instant.gaits.ctypes.data,
+            resets=ctypes.addressof(self._resets), parts=len(memory),
+            **{name: addresses[name] for name in ('report', 'plan', 'follow')})
         self.restart()
         self.learn(pattern.plan)
         self._close = by_address.closing_function(self._arguments)
         self._correction.close = self._close.address
         self.set_gains(self.feedback.gains)
-
-    def _corrects(self) -> native.Correction:
-        """Return how ``tick.c`` corrects, but for what is compiled."""
-        memory, inputs, instant = self.feedback.memory, self.inputs.structs, self._instant
-        pattern = self._pattern.addresses
-        self._blank = Memory.empty(1, len(instant.trim))
-        self._resets = (native.Copy * len(memory))(*[
-            native.Copy(part.ctypes.data, blank.ctypes.data, part.nbytes)
-            for part, blank in zip(memory, self._blank, strict=True)])
-        return native.Correction(
-            take=native.address('rcl_take_serialized_message'),
-            forget=native.address('rcutils_reset_error'), numbers=instant.numbers.ctypes.data,
-            gaits=instant.gaits.ctypes.data, inputs=ctypes.addressof(inputs), count=len(inputs),
-            resets=ctypes.addressof(self._resets), parts=len(memory),
-            **{name: pattern[name] for name in ('report', 'plan', 'follow')})
 
     @property
     def wanted(self) -> bool:
@@ -210,13 +226,13 @@ class FeedbackLoop(SensorLoop):
     @property
     def waiting(self) -> bool:
         """Whether an input has never arrived."""
-        return self.inputs.faults(0.0, judge=False)[1]
+        return self.inputs.faults(0.0)[1]
 
     @property
     def faults(self) -> str:
         """Faults that interrupt it, such as 'imu: no messages for 3.2 s'; none while active."""
         inputs, plan = self.inputs, self._pattern.plan
-        found, _ = inputs.faults(self._instant.numbers[NOW], judge=False)
+        found, _ = inputs.faults(self._instant.numbers[NOW])
         if mounted := MOUNTED[int(self._state[MOUNT])]:
             found.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
                          f'legs on the ground: it seems to be mounted {mounted} '
@@ -232,17 +248,15 @@ class FeedbackLoop(SensorLoop):
         self._instant.command[:] = self._motion()
 
     def compiled(self) -> native.Correction:
-        """Read messages of new layouts; return how ``tick.c`` corrects the pattern."""
+        """Do as the base class does, with strides that the laws change."""
         if self._pattern.strides is not None:
             self._pattern.strides.trim = self._instant.trim
-        self.inputs.read()
-        self.renew()
-        return self._correction
+        return super().compiled()
 
     @property
     def target(self) -> np.ndarray:
         """The angles to send, rad, shape (joints,), overwritten at every tick."""
-        return self._pattern.position if self._finish is None else self._sent
+        return super().target if self._finish is None else self._sent
 
     @property
     def share(self) -> np.ndarray:
@@ -265,24 +279,50 @@ class BalanceLoop(SensorLoop):
             InputError: the robot file's part ``biped`` cannot be used.
 
         """
-        super().__init__(inputs, motion)
-        self.wanted, self.waiting, self.faults = False, True, ''
-        self._pattern, robot = pattern, pattern.robot
+        super().__init__(pattern, inputs, motion)
+        robot = pattern.robot
         self.feedback = BipedFeedback(robot, plan=pattern.plan)
-        self._balanced = False
-        order = self.feedback.order
+        pattern.prepare(self.feedback)
+        order, self._balanced = self.feedback.order, False
         names = [*(joint.name for joint in robot.joints), *robot.held]
-        self._rows = np.array([order.index(name) for name in names])
-        self._sensors = inputs.sensor_data._replace(
-            joint_positions=np.zeros((1, len(order))), joint_velocities=np.zeros((1, len(order))))
-        # Compiles, or loads what has been compiled.
-        self.feedback.advance(self._sensors, 1e-3)
-        self.feedback.restart()
+        self._numbers = np.zeros(2)
+        # It loads numba.
+        from cpg_ros.feedback.by_address import balancing_function, memory_of
+        self._arguments = (inputs.senses, inputs.sensor_data, inputs.legs, self._numbers,
+                           np.array([order.index(name) for name in names]), pattern.watch,
+                           self.feedback.biped)
+        self._close, self._memory = (balancing_function(self._arguments),
+                                     memory_of(self._arguments))
+        self._correction = self._corrects(self._numbers, close=self._close.address,
+                                          arguments=ctypes.addressof(self._memory))
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the feedback is enabled."""
+        return self._pattern.balance is not None
+
+    @wanted.setter
+    def wanted(self, wanted: bool) -> None:
+        self._pattern.balance = self.feedback if wanted else None
+
+    @property
+    def waiting(self) -> bool:
+        """Whether an input has never arrived."""
+        return bool(self._pattern.waiting)
+
+    @property
+    def faults(self) -> str:
+        """Faults of the inputs, such as 'imu: no messages for 3.2 s'; '' for none."""
+        inputs = self.inputs
+        faults, _ = inputs.faults(self._numbers[NOW])
+        faults += [f'{inputs.feet if k == FEET else inputs.monitors[k].name}: {why}'
+                   for k, why in self._pattern.doubts.items()]
+        return '; '.join(faults)
 
     @property
     def fraction(self) -> float:
         """Fraction of the robot's balance by the feedback: 0 or 1."""
-        return 1.0 if self._pattern.balance is not None and self._pattern.balancing else 0.0
+        return 1.0 if self.wanted and self._pattern.balancing else 0.0
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
@@ -292,11 +332,6 @@ class BalanceLoop(SensorLoop):
     def set_gains(self, gains: BipedGains) -> None:
         """Replace the gains of the walk."""
         self.feedback.set_gains('walk', gains)
-
-    @property
-    def held_angles(self) -> np.ndarray:
-        """Target angles of joints of no leg, rad, in the order of ``robot.held``."""
-        return self._pattern.held_angles
 
     @property
     def _active_state(self) -> str:
@@ -319,37 +354,17 @@ class BalanceLoop(SensorLoop):
     def news(self) -> str:
         """Return how the robot has lost its balance since the last call, or ''."""
         pattern, before = self._pattern, self._balanced
-        self._balanced = pattern.balancing
+        self._balanced = bool(pattern.balancing)
         if not before or pattern.balancing:
             return ''
-        if self.faults:
-            return f'the robot is not balanced any more: {self.faults}'
+        if faults := self.faults:
+            return f'the robot is not balanced any more: {faults}'
         if pattern.crouching:
             return ''
         if pattern.fallen:
             return 'the robot has fallen: holding the stand until it is on its feet'
         return 'the robot was moved by hand; standing up again'
 
-    def sense(self, _: float, now: float) -> None:
-        """Read the sensors for the coming tick; now in s."""
-        pattern, inputs = self._pattern, self.inputs
-        if not self.wanted:
-            pattern.balance = None
-            return
-        inputs.update(now, pattern.enabled)
-        faults, self.waiting = inputs.faults(now)
-        pattern.failed = bool(faults)
-        faults += [f'{inputs.feet if joint == FEET else inputs.monitors[joint].name}: {why}'
-                  for joint, why in list(pattern.doubts.items())]
-        self.faults = '; '.join(faults)
-        measured, sensors = inputs.sensor_data, self._sensors
-        sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
-        sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]
-        pattern.refused = any(monitor.refused for monitor in inputs.monitors)
-        ages = [now - monitor.believed for monitor in inputs.monitors]
-        # The oldest of the feet's inputs counts; with efforts as contacts, that of the joints.
-        pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
-        pattern.latencies[:FEET] = [monitor.latency(now) for monitor in inputs.monitors[:FEET]]
-        pattern.sensors = None if self.waiting else sensors
-        pattern.command = self._motion()
-        pattern.balance = self.feedback
+    def renew(self) -> None:
+        """Take over the wanted motion."""
+        self._pattern.command = self._motion()

@@ -20,14 +20,12 @@ import ctypes
 import math
 from typing import Any
 
-from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.closed_loop import (
     CONTACTS,
     EFFORTS,
     FOOT_CONTACTS,
     FORCE,
     Senses,
-    take_in,
     WRENCHES,
 )
 from cpg_ros.feedback.estimate import SensorData
@@ -176,6 +174,7 @@ class SensorInput:
         sensor_data: of one run, filled in place with the last plausible measurements; joints
             leg by leg, then those that the robot file holds.
         senses: what messages are read into.
+        legs: of the robot, without rows where efforts cannot be the contacts.
         structs: how ``tick.c`` takes and reads the messages of each input, see ``held``.
         monitors: of the inputs.
         feet: name of the source of the contacts.
@@ -202,7 +201,7 @@ class SensorInput:
                 geometry also for moments.
 
         """
-        self._geometry = geometry.arrays if isinstance(geometry, Geometry) else LegArrays(
+        self.legs = geometry.arrays if isinstance(geometry, Geometry) else LegArrays(
             np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, float(geometry))
         self._legs = tuple(robot.legs)
         own, held = [joint.name for joint in robot.joints], robot.held
@@ -216,7 +215,7 @@ class SensorInput:
         turned = np.zeros(4)
         fill_quaternion(mount[0], mount[1], mount[2], turned)
         self.senses = senses = Senses.empty(len(self._legs), limits, np.roll(turned, -1),
-                                            self._geometry.weight, contacts)
+                                            self.legs.weight, contacts)
         self._contacts, self.feet = contacts, joints if contacts == EFFORTS else feet
         topics: list[tuple[type, str, np.ndarray]] = [
             (Imu, imu, senses.imu), (JointState, joints, senses.joints)]
@@ -244,7 +243,6 @@ class SensorInput:
         self.monitors: Sequence[InputMonitor] = [source.monitor for source in self.inputs]
         self.joints = self.monitors[1]
         self._library = native.library()
-        self._take_in: Any = None
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -271,17 +269,11 @@ class SensorInput:
         return {monitor.name: monitor.age for monitor in self.monitors
                 if not math.isnan(monitor.age)}
 
-    def faults(self, now: float, judge: bool = True) -> tuple[list[str], bool]:
-        """Return the faults of the inputs, and whether a faulty one has never arrived.
-
-        Args:
-            now: s.
-            judge: whether to judge them now; else the last result is returned.
-
-        """
+    def faults(self, now: float) -> tuple[list[str], bool]:
+        """Return the inputs' faults as last judged, and whether a faulty one has never arrived."""
         faults, waiting = [], False
         for monitor in self.monitors:
-            if fault := monitor.fault(now) if judge else monitor.reason:
+            if fault := monitor.reason:
                 faults.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
                 waiting = waiting or monitor.believed == -math.inf
         return faults, waiting
@@ -300,20 +292,6 @@ class SensorInput:
             if not self._library.read_input(address, data, len(data)):
                 self._learn(k, one, data)
                 self._library.read_input(address, data, len(data))
-
-    def update(self, now: float, moving: bool) -> None:
-        """Read the messages that have arrived, and check them.
-
-        Args:
-            now: s, on the clock of the messages' stamps.
-            moving: whether the robot should move, so that no measurement may stay the same.
-
-        """
-        self.read()
-        arguments = self.senses, self.sensor_data, self._geometry, now, bool(moving)
-        if self._take_in is None:
-            self._take_in = specialised(take_in, *arguments)
-        self._take_in(*arguments)
 
     def _learn(self, number: int, one: _Input, data: bytes) -> None:
         """Find the positions of the numbers in messages of a new layout."""

@@ -34,7 +34,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.strides import StrideCommand
-from cpg_ros.ros.command_topics import HeldPublisher, kp_scale_block
+from cpg_ros.ros.command_topics import held_block, kp_scale_block
 from cpg_ros.ros.feedback.loop import BalanceLoop, FeedbackLoop, Motion
 from cpg_ros.ros.feedback.odometry import odometry_block
 from cpg_ros.ros.feedback.sensor_input import SensorInput
@@ -198,7 +198,6 @@ class FeedbackSwitch:
         self.loop: Any = None
         self._delays_logged = False
         self.blocks: list[MessageBlock] = []
-        self._held: HeldPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
         self._hindrance = ''
@@ -291,8 +290,8 @@ class FeedbackSwitch:
             self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
         with announced(self._node, 'the feedback', BALANCE):
             loop = BalanceLoop(pattern, inputs, self._motion)
-        if loop.feedback.arms.swing:
-            self._held = HeldPublisher(self._node, pattern.robot)
+        if loop.feedback.arms.swings.any():
+            self.blocks.append(held_block(self._node, pattern.robot, pattern.held_angles))
         return loop
 
     def _inputs(self, geometry: Geometry | float) -> SensorInput:
@@ -309,16 +308,13 @@ class FeedbackSwitch:
         if self.loop is not None:
             self.loop.learn(plan)
 
-    def sense(self, dt: float, stamp: int) -> None:
-        """Balance the coming tick by the sensors; dt in s, stamp in ns."""
-        if self.loop is not None:
-            self.loop.sense(dt, 1e-9 * stamp)
-
     def renew(self) -> None:
         """Pass requests on to ticks outside the interpreter; log delays once they matter."""
         if self.loop is None:
             return
         self.loop.renew()
+        if news := self.loop.news():
+            self._node.get_logger().warning(news)
         if self.loop.fraction > 0.0 and not self._delays_logged:
             self._delays_logged = True
             delays = [f'{name} {1e3 * delay:.1f} ms'
@@ -327,15 +323,6 @@ class FeedbackSwitch:
                 'feedback: age of the measurements when they are used: '
                 f'{", ".join(delays) or "unknown, messages have no stamps"} '
                 f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
-
-    def publish(self, stamp: int) -> None:
-        """Publish and log what a balance has to say at a tick; stamp in ns."""
-        if self.loop is None:
-            return
-        if news := self.loop.news():
-            self._node.get_logger().warning(news)
-        if self._held is not None:
-            self._held.publish(stamp, self.loop.held_angles)
 
     def restart(self) -> None:
         """Restart after a jump back of simulated time."""

@@ -127,7 +127,7 @@ def library() -> ctypes.CDLL:
     loaded = load(cache_folder(f'tick-{key}'), 'tick', lambda: {_SOURCE.name: text}, _SOURCE.name)
     whole = ctypes.c_int64
     loaded.publish.argtypes, loaded.publish.restype = (ctypes.c_void_p, whole, whole), whole
-    for name in ('run', 'sense', 'tick', 'publish_outputs'):
+    for name in ('run', 'sense', 'tick'):
         getattr(loaded, name).argtypes = ctypes.c_void_p,
     loaded.read_input.argtypes = ctypes.c_void_p, ctypes.c_char_p, whole
     return loaded

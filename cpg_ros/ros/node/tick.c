@@ -122,7 +122,8 @@ typedef struct {
     int64_t size;
 } copy;
 
-/* The correction of the angles between plan and follow of the pattern. */
+/* The correction of the angles between plan and follow of the pattern; where these are NULL, close
+ * moves the joints itself. */
 typedef struct {
     int64_t (*close)(const void *arguments);
     int64_t (*finish)(const void *arguments);  /* called after follow; NULL for nothing to do */
@@ -219,14 +220,18 @@ static void correct(correction *c, void *what, double dt, int64_t stamp)
     const void *arguments = __atomic_load_n(&c->arguments, __ATOMIC_ACQUIRE);
     c->numbers[0] = dt;
     c->numbers[1] = 1e-9 * (double)stamp;
-    c->plan(what, dt);
-    c->report(what, c->numbers + 2, c->gaits);
+    if (c->plan) {
+        c->plan(what, dt);
+        c->report(what, c->numbers + 2, c->gaits);
+    }
     if (c->close(arguments) == 2) {
         for (int64_t k = 0; k < c->parts; k++) {
             memcpy(c->resets[k].to, c->resets[k].from, (size_t)c->resets[k].size);
         }
     }
-    c->follow(what, dt, 1);
+    if (c->plan) {
+        c->follow(what, dt, 1);
+    }
     if (c->finish) {
         c->finish(arguments);
     }
@@ -306,7 +311,7 @@ static int put(output *o, int64_t stamp, int64_t duration)
 }
 
 /* Publish what is due at a tick; return 0 if the middleware refuses a message. */
-int publish_outputs(loop *l)
+static int publish_outputs(loop *l)
 {
     int sent = 1;
     for (int k = 0; k < OUTPUTS && l->outputs[k] && sent; k++) {

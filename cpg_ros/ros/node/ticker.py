@@ -292,11 +292,6 @@ class Ticker(TickThread):
         elif event == native.REFUSED:
             raise native.middleware_error()
 
-    def publish(self) -> None:
-        """Publish the loop's outputs at a tick of Python."""
-        if not self._library.publish_outputs(ctypes.byref(self.loop)):
-            raise native.middleware_error()
-
 
 class SimulatedClock:
     """``/clock`` as ``tick.c`` takes it, while it is entered.

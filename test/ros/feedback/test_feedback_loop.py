@@ -18,6 +18,7 @@ import importlib.util
 import math
 
 from c_ticks import CTicks
+from cpg_ros.feedback.closed_loop import take_in
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_checks import FADE, GOOD, STALE
@@ -288,5 +289,6 @@ def test_feet_in_the_air_may_be_minus_zero(monkeypatch):
     monitor = inputs.monitors[-1]
     for k in range(100):
         Wire.wires['foot_contacts'].data = serialize_message(Float64MultiArray(data=[-0.0] * 4))
-        inputs.update(0.002 * k, True)
+        inputs.read()
+        take_in(inputs.senses, inputs.sensor_data, inputs.legs, 0.002 * k, True)
     assert not monitor.fault(0.2)

@@ -25,7 +25,7 @@ void cpg_approach_stand(cpg *c, cpg_real time)
 }
 
 /* Take the requests of other threads. */
-void cpg_take(cpg *c)
+static void take(cpg *c)
 {
     cpg_real go = 0.0;
     __atomic_exchange(&c->go, &go, &go, __ATOMIC_ACQ_REL);
@@ -110,7 +110,7 @@ static cpg_real slowed_in(cpg *c, cpg_real dt, cpg_real *pace)
 void cpg_plan(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS], clock = dt;
-    cpg_take(c);
+    take(c);
     c->fraction = 1.0;
     if (c->stall > 0.0) {
         clock = slowed_in(c, dt, &c->fraction);
@@ -158,6 +158,25 @@ void cpg_follow(cpg *c, cpg_real dt, int corrected)
     c->state = newest->net.now;
 }
 
+/* Want the joints where they are, at rest. */
+static void rest(cpg *c)
+{
+    for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
+        c->wanted[joint] = c->position[joint];
+        c->rate[joint] = c->correction[joint] = 0.0;
+    }
+}
+
+/* Move the joints to the goal, whatever the gait is; requests of other threads are taken, but only
+ * the first gait runs. */
+void cpg_reach(cpg *c, cpg_real dt)
+{
+    take(c);
+    c->tracks = 1;
+    rest(c);
+    cpg_follow(c, dt, 1);
+}
+
 /* Fill the inputs of a correction: level, phase of the first leg, fraction of the gait that is
  * entered, strides per second, whether the gait changes, roll, pitch and yaw of the body; keys of
  * both gaits, the entered last. */
@@ -182,6 +201,15 @@ void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_plan(c, dt);
     cpg_follow(c, dt, 0);
+}
+
+/* Go on with the gait after cpg_reach: the joints move there from where they are. */
+void cpg_let_go(cpg *c, cpg_real dt)
+{
+    rest(c);
+    c->absorbed = 0.0;
+    c->jumped = 0;
+    cpg_advance(c, dt);
 }
 
 /* Move joints to the wanted positions within limits; return how many those hold back. */
