@@ -15,4 +15,4 @@
 """The integrator: kernels compiled by numba or in C, in real time and offline."""
 
 __all__ = ['c_kernel', 'c_text', 'compilation', 'kernel', 'kernel_source', 'machine_code',
-           'simulate', 'stepper']
+           'memory', 'simulate', 'stepper']

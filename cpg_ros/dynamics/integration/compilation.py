@@ -19,7 +19,6 @@ numba, kernels are plain Python, too slow for feedback and simulation.
 """
 
 from contextlib import AbstractContextManager, nullcontext
-import ctypes
 from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 import math
@@ -92,24 +91,6 @@ def specialised(kernel: Kernel, *arguments):
 def on_compile(compiling) -> AbstractContextManager:
     """Call a function before each compilation of a function that is not in the cache."""
     return _numba().on_compile(compiling) if COMPILED else nullcontext()
-
-
-# Memory and functions of C, by their addresses. Compiled kernels have them as machine code.
-
-def number_at(address: int) -> float:
-    """Return the double at an address."""
-    return ctypes.c_double.from_address(int(address)).value
-
-
-def whole_at(address: int) -> int:
-    """Return the 64-bit integer, such as a pointer, at an address."""
-    return ctypes.c_int64.from_address(int(address)).value
-
-
-def call_at(function: int, struct: int, number: float) -> int:
-    """Call a C function of a pointer and a double; return its int, arbitrary if it is void."""
-    kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_double)
-    return int(kind(int(function))(int(struct), number))
 
 
 _LOG2E = 1.0 / math.log(2.0)

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.common.cache_folder import writing
-from cpg_ros.dynamics.integration import compilation
+from cpg_ros.dynamics.integration import memory
 from cpg_ros.networks import equations
 from llvmlite import ir
 from numba import config, njit, prange, typeof
@@ -148,9 +148,9 @@ def _call(_, function, struct, number):
 
 
 _called: Any = intrinsic(_call)
-_reads(compilation.number_at, types.float64)
-_reads(compilation.whole_at, types.int64)
-overload(compilation.call_at)(lambda function, struct, number: (
+_reads(memory.number_at, types.float64)
+_reads(memory.whole_at, types.int64)
+overload(memory.call_at)(lambda function, struct, number: (
     lambda function, struct, number: _called(function, struct, number)))
 
 

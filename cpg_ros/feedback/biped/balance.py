@@ -17,7 +17,8 @@
 import math
 from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import call_at, jit, jit_entry
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.dynamics.integration.memory import call_at
 from cpg_ros.feedback.biped import substitutes
 from cpg_ros.feedback.biped.gains import SHIFT, STAND, WALK
 from cpg_ros.feedback.biped.modes import advance, follow, stand_anew

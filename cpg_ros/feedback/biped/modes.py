@@ -17,7 +17,8 @@
 import math
 from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import call_at, jit, jit_entry, number_at, whole_at
+from cpg_ros.dynamics.integration.compilation import jit, jit_entry
+from cpg_ros.dynamics.integration.memory import call_at, number_at, whole_at
 from cpg_ros.feedback.biped.gains import BipedMemory, SHIFT, STAND, WALK
 from cpg_ros.feedback.biped.links import Links
 from cpg_ros.feedback.biped.stepping import HOPS, RUNS, WALKS

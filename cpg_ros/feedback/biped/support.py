@@ -22,7 +22,8 @@ share it, and each leg's joints get J' F.
 import math
 from typing import NamedTuple
 
-from cpg_ros.dynamics.integration.compilation import jit, number_at
+from cpg_ros.dynamics.integration.compilation import jit
+from cpg_ros.dynamics.integration.memory import number_at
 from cpg_ros.feedback.biped.links import carry
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.feedback.laws.law import Gain
