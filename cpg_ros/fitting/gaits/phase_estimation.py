@@ -64,6 +64,9 @@ DRIFTS = 12
 STEPS, FARTHEST = 6, 0.1
 #: STIFFNESS: weight of a knot's neighbours where there are no data around it.
 STIFFNESS = 1e-3
+#: MISSING: interval between samples, over the usual one or that of the grid, in which none of the
+#: grid's points count.
+MISSING = 2.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -171,7 +174,11 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     within = index_range(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
     grid, y = resample_evenly(times[within], positions[within], BLOCKS * POINTS * slope)
     inside = index_range(grid, rough.begin, rough.end)
-    grid, x = grid[inside] - rough.begin, y.T[:, inside]
+    # What is interpolated where many samples are missing is no motion.
+    steps = np.diff(times[within])
+    known = steps[np.clip(np.searchsorted(times[within], grid) - 1, 0, steps.size - 1)] <= (
+        MISSING * max(float(np.median(steps)), grid[1] - grid[0]))
+    grid, x = grid[inside][known[inside]] - rough.begin, y.T[:, inside][:, known[inside]]
     if span * slope < FEW:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
         return PhaseEstimate(np.array([rough.begin, rough.end]), phases,
@@ -286,8 +293,8 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
             ) -> tuple[int, int]:
     """Return first and last stride of the longest run, between knots, that resembles the mean."""
     left, _ = _model(x, np.interp(grid, knots, phases))
-    starts = np.searchsorted(grid, knots[:-1])
-    counts = np.diff(np.append(starts, grid.size))
+    starts = np.minimum(np.searchsorted(grid, knots[:-1]), grid.size - 1)
+    counts = np.maximum(np.diff(np.append(starts, grid.size)), 1)
 
     def sums(values: np.ndarray) -> np.ndarray:
         return np.add.reduceat(values, starts, axis=1)

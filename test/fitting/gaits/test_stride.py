@@ -367,3 +367,17 @@ def test_joints_with_gaps_are_left_out_or_the_recording_is_refused(seed):
     assert set(NAMES) - set(stride.joints) <= set(re.findall(
         r'\w+', ' '.join(note for note in stride.notes if 'left out' in note)))
     assert np.isfinite(stride.mean).all() and np.isfinite(list(stride.phases.values())).all()
+
+
+@pytest.mark.parametrize('seed', [1, 2, 3])
+def test_the_phase_goes_evenly_through_missing_samples(seed):
+    rng, t = np.random.default_rng(seed), np.arange(2800) / 200.0
+    there = np.full(t.size, True)
+    # Thirty to 250 ms at a time, 5 % of all.
+    while there.mean() > 0.95:
+        begin = rng.integers(t.size)
+        there[begin:begin + rng.integers(6, 50)] = False
+    stride = walked(noisy(rng, quadruped(1.7 * t), 0.01)[there], t[there])
+    inside = t[there & (t >= stride.begin) & (t <= stride.end)]
+    off = stride.warp(inside) - 1.7 * inside
+    assert np.std(off) < 3e-4
