@@ -57,7 +57,7 @@ def test_a_normalised_table_needs_the_duration(tmp_path, time):
     recording = read_recording(path, cycle=1.2)
     assert recording.cycle == 1.2 and recording.times[100] == pytest.approx(1.2)
     assert recording.positions.shape == (600, 4)
-    with pytest.raises(RecordingError, match=r'shares of a stride: give .* \(--cycle\)'):
+    with pytest.raises(RecordingError, match=r'fractions of a stride: give .* \(--cycle\)'):
         fit_recording(read_recording(path))
 
 
