@@ -118,14 +118,6 @@ class SensorLoop:
         """Return what has happened to the robot since the last call, or ''."""
         return ''
 
-    def ages(self, now: float) -> dict[str, float]:
-        """Return name -> time since the last plausible message, s; inf for none."""
-        return self.inputs.ages(now)
-
-    def latencies(self) -> dict[str, float]:
-        """Return name -> age of its measurements when they are used, low-passed, s."""
-        return self.inputs.latencies()
-
 
 class FeedbackLoop(SensorLoop):
     """Corrects a pattern by the robot's sensors, as long as they are plausible.

@@ -318,7 +318,7 @@ class FeedbackSwitch:
         if self.loop.fraction > 0.0 and not self._delays_logged:
             self._delays_logged = True
             delays = [f'{name} {1e3 * delay:.1f} ms'
-                      for name, delay in self.loop.latencies().items()]
+                      for name, delay in self.loop.inputs.latencies().items()]
             self._node.get_logger().info(
                 'feedback: age of the measurements when they are used: '
                 f'{", ".join(delays) or "unknown, messages have no stamps"} '
@@ -353,7 +353,7 @@ class FeedbackSwitch:
             return {'feedback': 'off'}
         return {'feedback': loop.state if loop.wanted else 'off',
                 **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
-                   for name, age in loop.ages(now).items()},
+                   for name, age in loop.inputs.ages(now).items()},
                 **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'
-                   for name, delay in loop.latencies().items()},
+                   for name, delay in loop.inputs.latencies().items()},
                 'largest delay [ms]': f'{1e3 * self._value("max_delay"):.1f}'}
