@@ -88,7 +88,7 @@ def test_a_bag_in_a_gait_out(bag, tmp_path, capsys):
         assert joint.lower < angle.min() and angle.max() < joint.upper
     page = report.read_text()
     # Pictures are texts in which http may stand by chance.
-    assert page.count('<img') == 6 and '://' not in page
+    assert page.count('<img') == 4 and '://' not in page
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         'fitted.yaml', 'fitted_robot.yaml', 'report.html']
 
