@@ -357,7 +357,6 @@ def _sense(biped, watch, dt):
     if state.balancing and mode == WALK and gait.kind == WALKS:
         _doubt_feet(gait, laws, measured.foot_forces[0], state, dt)
     _discount(state)
-    substitutes.aim(filled, biped.servos.rows, watch.position, watch.places, biped.arms.positions)
     substitutes.fill(biped.links, measured, state, biped.memory, filled, dt)
     sensors = filled.sensors
     near = _is_near(sensors.joint_positions[0], biped.servos.rows,

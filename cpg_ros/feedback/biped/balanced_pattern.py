@@ -108,7 +108,7 @@ class BalancedPattern(Pattern):
         self._state.depth = depth
         self._state.weight = GRAVITY * feedback.biped.links.masses.sum()
         self.watch = compiled.Watch(
-            SensorData.zeros(1, 2, joints), Substitutes.of(self.robot, feedback.biped.links),
+            SensorData.zeros(1, 2, joints), Substitutes.empty(feedback.biped.links),
             LastStride.empty(size), np.zeros((3, joints)),
             np.stack([rest, low, leant - low, self.position]), self._goal, self.position,
             self.robot.places, addresses('cpg_advance', 'cpg_let_go', 'cpg_reach'),

@@ -18,8 +18,8 @@ For a few ticks measured values go on as their rates say. Later the sole that be
 the inertial unit: it is level and still, so the joints say how the base leans and turns. The force
 that the legs were to exert accelerates the centre of mass, and from it and the joints follows how
 the base accelerates. Loads on the feet are those that the clock gives them. Joints move as they
-must for soles that stand to be still and level, while the base moves as the inertial unit says;
-those of a leg that swings and of arms follow their targets as masses, rotors and servos do.
+must for soles that stand to be still and those that swing to be on their paths, while the base
+moves as the inertial unit says.
 """
 
 import math
@@ -40,7 +40,6 @@ from cpg_ros.feedback.biped.links import (
 from cpg_ros.feedback.biped.stepping import WALKS
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import cross, GRAVITY
-from cpg_ros.motion.robot import Robot
 import numpy as np
 
 #: Inputs in the order of their ages.
@@ -50,9 +49,9 @@ IMU, JOINTS, FEET = range(3)
 EXTRAPOLATED = 0.05
 #: PROMPT: age, s, above which a measurement that has just arrived is extrapolated, too.
 PROMPT = 0.008
-#: LEVELLED: rate at which a predicted sole that stands becomes level, 1/s; DAMPED: damping of the
-#: least squares that give the rates of the joints.
-LEVELLED, DAMPED = 40.0, 1e-3
+#: FOLLOWED: rate at which a predicted sole approaches its path, 1/s; DAMPED: damping of the least
+#: squares that give the rates of the joints.
+FOLLOWED, DAMPED = 20.0, 1e-3
 #: FASTEST: largest rate of a predicted joint, rad/s.
 FASTEST = 15.0
 #: LEANT: age of the inertial unit, s, from which on a sole stands for it, where joints are known.
@@ -132,75 +131,30 @@ class Substitutes(NamedTuple):
     Attributes:
         sensors: measurements with the gaps filled.
         angles: of the joints as they are predicted, rad, shape (joints,).
-        rates: of the joints at the last tick, rad/s, shape (joints,).
-        targets: of their servos, rad, shape (joints,).
-        servos: kp, N m/rad, kd, N m s/rad, and inertia of the rotor, kg m^2, shape (3, joints).
-        held: rows of the joints of no leg among the links.
-        moves: whether a link, the first index, is moved by the joint of another's row.
         pose: of the links, scratch.
         center: velocity of the centre of mass, scratch, shape (3,).
         sole: velocity of a sole, scratch, shape (6,).
         rpy: of the base, scratch, shape (3,).
         columns: of a leg's Jacobian, scratch, shape (joints of a leg, 6).
         system: of equations, scratch, shape (6, 7).
-        lever: velocity of a centre at a unit rate of each joint, scratch, shape (joints, 3).
-        leg_motion: equations of motion of a leg, scratch.
-        held_motion: of the joints of no leg, scratch.
 
     """
 
     sensors: SensorData
     angles: np.ndarray
-    rates: np.ndarray
-    targets: np.ndarray
-    servos: np.ndarray
-    held: np.ndarray
-    moves: np.ndarray
     pose: Pose
     center: np.ndarray
     sole: np.ndarray
     rpy: np.ndarray
     columns: np.ndarray
     system: np.ndarray
-    lever: np.ndarray
-    leg_motion: np.ndarray
-    held_motion: np.ndarray
 
     @classmethod
-    def of(cls, robot: Robot, links: Links) -> 'Substitutes':
+    def empty(cls, links: Links) -> 'Substitutes':
         """Return those of a robot that was not measured yet."""
-        assert robot.biped is not None
         joints, (legs, size) = len(links.masses) - 1, links.chains.shape
-        servos = np.array([(link.kp, link.kd, link.armature)
-                           for link in robot.biped.links.values()]).T.copy()
-        names = list(robot.biped.links)
-        held = np.array([names.index(name) + 1 for name in robot.held], dtype=np.int64)
-        moves = np.eye(joints + 1, dtype=bool)
-        for row in range(1, joints + 1):
-            moves[row] |= moves[links.parents[row]]
-        return cls(SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(joints),
-                   np.zeros(joints), servos, held, moves,
-                   blank_pose(links), np.zeros(3), np.zeros(6), np.zeros(3), np.zeros((size, 6)),
-                   np.zeros((6, 7)), np.zeros((joints, 3)), np.zeros((size, size + 1)),
-                   np.zeros((len(held), len(held) + 1)))
-
-
-@jit
-def aim(own, rows, position, places, arms):
-    """Note the targets of the servos since the last tick.
-
-    Args:
-        own: Substitutes.
-        rows: of the legs' joints among the feedback's, shape (joints,).
-        position: targets of all joints of the pattern, rad.
-        places: of the legs' joints among these, shape (joints,).
-        arms: targets of the joints of no leg, rad.
-
-    """
-    for k in range(len(rows)):
-        own.targets[rows[k]] = position[places[k]]
-    for k in range(len(own.held)):
-        own.targets[own.held[k] - 1] = arms[k]
+        return cls(SensorData.zeros(1, legs, joints), np.zeros(joints), blank_pose(links),
+                   np.zeros(3), np.zeros(6), np.zeros(3), np.zeros((size, 6)), np.zeros((6, 7)))
 
 
 @jit
@@ -227,7 +181,7 @@ def fill(links, measured, known, memory, own, dt):
     sensors.acceleration[:] = measured.acceleration
     late_imu, late_joints = ages[IMU] > 1.5 * dt, ages[JOINTS] > 1.5 * dt
     if late_joints:
-        _move(links, memory, own, LEVELLED if known.suspect < 0 else 0.0, dt)
+        _move(links, memory, own, dt)
     else:
         _take_joints(links, latencies[JOINTS], memory, known.suspect, measured, own, dt)
     time = max(ages[IMU], latencies[IMU])
@@ -248,7 +202,6 @@ def fill(links, measured, known, memory, own, dt):
         for leg in range(2):
             sensors.foot_forces[0, leg] = (0.0 if laws.swinging[leg]
                                            else weight * laws.fractions[leg])
-    own.rates[:] = sensors.joint_velocities[0]
 
 
 @jit
@@ -269,8 +222,7 @@ def _take_joints(links, latency, memory, suspect, measured, own, dt):
     ahead = min(latency, EXTRAPOLATED) if latency > PROMPT else 0.0
     predicted, rate = 0.0, 0.0
     if suspect >= 0:
-        # Beside measured joints, a single predicted one would answer for the tilt of a sole.
-        _move(links, memory, own, 0.0, dt)
+        _move(links, memory, own, dt)
         predicted, rate = own.angles[suspect], rates[suspect]
     for k in range(len(rates)):
         rates[k] = measured.joint_velocities[0, k]
@@ -295,63 +247,19 @@ def _solve(system):
 
 
 @jit
-def _follow(links, pose, rows, own, system, dt):
-    """Fill the rates, rad/s, of joints whose links nothing bears, dt in s later.
-
-    Servos move their masses against gravity, as if the base did not accelerate. The step is an
-    implicit one, as feet are light for their servos.
-    """
-    size, lever, rates = len(rows), own.lever, own.sensors.joint_velocities[0]
-    system[:] = 0.0
-    for link in range(1, len(links.masses)):
-        mass, at, to = links.masses[link], links.anchors[link], links.centers[link]
-        off = (to[0] - at[0], to[1] - at[1], to[2] - at[2])
-        turn, start = pose.rotations[link], pose.places[link]
-        center = (start[0] + carry(turn, off, 0), start[1] + carry(turn, off, 1),
-                  start[2] + carry(turn, off, 2))
-        for a in range(size):
-            if own.moves[link, rows[a]]:
-                lever[a, 0], lever[a, 1], lever[a, 2] = column(pose, rows[a], center)
-                system[a, size] -= dt * GRAVITY * mass * lever[a, 2]
-                for b in range(a + 1):
-                    if own.moves[link, rows[b]]:
-                        system[a, b] += mass * (lever[a, 0] * lever[b, 0]
-                                                + lever[a, 1] * lever[b, 1]
-                                                + lever[a, 2] * lever[b, 2])
-    for a in range(size):
-        system[a, a] += own.servos[2, rows[a] - 1]
-        for b in range(a):
-            system[b, a] = system[a, b]
-    for a in range(size):
-        joint = rows[a] - 1
-        for b in range(size):
-            system[a, size] += system[a, b] * own.rates[rows[b] - 1]
-        system[a, size] += dt * own.servos[0, joint] * (own.targets[joint] - own.angles[joint])
-    for a in range(size):
-        system[a, a] += dt * (own.servos[1, rows[a] - 1] + dt * own.servos[0, rows[a] - 1])
-    _solve(system)
-    for a in range(size):
-        rates[rows[a] - 1] = system[a, size]
-
-
-@jit
-def _move(links, memory, own, level, dt):
-    """Predict the joints dt in s later; soles that stand become level at a rate, 1/s."""
+def _move(links, memory, own, dt):
+    """Predict the joints of the legs dt in s later."""
     laws = memory.laws[0]
     pose, rates, columns, system = (memory.pose, own.sensors.joint_velocities[0], own.columns,
                                     own.system)
     rates[:] = 0.0
-    _follow(links, pose, own.held, own, own.held_motion, dt)
     for leg in range(2):
         chain, sole = links.chains[leg], pose.soles[leg]
-        if laws.swinging[leg] and not laws.landed[leg]:
-            _follow(links, pose, chain, own, own.leg_motion, dt)
-            continue
-        turned, up = cross(laws.turning, sole), pose.rotations[chain[-1]]
+        turned = cross(laws.turning, sole)
         for k in range(3):
             system[k, 6], system[3 + k, 6] = -(laws.velocity[k] + turned[k]), -laws.turning[k]
-        system[3, 6] += level * up[1, 2]
-        system[4, 6] -= level * up[0, 2]
+            if laws.swinging[leg]:
+                system[k, 6] += laws.path[1, k] + FOLLOWED * (laws.path[0, k] - sole[k])
         for j in range(len(chain)):
             moved, axis = column(pose, chain[j], sole), pose.axes[chain[j]]
             for k in range(3):
@@ -368,8 +276,7 @@ def _move(links, memory, own, level, dt):
                 rate += columns[j, k] * system[k, 6]
             rates[chain[j] - 1] = rate
     for k in range(len(rates)):
-        rates[k] = min(max(rates[k], -FASTEST), FASTEST)
-        own.angles[k] += dt * rates[k]
+        own.angles[k] += dt * min(max(rates[k], -FASTEST), FASTEST)
     own.sensors.joint_positions[0] = own.angles
 
 

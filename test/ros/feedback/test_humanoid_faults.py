@@ -35,20 +35,6 @@ def test_it_goes_on_walking_after(fault):
     assert not humanoid.crossed and not humanoid.pattern.falls
 
 
-def test_joints_of_the_legs_that_are_not_measured_follow_their_soft_servos():
-    humanoid = HumanoidUnderFault('dropped joints', begins=3.1)
-    humanoid.run(3.12)
-    servos, off = humanoid.loop.feedback.biped.servos, []
-    # From the middle of a swing to that of the next one.
-    while humanoid.time < 3.4:
-        place = humanoid.body.position.copy()
-        humanoid.step()
-        # Torques are added to the angles that the balance takes for measured ones.
-        off.append(np.abs(servos.positions - servos.torques / servos.kp - place).max())
-    # Servos lag by up to .3 rad behind their targets.
-    assert max(off) < 0.16
-
-
 def test_its_state_says_what_it_does_beside_the_fault():
     humanoid = HumanoidUnderFault('dropped imu', speed=0.0, begins=1.0)
     for until, doing in ((0.9, 'on'), (1.1, 'coming to a stand: imu: no messages for '),
