@@ -222,15 +222,14 @@ static void confine(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real 
         /* NaN is held back, too. */
         const uint8_t held = !(position <= wanted[joint] && position >= wanted[joint]);
         const uint8_t fast = F(fabs)(rate) > fastest * ABOVE;
-        const cpg_real step = dt > R(0.0) ? (position - last) / dt : R(0.0);
         uint8_t turned = 0;
 #ifdef CPG_HOST
-        const cpg_real before = c->velocity[joint];
+        const cpg_real before = c->velocity[joint], step = dt > 0.0 ? (position - last) / dt : 0.0;
         turned = fabs(step - within(step, least(rate, before), most(rate, before)))
                > BESIDE * fastest;
 #endif
         if (held || fast || turned || c->behind[joint]) {
-            rate = step;
+            rate = dt > R(0.0) ? (position - last) / dt : R(0.0);
             c->held = (uint8_t)(c->held + (held || fast));
         }
         c->behind[joint] = held;
