@@ -204,8 +204,8 @@ def test_a_recording_with_a_gap_in_the_stride_is_refused():
 
 # -- the loop -----------------------------------------------------------------------------------
 
-def close(pattern, feedback, measure, velocity, heading):
-    """Let a feedback of one run correct a pattern at ticks of DT, from what is measured."""
+def correction(pattern, feedback, measure, velocity, heading):
+    """Return how feedback of one run corrects a pattern at ticks of DT by what is measured."""
     gaits, mix, memory = np.zeros((1, 2), dtype=np.int64), np.zeros(1), feedback.memory
 
     def correct(angles):
@@ -219,7 +219,7 @@ def close(pattern, feedback, measure, velocity, heading):
         pattern.steer(np.clip(stride + memory.stride[0], -1.0, 1.0), pace)
         return corrected[0]
 
-    pattern.correct = correct
+    return correct
 
 
 def test_a_body_that_rolls_to_the_right_steps_to_the_right(loop):
@@ -246,14 +246,19 @@ def patterns(loop, expected, gains, steps=1500):
     body = Body('go2', GO2)
     pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
+    correct = None
     if gains is not None:
         feedback = Feedback(loop.geometry, gains)
         feedback.learn(made, expected)
-        close(pattern, feedback, Proprioception(body), np.array([[0.4, 0.0]]), np.zeros(1))
+        correct = correction(pattern, feedback, Proprioception(body), np.array([[0.4, 0.0]]),
+                             np.zeros(1))
     told, spun, held = np.empty((steps, 12)), np.empty((steps, 12)), np.zeros(steps, dtype=bool)
     for k, (row, rate) in enumerate(zip(told, spun, strict=True)):
         before = pattern.held
-        pattern.advance(DT)
+        if correct is None:
+            pattern.advance(DT)
+        else:
+            pattern.follow(DT, correct(pattern.plan_tick(DT)))
         held[k] = pattern.held > before
         row[:], rate[:] = pattern.position, pattern.velocity
         body.command(pattern.position[GO2.places])
