@@ -398,6 +398,7 @@ class Generator(StartedNode):
             self.pattern.start_from(pose, self._value('ramp'))
         if self.ticker.is_alive():
             self.ticker.paused = False
+            self.ticker.attend()
         else:
             self.ticker.start()
         return '', 'the stand' if pose is None else 'the measured pose'

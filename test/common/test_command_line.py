@@ -82,7 +82,7 @@ def test_help(executable, word):
     assert found.returncode == 0 and not found.stderr
     assert found.stdout.startswith('usage: ') and executable in found.stdout
     if executable in ('generator', 'robot_sim'):
-        assert '\n  command  ' in found.stdout
+        assert '\n  command*: ' in found.stdout
 
 
 def test_the_entry_points_of_setup_are_the_executables(monkeypatch, capsys):
