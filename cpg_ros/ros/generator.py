@@ -398,7 +398,6 @@ class Generator(StartedNode):
             self.pattern.start_from(pose, self._value('ramp'))
         if self.ticker.is_alive():
             self.ticker.paused = False
-            self.ticker.attend()
         else:
             self.ticker.start()
         return '', 'the stand' if pose is None else 'the measured pose'
@@ -442,7 +441,7 @@ class Generator(StartedNode):
 
     def _cannot_sit(self) -> str:
         """Return why the robot can neither sit nor stand up now, or ''."""
-        if self.ticker.waiting or self.ticker.paused:
+        if self.ticker.waiting:
             return 'nothing is published yet'
         active = self._lifecycle is not None and self._lifecycle.active
         return 'this node is managed: deactivate it first' if active else ''
@@ -452,7 +451,6 @@ class Generator(StartedNode):
         if not self.pattern.standing:
             return 'it is still ramping down to the stand'
         self.ticker.paused = True
-        self.ticker.attend()
         return ''
 
     def _shut_down(self) -> str:

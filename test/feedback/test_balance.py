@@ -96,7 +96,7 @@ def walker():
     assert not made.crossed
 
 
-def test_it_stands_walks_as_wished_and_stops(walker):
+def test_it_stands_walks_as_commanded_and_stops(walker):
     pattern = walker.pattern
     assert abs(walker.go(1.0)) < 0.03 and pattern.balancing and pattern.standing
     pattern.command = 0.3, 0.0, 0.0
@@ -110,7 +110,7 @@ def test_it_stands_walks_as_wished_and_stops(walker):
     assert walker.tilt < 0.1 and not pattern.falls
 
 
-def test_wishes_keep_to_what_was_tried(walker):
+def test_commands_keep_to_what_was_tried(walker):
     pattern = walker.pattern
     pattern.command = 9.0, -9.0, 9.0
     pattern.enable(True, 1.0)

@@ -405,13 +405,14 @@ def _decide(gait, mode, laws, state, dt):
 
 
 @jit
-def _wish(wish, state):
-    """Fill the wished velocity, m/s and rad/s, shape (3,); return whether it is to walk."""
+def _take_command(velocity, state):
+    """Fill the commanded velocity, m/s and rad/s, shape (3,); return whether the robot walks."""
     walks = state.enabled and not (state.good < GOOD or state.lowers)
-    wish[:] = state.command
+    velocity[:] = state.command
     if not walks:
-        wish[:] = 0.0
-    wish[1], wish[2] = min(max(wish[1], -ASIDE), ASIDE), min(max(wish[2], -TURN), TURN)
+        velocity[:] = 0.0
+    velocity[1] = min(max(velocity[1], -ASIDE), ASIDE)
+    velocity[2] = min(max(velocity[2], -TURN), TURN)
     return walks
 
 
@@ -433,7 +434,7 @@ def _go_over(target, start, goal, places, state, dt):
 def _balance(biped, watch, dt):
     """Fill the goal with the angles that balance requests; return False after a fall."""
     state, own, laws = watch.state[0], biped.state[0], biped.memory.laws[0]
-    own.walks = _wish(biped.wishes[0], state)
+    own.walks = _take_command(biped.velocities[0], state)
     if state.holds:
         state.holds = False
         watch.poses[START] = watch.position
@@ -486,7 +487,7 @@ def balance(biped, watch, dt):
         state.anew = False
         if not state.balancing:
             state.doubts[:] = 0
-    if own.wish != own.goal:
+    if own.requested != own.goal:
         follow(biped.gaits, biped.functions, own)
     state.used[:] = state.ages
     if state.seen:

@@ -37,7 +37,7 @@ class BalancedPattern(Pattern):
     """A pattern whose joints a biped's feedback moves.
 
     Without feedback it is the open-loop pattern. With it, it holds the stand's angles until the
-    robot stands on its feet, then balances: it stands while disabled, and walks as wished while
+    robot stands on its feet, then balances: it stands while disabled, and walks as commanded while
     enabled. After a fall it holds the stand until somebody has put the robot on its feet. Limits
     of positions and speeds hold throughout; where the feedback begins or ends, the joints move on
     from where they are.
@@ -156,7 +156,7 @@ class BalancedPattern(Pattern):
                 for k, code in enumerate(self._state.doubts.tolist()) if code}
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
-        """Do nothing: feet are placed for the wished speed."""
+        """Do nothing: feet are placed for the commanded speed."""
 
     def apply(self, plan: GaitPlan, transition: float) -> None:
         """Change to a plan; with feedback at once, whatever the transition."""
@@ -172,7 +172,7 @@ class BalancedPattern(Pattern):
         super().enable(enabled, ramp)
 
     def attach(self, strides: StrideCommand) -> None:
-        """Do nothing: feet are placed for the wished speed."""
+        """Do nothing: feet are placed for the commanded speed."""
 
     @property
     def faults(self) -> int:

@@ -114,14 +114,14 @@ class BipedFeedback:
         self.biped = Biped(links, gaits, Arms.of(robot, SLOTS), servos,
                            addresses('cpg_track_advance', 'cpg_track_reseed'),
                            BipedMemory.empty(links), np.zeros((2, 3)), state)
-        self.state, self.arms, self.command = state[0], self.biped.arms, self.biped.wishes[1]
+        self.state, self.arms, self.command = state[0], self.biped.arms, self.biped.velocities[1]
         self.pose, self.memory = self.biped.memory.pose, self.biped.memory.laws[0]
         self.runners: list[GaitRunner | None] = [None] * SLOTS
         self._put(STOPPING, GaitRunner(walk, 0.0))
         if gains is not None:
             self._gains[plan.gait] = gains._replace(frequency=plan.frequency)
         self._put(STOPPING + 1, GaitRunner(plan, 0.0))
-        self.state.gait = self.state.goal = self.state.wish = STOPPING + 1
+        self.state.gait = self.state.goal = self.state.requested = STOPPING + 1
         self._advance: Callable | None = None
 
     @property
@@ -134,7 +134,7 @@ class BipedFeedback:
     @property
     def wanted(self) -> GaitRunner:
         """The network of the gait that is wanted."""
-        track = self.runners[self.state.wish]
+        track = self.runners[self.state.requested]
         assert track is not None
         return track
 
@@ -151,16 +151,16 @@ class BipedFeedback:
     @property
     def changing(self) -> bool:
         """Whether another gait than that in force is wanted."""
-        return bool(self.state.gait != self.state.wish)
+        return bool(self.state.gait != self.state.requested)
 
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
         """Go with this velocity, m/s, and rate of turning, rad/s, from now on."""
-        self.biped.wishes[0] = forward, left, turn
+        self.biped.velocities[0] = forward, left, turn
         self.state.walks = True
 
     def stand(self) -> None:
         """Stop, and stand on both legs as soon as the body is slow enough."""
-        self.biped.wishes[0] = 0.0
+        self.biped.velocities[0] = 0.0
         self.state.walks = False
 
     def set_gains(self, gait: str, gains: BipedGains) -> None:
@@ -178,9 +178,9 @@ class BipedFeedback:
 
         """
         state = self.state
-        slot = min({*range(SLOTS)} - {STOPPING, state.gait, state.goal, state.wish})
+        slot = min({*range(SLOTS)} - {STOPPING, state.gait, state.goal, state.requested})
         self._put(slot, track)
-        state.wish = slot
+        state.requested = slot
 
     def _put(self, slot: int, track: GaitRunner) -> None:
         """Put a network at a place among the gaits that is not in use."""

@@ -47,11 +47,11 @@ MOVE, RESEED = range(2)
 #: Where a network's struct has its phase, and the addresses of the legs' phases and of the state.
 PHASE, LEGS, NOW = Track.phase.offset, Track.legs.offset, Track.net.offset + Net.now.offset
 
-#: State of a biped's feedback. mode: STAND, SHIFT or WALK; gait, goal, wish: place among the gaits
-#: of the one in force, the one wanted, and the one requested last; faults: how often the network
-#: left its orbit and was put back; time: in the mode, s; walks: whether it is to walk; ready:
-#: whether the heading is known.
-STATE = np.dtype([*((name, np.int64) for name in ('mode', 'gait', 'goal', 'wish', 'faults')),
+#: State of a biped's feedback. mode: STAND, SHIFT or WALK; gait, goal, requested: place among the
+#: gaits of the one in force, the one wanted, and the one requested last; faults: how often the
+#: network left its orbit and was put back; time: in the mode, s; walks: whether it is to walk;
+#: ready: whether the heading is known.
+STATE = np.dtype([*((name, np.int64) for name in ('mode', 'gait', 'goal', 'requested', 'faults')),
                   ('time', float), ('walks', np.bool_), ('ready', np.bool_)])
 
 
@@ -86,8 +86,8 @@ class Biped(NamedTuple):
         servos: of the robot.
         functions: addresses of C functions, see MOVE and RESEED.
         memory: of the laws.
-        wishes: velocity forward and left, m/s, and rate of turning, rad/s, as they are asked of it
-            and as they are requested of the gait in force, shape (2, 3).
+        velocities: forward and left, m/s, and rate of turning, rad/s: commanded, and within what
+            the gait in force can do, shape (2, 3).
         state: STATE, shape (1,).
 
     """
@@ -98,7 +98,7 @@ class Biped(NamedTuple):
     servos: Servos
     functions: np.ndarray
     memory: BipedMemory
-    wishes: np.ndarray
+    velocities: np.ndarray
     state: np.ndarray
 
 
@@ -119,11 +119,11 @@ def stand_anew(laws, state, weight, crouch):
 @jit
 def follow(gaits, functions, state):
     """Want the gait requested last; another frequency of the same gait is taken at once."""
-    wish, now = gaits[state.wish], gaits[state.gait]
-    same = wish.name == now.name and state.gait == state.goal
-    state.goal = state.wish
+    requested, now = gaits[state.requested], gaits[state.gait]
+    same = requested.name == now.name and state.gait == state.goal
+    state.goal = state.requested
     if same:
-        call_at(functions[RESEED], wish.track, number_at(now.track + PHASE))
+        call_at(functions[RESEED], requested.track, number_at(now.track + PHASE))
         state.gait = state.goal
 
 
@@ -232,13 +232,13 @@ def _choose(gaits, functions, laws, soles, state, dt):
 
 
 @jit
-def _limit(gaits, wishes, state):
+def _limit(gaits, velocities, state):
     """Fill the velocity requested of the gait in force, which may be changing to another."""
-    wishes[1] = 0.0
+    velocities[1] = 0.0
     if not _stops(gaits, state):
         now, goal = gaits[state.gait], gaits[state.goal]
-        wishes[1] = wishes[0]
-        wishes[1, 0] = min(max(wishes[0, 0], now.slow, goal.slow), now.fast, goal.fast)
+        velocities[1] = velocities[0]
+        velocities[1, 0] = min(max(velocities[0, 0], now.slow, goal.slow), now.fast, goal.fast)
 
 
 @jit_entry
@@ -253,14 +253,14 @@ def advance(biped, sensors, dt):
     """
     gaits, memory, functions, state = biped.gaits, biped.memory, biped.functions, biped.state[0]
     laws = memory.laws[0]
-    if state.wish != state.goal:
+    if state.requested != state.goal:
         follow(gaits, functions, state)
     if not state.ready:
         laws.heading, state.ready = sensors.rpy[0, 2], True
     _choose(gaits, functions, laws, memory.pose.soles, state, dt)
-    _limit(gaits, biped.wishes, state)
+    _limit(gaits, biped.velocities, state)
     gait = gaits[state.gait]
-    tick(biped.links, gait, memory, sensors, biped.wishes[1], state.mode,
+    tick(biped.links, gait, memory, sensors, biped.velocities[1], state.mode,
          (dt, min(state.time / SHIFTING, 1.0), gait.kind))
     if state.mode == WALK:
         strides = laws.clock[1] + laws.clock[0] * gait.frequency * dt

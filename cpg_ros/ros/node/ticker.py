@@ -211,7 +211,7 @@ class Ticker(TickThread):
 
     Attributes:
         jumps: number of jumps back of simulated time.
-        paused: set by the tick: ticks continue but do nothing.
+        paused: ticks continue but do nothing; ``prepare`` is called after a change.
         loop: shared with ``tick.c``.
 
     """
@@ -238,7 +238,7 @@ class Ticker(TickThread):
         """
         super().__init__('ticker', rate, failed)
         self._library = native.library()
-        self.jumps, self.paused = 0, False
+        self.jumps, self._paused = 0, False
         self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
         self._prepare = prepare
         self.loop = native.Loop(count=ctypes.addressof(self.count), offset=ctypes.cast(
@@ -247,6 +247,16 @@ class Ticker(TickThread):
         self._clock = SimulatedClock(node) if clock.ros_time_is_active else None
         if self._clock is not None:
             self.loop.clock = ctypes.addressof(self._clock.struct)
+
+    @property
+    def paused(self) -> bool:
+        """Whether ticks do nothing."""
+        return self._paused
+
+    @paused.setter
+    def paused(self, paused: bool) -> None:
+        self._paused = paused
+        self.attend()
 
     @property
     def waiting(self) -> bool:
