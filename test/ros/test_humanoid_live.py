@@ -107,7 +107,7 @@ def test_it_walks_by_cmd_vel_survives_a_push_falls_and_is_reset(stage):
     stage.watcher.call(Trigger, '/robot_sim/reset', Trigger.Request())
     stage.body.wait_for('standing at the origin')
     stage.drive(0.3)
-    stage.pass_time(4.0)
+    stage.pass_time(5.0)
     assert stage.pass_time(0.6) == pytest.approx(0.3, abs=0.06)
     assert len(re.findall('the robot has fallen', stage.body.log)) == 1
     # Joints that lay on the ground follow again.

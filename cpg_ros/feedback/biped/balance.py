@@ -100,8 +100,9 @@ REST, CROUCH, BRACED, START = range(4)
 #: Doubts: doubts: how each input contradicts the others, 0 for not; suspect: joint whose
 #: measurement is not used, -1 for none; contrary: for how long a swinging foot has borne more than
 #: the other; tilts: lean of the soles, the same low-passed, and the usual one; uneven, level: for
-#: how long they have not been, and have been, level; settles: time until they are judged; apart:
-#: angle between them as they were doubted; leant: whether the IMU was doubted.
+#: how long they have not been, and have been, level, where uneven is negative until they are
+#: judged; settles: time until they are compared; apart: angle between them as they were doubted;
+#: leant: whether the IMU was doubted.
 #:
 #: Requests: wanted: whether to balance; enabled: whether to walk; lowers: whether to end in a
 #: crouch; anew: whether to judge the inputs anew; command: speeds forward and to the left, m/s,
@@ -255,7 +256,7 @@ def _doubt_soles(links, measured, filled, state, mode, dt):
     leaning = 0.5 * max(math.hypot(tilts[0, 0] + tilts[1, 0], tilts[0, 1] + tilts[1, 1]),
                         FLAT / TURNED * math.hypot(first[0] + second[0], first[1] + second[1]))
     uneven = apart or leaning > FLAT
-    state.uneven = state.uneven + dt if uneven else 0.0
+    state.uneven = state.uneven + dt if uneven or state.uneven < 0.0 else 0.0
     state.level = state.level + dt if state.crouching and not uneven else 0.0
     if state.level > SEEN_LEVEL and state.leant:
         state.leant, state.doubts[IMU] = False, 0
@@ -365,7 +366,9 @@ def _sense(biped, watch, dt):
     if _look(state, _lean(sensors.rpy[0]), near, load, leaps[0], dt):
         stand_anew(laws, biped.state[0], state.weight, state.depth if state.crouching else 0.0)
         state.balancing, state.fallen, state.share, state.known = True, False, 0.0, True
-        state.crouching = False
+        if state.crouching:
+            # Soles rock while the robot rises.
+            state.uneven, state.crouching = -USUAL, False
 
 
 @jit
