@@ -70,7 +70,7 @@ def make(entrant: str, go1: Path | None, plain: bool, motors: bool
         velocity = 'true' if 'velocity' in entry['observes'] else 'not observed'
     body = bodies.body
     if motors:
-        limit_motors(bodies, body.robot.column('velocity')[body.robot.places])
+        limit_motors(bodies, body.robot.column('velocity')[body.robot.order_indices])
     if plain:
         joints = slice(6, None)
         body.model.dof_frictionloss[joints] = 0.0

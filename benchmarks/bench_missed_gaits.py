@@ -45,7 +45,7 @@ import numpy as np
 from own_networks import FhnRing, half_centre, WilsonCowan
 
 SETS, STARTS = 40, 20
-#: A cycle has a shift where signals differ by less than this share of their range.
+#: A cycle has a shift where signals differ by less than this fraction of their range.
 SAME = 0.01
 #: What differs by less than this from more symmetry comes to have it: it settles slowly.
 RICHER = 0.03
@@ -59,7 +59,7 @@ MOVES, HOLD = 0.05, 1.0
 NEUTRAL = 1e-6
 #: So many cycles have to repeat those before, but for this share of their RMS; looked at points.
 REPEATS, UNLIKE, POINTS = 4.0, 0.3, 2000
-#: By what share its size may change over three cycles, or it still dies away.
+#: By what fraction its size may change over three cycles, or it still dies away.
 STEADY = 2e-3
 TARGETS = {'missed': 0, 'other_orbits': 0}
 
@@ -122,7 +122,7 @@ NETWORKS = {
 
 
 def turned(signals: np.ndarray, shift: float) -> np.ndarray:
-    """Return signals, on even points of a cycle, by a share of it later."""
+    """Return signals, on even points of a cycle, by a fraction of it later."""
     return np.roll(signals, -round(float(shift) * len(signals)), axis=0)
 
 

@@ -38,7 +38,7 @@ GAITS = {'delayed': ('walk', 'pronk', 'goat_trot', 'goat_slope_walk', 'liu2024_p
          'biped': ('walk', 'run', 'skip', 'gallop', 'one_legged_hop'),
          'hopf': ('trot', 'walk'), 'phase': ('canter_left',)}
 TIMES, SIZE, ROUNDS = np.array([0.05, 0.41, 0.83]), 3e-4, 15
-#: The orbit's solve starts from one at parameters this share away, next to it.
+#: The orbit's solve starts from one at parameters this fraction away, next to it.
 BESIDE = 1e-3
 TARGETS = {'difference': 1e-4, 'ratio_to_orbit': 1.0}
 

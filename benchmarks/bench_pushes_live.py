@@ -41,7 +41,7 @@ WALKS, AFTER, ON = 4.0, 2.5, 1.5
 
 
 def over_the_graph(size: float, count: int, seed: int) -> float:
-    """Return the share of pushes, N s, that are survived."""
+    """Return the fraction of pushes, N s, that are survived."""
     rng, survived = np.random.default_rng(seed), 0
     stage = Stage('unitree_go2', 'delayed', LOW, model=MODEL)
     try:

@@ -57,7 +57,7 @@ TYPES = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGE
 #: A node that does not end within this time is killed, s.
 PATIENCE = 5.0
 TARGETS = {'limits_crossed': 0, 'exit_code': 0}
-#: What a velocity may differ from those published before and after a step, share of the limit.
+#: What a velocity may differ from those published before and after a step, fraction of the limit.
 TOLERANCE = 0.1
 
 

@@ -51,7 +51,7 @@ from cpg_ros.fitting.inversion.recording_fit import (  # noqa: E402
     fit_recording,
     fit_with_fallbacks,
 )
-from cpg_ros.motion.plan import gait_of, refusal  # noqa: E402
+from cpg_ros.motion.plan import gait_of, validate_orbit  # noqa: E402
 from cpg_ros.motion.robot import HARMONICS  # noqa: E402
 from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.networks.registry import NETWORKS, PRESETS  # noqa: E402
@@ -80,7 +80,7 @@ READOUTS = {'exact': (0.01, joint_angles, 3, ''), 'noise of 3 %': (0.03, joint_a
             'order 2': (0.01, joint_angles, 2, ''),
             'samples missing': (0.01, joint_angles, 3, 'missing'),
             'poses repeated': (0.01, joint_angles, 3, 'repeated')}
-#: Samples a second, share of them that are stalled, and how long one stall lasts, s.
+#: Samples a second, fraction of them that are stalled, and how long one stall lasts, s.
 RATE, STALLED, STALL = 200.0, (0.01, 0.05), (0.03, 0.25)
 #: Gaits whose phases are read off the legs, recorded for so long (s) at so many strides a second.
 STATED, LASTING, STRIDES = (('phase', 'canter_left'), ('phase', 'unnamed')), 14.0, 1.7
@@ -156,7 +156,7 @@ def drawn(name: str, runs: int, seed: int) -> Iterator[tuple]:
             orbit, _ = gait_of(preset, made)
         except CpgError:
             continue
-        if network.offsets or not refusal(orbit, preset.gait, HARMONICS):
+        if network.offsets or not validate_orbit(orbit, preset.gait, HARMONICS):
             yield rng, preset, truth, orbit
 
 

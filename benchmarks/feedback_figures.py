@@ -121,7 +121,7 @@ def pushes(one: Subject, impulses: Sequence[float], friction: float = 1.0) -> di
 
 
 def interval(fraction: float, count: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share of so many runs (Wilson 1927)."""
+    """Return the 95 % confidence interval of a fraction of so many runs (Wilson 1927)."""
     z = 1.96 / math.sqrt(count)
     middle, half = fraction + z**2 / 2.0, z * math.sqrt(fraction * (1.0 - fraction) + z**2 / 4.0)
     return (round((middle - half) / (1.0 + z**2), 3), round((middle + half) / (1.0 + z**2), 3))

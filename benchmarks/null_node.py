@@ -57,7 +57,7 @@ class TypedOutputs:
         for leg, joints in robot.legs.items():
             parts[f'{leg}/joint_states'] = slice(start, start + len(joints))
             start += len(joints)
-        parts['joint_states'] = robot.places
+        parts['joint_states'] = robot.order_indices
         self._stamps, self._views, self._publish = [], [], []
         for topic, part in parts.items():
             names = [robot.joints[k].name for k in places[part]]

@@ -75,7 +75,7 @@ class FhnRing(Network):
         return 'pronk', 'walk', 'two_by_two', 'backward_walk'
 
     def symmetry(self, gait):
-        """Return by what share of a cycle a leg follows the one before it."""
+        """Return by what fraction of a cycle a leg follows the one before it."""
         return Symmetry.of(RING, {'turn': Fraction(self.gaits().index(gait), 4)})
 
     @classmethod
@@ -131,7 +131,7 @@ class WilsonCowan(Network):
         return tuple(SHIFTS)
 
     def symmetry(self, gait):
-        """Return by what share of a cycle one leg follows the other."""
+        """Return by what fraction of a cycle one leg follows the other."""
         return Symmetry.of(PAIR, {'side': SHIFTS[gait]})
 
     @classmethod

@@ -44,7 +44,7 @@ import yaml
 
 #: Pushes of these impulses, N s, so far apart and so long before the end, s; rough ground, m.
 PUSHES, APART, BEFORE, ROUGH = (8.0, 20.0), 4.0, 1.0, 0.03
-#: A foot that bears less than this share of the weight does not stand.
+#: A foot that bears less than this fraction of the weight does not stand.
 LOADED = 0.02
 #: Of the sensors, as `SensorNoise` has them.
 NOISE = {'force_bias': 0.05, 'force_noise': 0.03, 'orientation_bias': 0.005,

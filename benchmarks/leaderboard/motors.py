@@ -20,7 +20,7 @@ from typing import Any
 from cpg_ros.simulation.bodies import BatchPhysics
 import numpy as np
 
-#: SLOW: share of a motor's no-load speed up to which it has its full torque.
+#: SLOW: fraction of a motor's no-load speed up to which it has its full torque.
 SLOW = 1e-3
 
 

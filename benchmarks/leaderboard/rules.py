@@ -85,7 +85,7 @@ def pushes(one: Entrant, rng: np.random.Generator, few: bool) -> dict[str, Any]:
 
 
 def pushed(one: Entrant, size: float, first: float, few: bool) -> float:
-    """Return the share that stays up after pushes of one impulse, N s, while walking."""
+    """Return the fraction that stays up after pushes of one impulse, N s, while walking."""
     directions, times = (4, 2) if few else (DIRECTIONS, TIMES)
     runs = [Scenario(FRICTION, speed=SPEED, pushes=(impulse(
         PUSHED + SPREAD * k / times, size * math.cos(way), size * math.sin(way)),))
@@ -120,7 +120,7 @@ def stairs(one: Entrant, rng: np.random.Generator, few: bool) -> dict[str, Any]:
 
 
 def crossed(one: Entrant, kind: str, size: float, rng: np.random.Generator, few: bool) -> float:
-    """Return the share of 20 grounds that is crossed; friction is that of 0.6 to 1."""
+    """Return the fraction of 20 grounds that is crossed; friction is that of 0.6 to 1."""
     runs = [Scenario(rng.uniform(0.6, 1.0), terrain=Terrain(kind, size, int(seed)), speed=SPEED,
                      phase=rng.uniform()) for seed in rng.integers(0, 2**31, 2 if few else 20)]
     return float(np.isfinite(one.run(runs, CROSSING, goal=WAY).arrived).mean())

@@ -21,7 +21,7 @@ from typing import Literal
 
 from cpg_ros.analysis import gait_diagram as footfall
 from cpg_ros.analysis.analysis_report import Analysis, cells, curves, PhaseReport
-from cpg_ros.analysis.branch_report import JudgedBranch, on_line
+from cpg_ros.analysis.branch_report import AssessedBranch, on_line
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.report_page import rendered
 from cpg_ros.dynamics.continuation import Branch
@@ -97,10 +97,10 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
         axes.plot(branch.values[k], branch.amplitudes[k], marker='s', color=colour, markersize=5)
 
 
-def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch]) -> None:
+def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBranch]) -> None:
     shown: set[str] = set()
     met: dict[str, str] = {}
-    for member in judged:
+    for member in assessed:
         gait, branch, colour = member.gait, member.branch, _colour(analysis, member.gait)
         _draw_branch(axes, branch, member.kinds, colour)
         shown.add(gait)
@@ -196,12 +196,12 @@ def written(figure: Figure, suffix: str) -> bytes:
     return content
 
 
-def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> bytes:
+def picture(analysis: Analysis, assessed: Sequence[AssessedBranch], suffix: str) -> bytes:
     """Draw an analysis.
 
     Args:
         analysis: of a parameter set.
-        judged: its branches.
+        assessed: its branches.
         suffix: of the file, such as '.png'.
 
     """
@@ -210,7 +210,7 @@ def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> 
     count = max(1, len(analysis.existing))
     figure = pyplot.figure(figsize=(12.0, 7.4 + 1.7 * max(0, count - 3)), layout='constrained')
     outer = figure.add_gridspec(2, 2)
-    _draw_branches(figure.add_subplot(outer[0, 0]), analysis, judged)
+    _draw_branches(figure.add_subplot(outer[0, 0]), analysis, assessed)
     _draw_roots(figure.add_subplot(outer[0, 1]), analysis)
     _draw_trajectories(figure.add_subplot(outer[1, 0]), analysis)
     inner = outer[1, 1].subgridspec(count, 1)

@@ -126,10 +126,10 @@ def _analyze(args: Namespace) -> int:
     answer, text = analysis.as_dict() if args.json else {}, [] if args.json else [analysis.text()]
     if args.plot is not None:
         from cpg_ros.analysis.analysis_plot import picture
-        from cpg_ros.analysis.branch_report import judged_branches
-        judged = judged_branches(analysis)
-        write_atomically(args.plot, picture(analysis, judged, args.plot.suffix))
-        losses = [loss for branch in judged for loss in branch.losses]
+        from cpg_ros.analysis.branch_report import assess_branches
+        assessed = assess_branches(analysis)
+        write_atomically(args.plot, picture(analysis, assessed, args.plot.suffix))
+        losses = [loss for branch in assessed for loss in branch.losses]
         answer['stability_losses'] = [loss.as_dict() for loss in losses]
         text += ['', *(loss.text(str(analysis.along)) for loss in losses)] if losses else []
     if args.prc is not None:

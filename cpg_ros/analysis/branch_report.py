@@ -72,7 +72,7 @@ class StabilityLoss:
 
 
 @dataclass
-class JudgedBranch:
+class AssessedBranch:
     """A branch of a gait with the stability of its points.
 
     Attributes:
@@ -91,13 +91,13 @@ class JudgedBranch:
     losses: list[StabilityLoss] = field(default_factory=list)
 
 
-def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
+def assess_branches(analysis: Analysis) -> list[AssessedBranch]:
     """Follow the gaits of an analysis, and judge where they lose stability."""
-    judged = [JudgedBranch(gait, branch) for gait, branch in _branches(analysis)]
+    assessed = [AssessedBranch(gait, branch) for gait, branch in _branches(analysis)]
     done = 0
     with progress_bar('stability along the branches',
-                      sum(len(entry.branch.points) for entry in judged)) as bar:
-        for entry in judged:
+                      sum(len(entry.branch.points) for entry in assessed)) as bar:
+        for entry in assessed:
             spectra: list[Multipliers] = []
             for member in entry.branch.points:
                 spectra.append(multipliers(member.orbit))
@@ -106,14 +106,14 @@ def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
                 done += 1
                 bar(done)
             entry.crossings = bifurcations(entry.branch, spectra)
-    lost = [(entry, point) for entry in judged for point in entry.crossings
+    lost = [(entry, point) for entry in assessed for point in entry.crossings
             if loses_stability(point.point.orbit)]
     with progress_bar('normal forms where gaits lose stability', len(lost)) as bar:
         for done, (entry, point) in enumerate(lost, 1):
             entry.losses.append(StabilityLoss(entry.gait, point, orbit_normal_form(
                 point.point.orbit, point.multiplier, point.part)))
             bar(done)
-    return judged
+    return assessed
 
 
 def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:

@@ -199,7 +199,7 @@ class Epoch(ShortRepr):
         random: seed of the island's random numbers.
         seed: of the simulations' initial states, the same for all.
         start: first generation, shape (population, free variables); None for a random one.
-        judged: known scores of sets.
+        assessed: known scores of sets.
 
     """
 
@@ -209,7 +209,7 @@ class Epoch(ShortRepr):
     random: int
     seed: int
     start: np.ndarray | None = None
-    judged: tuple[Score, ...] = ()
+    assessed: tuple[Score, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -243,7 +243,7 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
     algorithm = (NSGA2(pop_size=epoch.population) if epoch.start is None
                  else NSGA2(pop_size=epoch.population, sampling=epoch.start))
     algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
-    tried: dict[Network, Score] = {score.network: score for score in epoch.judged}
+    tried: dict[Network, Score] = {score.network: score for score in epoch.assessed}
     for generation in range(epoch.generations):
         population = algorithm.ask()
         networks = [space.build(values) for values in population.get('X')]

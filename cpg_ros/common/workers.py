@@ -230,7 +230,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
         end = time.monotonic() + RETURNS
         while True:
             try:
-                found = connect(ANSWERS)
+                connected = connect(ANSWERS)
             except (NoCluster, OSError, TimeoutError):
                 if time.monotonic() > end:
                     raise
@@ -239,7 +239,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
             there = len(held[0].nthreads())
             say('the scheduler is back, with '
                 + (f'{there} workers' if there else 'no worker yet: jobs wait for one'))
-            return found
+            return connected
 
     def close(wait: bool) -> None:
         _leave(held)

@@ -96,8 +96,8 @@ class Linearised:
 
         """
         self.equation = orbit_method(orbit.network).floquet.Variational(orbit, halvings)
-        if self.equation.flaw:
-            raise NoOrbit(self.equation.flaw)
+        if self.equation.unusable:
+            raise NoOrbit(self.equation.unusable)
         self._field: Field = Field(orbit.network)
         self._systems: dict[complex, tuple[_Bordered, np.ndarray]] = {}
 

@@ -294,7 +294,7 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
     if everything or not search.attracting:
         # Without a delay branches take longer than anything else.
         if everything or network.delay_parameter:
-            search.follow()
+            search.follow_branches()
         search.deflate()
     orbits = search.result(near)
     if not orbits.orbits:
@@ -362,7 +362,7 @@ class _Search:
             return
         self.starts = len(SIZES) + random
 
-    def follow(self) -> None:
+    def follow_branches(self) -> None:
         """Follow the branches of the class's Hopf points to the parameters."""
         for orbits in branch_orbits(self.network, self.gait):
             self.hopf_points += 1

@@ -21,7 +21,7 @@ import ctypes
 from typing import Any
 
 from cpg_ros.dynamics.integration.machine_code import machine_function
-from cpg_ros.feedback.biped.balance import balance, take_measurements
+from cpg_ros.feedback.biped.balance import balance, read_measurements
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.closed_loop import (
@@ -81,16 +81,16 @@ def finishing_function(arguments: tuple) -> Any:
 
 def _balance(arguments):
     (senses, sensors, legs, numbers, rows, watch, biped) = _loaded(arguments)
-    take_measurements(senses, sensors, legs, numbers, rows, watch)
+    read_measurements(senses, sensors, legs, numbers, rows, watch)
     balance(biped, watch, numbers[DT])
     return 0
 
 
 def balancing_function(arguments: tuple) -> Any:
-    """Compile ``take_measurements`` and ``balance`` as closing_function does ``close``.
+    """Compile ``read_measurements`` and ``balance`` as closing_function does ``close``.
 
     Args:
-        arguments: of the first, then a Biped.
+        arguments: of the first, then BipedArrays.
 
     """
     return machine_function(_balance, arguments)

@@ -31,13 +31,13 @@ from cpg_ros.feedback.input_checks import (
     agreement,
     BELIEVED,
     CAME,
+    check_imu,
+    check_joints,
+    check_loads,
     fade,
     IMU,
     IMU_MEMORY,
     is_out,
-    judge_imu,
-    judge_joints,
-    judge_loads,
     note,
     NUMBERS,
 )
@@ -49,9 +49,9 @@ import numpy as np
 
 #: FURTHEST: largest difference between wanted and measured heading, rad.
 FURTHEST = 0.5
-#: DIES_OUT: time at a share of 0 after which all displacements have decayed, s.
+#: DIES_OUT: time at a fraction of 0 after which all displacements have decayed, s.
 DIES_OUT = 0.3
-#: AGREES: least mean share of legs whose contacts agree with the gait.
+#: AGREES: least mean fraction of legs whose contacts agree with the gait.
 AGREES = 0.5
 #: FLIGHT: longest time for which all feet may be unloaded, s.
 FLIGHT = 0.3
@@ -76,12 +76,12 @@ class Senses(NamedTuple):
         joints: positions, velocities and efforts, shape (JOINT, joints).
         feet: loads, shape (1, legs), or forces, shape (legs, FORCE).
         counts: measured joints, and which of CONTACTS it is, shape (2,).
-        places: indices 0, 1, 2 and so on.
+        indices: indices 0, 1, 2 and so on.
         mount: orientation of the IMU in the base's frame, x y z w.
         limits: of the joints, lowest, highest, fastest, shape (3, joints).
         weight: of the robot, N, shape (1,).
-        memory: of judge_imu.
-        heavy: of judge_loads, shape (legs, 1).
+        memory: of check_imu.
+        heavy: of check_loads, shape (legs, 1).
         loads: scratch, shape (legs,).
 
     """
@@ -94,7 +94,7 @@ class Senses(NamedTuple):
     joints: np.ndarray
     feet: np.ndarray
     counts: np.ndarray
-    places: np.ndarray
+    indices: np.ndarray
     mount: np.ndarray
     limits: np.ndarray
     weight: np.ndarray
@@ -118,31 +118,31 @@ class Senses(NamedTuple):
 
 
 @jit
-def _judge_feet(senses, sensors, legs, k, gap):
+def _check_feet(senses, sensors, legs, k, gap):
     """Return the verdict on an input of the feet, and for how long its numbers may repeat, s."""
     foot, loads, forces = k - 2, senses.feet[0], sensors.foot_forces[0]
-    places, heavy, weight = senses.places, senses.heavy, senses.weight[0]
+    indices, heavy, weight = senses.indices, senses.heavy, senses.weight[0]
     if senses.counts[1] == 1:
         # Its frame turns with the leg, but the length of the force is the same in every frame.
         force = senses.feet[foot]
         load = math.sqrt(force[0]**2 + force[1]**2 + force[2]**2)
         senses.loads[foot] = load
-        return (judge_loads(senses.loads[foot:foot + 1], places[:1], weight, gap, heavy[foot],
+        return (check_loads(senses.loads[foot:foot + 1], indices[:1], weight, gap, heavy[foot],
                             forces[foot:foot + 1]), 0.0 if load else FLIGHT)
     if senses.counts[1] == 2:
         angles, rpy = sensors.joint_positions[0], sensors.rpy[0]
         loads_of(legs.rows, legs.columns, angles, senses.joints[2], rpy[0], rpy[1], senses.loads)
-        return (judge_loads(senses.loads, places[:len(forces)], weight, gap, heavy[0], forces),
+        return (check_loads(senses.loads, indices[:len(forces)], weight, gap, heavy[0], forces),
                 0.0)
     unloaded = True
     for load in loads:
         unloaded = unloaded and load == 0.0
-    return (judge_loads(loads, places[:len(forces)], weight, gap, heavy[0], forces),
+    return (check_loads(loads, indices[:len(forces)], weight, gap, heavy[0], forces),
             FLIGHT if unloaded else 0.0)
 
 
 @jit_entry
-def take_in(senses, sensors, legs, now, moving):
+def check_inputs(senses, sensors, legs, now, moving):
     """Check the messages that have come, and fill sensors with the plausible values.
 
     Args:
@@ -160,33 +160,33 @@ def take_in(senses, sensors, legs, now, moving):
         verdict, gap = senses.unreadable[k], min(now - monitor[BELIEVED], 1.0)
         if verdict == 0 and k == 0:
             # Means go on while messages are refused.
-            verdict = judge_imu(senses.imu, min(now - monitor[CAME], 1.0), moving, senses.mount,
+            verdict = check_imu(senses.imu, min(now - monitor[CAME], 1.0), moving, senses.mount,
                                 senses.memory, sensors.rpy[0], sensors.angular_velocity[0],
                                 sensors.acceleration[0])
         elif verdict == 0 and k == 1:
             limits = senses.limits
-            verdict = judge_joints(senses.joints[0], senses.joints[1],
-                                   senses.places[:senses.counts[0]], limits[0], limits[1],
+            verdict = check_joints(senses.joints[0], senses.joints[1],
+                                   senses.indices[:senses.counts[0]], limits[0], limits[1],
                                    limits[2], sensors.joint_positions[0],
                                    sensors.joint_velocities[0])
             if verdict == 0 and senses.counts[1] == 2:
-                verdict, _ = _judge_feet(senses, sensors, legs, k, gap)
+                verdict, _ = _check_feet(senses, sensors, legs, k, gap)
         elif verdict == 0:
-            verdict, rests = _judge_feet(senses, sensors, legs, k, gap)
+            verdict, rests = _check_feet(senses, sensors, legs, k, gap)
             patience = max(patience, rests)
         note(monitor, now, senses.stamps[k], senses.news[k] == 1, verdict, patience)
         senses.news[k] = 0
 
 
 #: Indices of a loop's state. WANTED: whether feedback is requested; SPENT: time for which its
-#: share has been 0, s; FRACTION: that share; WAY, GOOD_FOR: see fade; AGREEMENT: mean share of
-#: legs whose contacts agree with the gait; OUT: number of inputs that are out; MOUNT: index of the
-#: IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts disagree; CLOSED: whether feedback
-#: acts. STATE is the number of these.
+#: fraction has been 0, s; FRACTION: of the correction that acts; WAY, GOOD_FOR: see fade;
+#: AGREEMENT: mean fraction of legs whose contacts agree with the gait; OUT: number of inputs that
+#: are out; MOUNT: index of the IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts
+#: disagree; CLOSED: whether feedback acts. STATE is the number of these.
 (WANTED, SPENT, FRACTION, WAY, GOOD_FOR, AGREEMENT, OUT, MOUNT, CONTRARY, CLOSED,
  STATE) = range(11)
 #: Indices of an instant. DT: length of the tick, s; NOW: time, s; LEVEL: of the ramp, 0 to 1;
-#: PHASE: cycles; MIX: share of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
+#: PHASE: cycles; MIX: fraction of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
 #: whether the gait changes; ROLL, and pitch and yaw behind it: of the body against its feet, rad.
 DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES, ROLL = range(8)
 
@@ -225,7 +225,7 @@ def _slot(tables, key):
 
 
 @jit
-def _judge(legs, tables, senses, sensors, rates, instant, slot, state):
+def _compare_contacts(legs, tables, senses, sensors, rates, instant, slot, state):
     """Update the faults that interrupt the feedback; return whether there are any."""
     numbers, out = instant.numbers, 0
     dt = numbers[DT]
@@ -271,11 +271,11 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
     dt, level = numbers[DT], numbers[LEVEL]
     wanted, wrong = state[WANTED] > 0.0, False
     if wanted or state[SPENT] <= DIES_OUT:
-        take_in(senses, sensors, legs, numbers[NOW], level > 0.0)
+        check_inputs(senses, sensors, legs, numbers[NOW], level > 0.0)
         old, new = _slot(tables, instant.gaits[0]), _slot(tables, instant.gaits[1])
         new = max(new, 0)
         old = new if old < 0 else old
-        wrong = _judge(legs, tables, senses, sensors, rates, instant, new, state)
+        wrong = _compare_contacts(legs, tables, senses, sensors, rates, instant, new, state)
         state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], wanted and not wrong, dt)
         state[FRACTION] = state[WAY]**2 * (3.0 - 2.0 * state[WAY])
         state[SPENT] = 0.0 if state[FRACTION] > 0.0 else state[SPENT] + dt
@@ -354,5 +354,5 @@ def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:
     senses, sensors = (Senses.empty(legs, np.zeros((3, joints)), np.zeros(4), 1.0, FOOT_CONTACTS),
                        SensorData.zeros(1, legs, joints))
     nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)
-    take_in(senses, sensors, nothing, 0.0, False)
+    check_inputs(senses, sensors, nothing, 0.0, False)
     return senses, sensors

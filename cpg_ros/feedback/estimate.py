@@ -79,8 +79,8 @@ def loads_of(rows, columns, angles, efforts, roll, pitch, out):
         out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
 
 
-#: TOUCH: share of the weight above which a foot is on the ground; LEAVE: share below which it is
-#: in the air again.
+#: TOUCH: fraction of the weight above which a foot is on the ground; LEAVE: fraction below which
+#: it is in the air again.
 TOUCH, LEAVE = 0.10, 0.04
 #: PULL: time constant, s, with which a leg that bears the whole weight corrects the velocity.
 PULL = 0.02
@@ -231,14 +231,14 @@ class BodyState:
 
 # All but STATES are standard deviations or intensities of noise.
 #: Slow velocity error, measured on a simulated Go2 that trots, walks, turns and is pushed.
-#: STILL: its size at rest, m/s; SHARE: as a share of the speed; SLOWLY: correlation time, s.
-STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
+#: STILL: its size at rest, m/s; OF_SPEED: as a fraction of the speed; SLOWLY: correlation time, s.
+STILL, OF_SPEED, SLOWLY = 0.001, 0.015, 15.0
 #: SCALE: constant relative error of the velocity of a robot whose odometry was not calibrated.
 SCALE = 0.05
 #: White noise. PLACE: of the position, m/sqrt(s); HEADING: of the heading, rad/sqrt(s), at which
 #: an IMU drifts by half a degree in a minute.
 PLACE, HEADING = 0.001, 0.001
-#: LEVEL: slope of the ground, as a share of the distance covered.
+#: LEVEL: slope of the ground, as a fraction of the distance covered.
 LEVEL = 0.05
 #: HEIGHT: height above level ground, m.
 HEIGHT = 0.01
@@ -261,7 +261,7 @@ class Odometry(NamedTuple):
     Attributes:
         pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
         covariance: of x, y, heading, the slow velocity error forward and to the left, and the
-            share by which velocities are wrong, in m, rad and m/s, shape (6, 6).
+            fraction by which velocities are wrong, in m, rad and m/s, shape (6, 6).
         twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
         orientation: in the odometry's frame, w x y z.
         pose_covariance: of x, y, z, roll, pitch and yaw, m and rad, shape (6, 6), as in ROS.
@@ -381,7 +381,7 @@ def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
     factor[0, 5], factor[1, 5] = dt * east, dt * north
     _multiply(factor, covariance, odometry.scratch[1])
     _multiply(factor, odometry.scratch[1].T, covariance)
-    slow = STILL**2 + SHARE**2 * (forward**2 + left**2)
+    slow = STILL**2 + OF_SPEED**2 * (forward**2 + left**2)
     for k, added in enumerate((dt * PLACE**2, dt * PLACE**2, dt * HEADING**2,
                                (1.0 - stays**2) * slow, (1.0 - stays**2) * slow)):
         covariance[k, k] += added

@@ -307,7 +307,7 @@ def _is_off_gravity(up, acceleration, moving, dt, memory):
 
 
 @jit_entry
-def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
+def check_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
     """Fill the last three arguments if a message is plausible; return an index into VERDICTS.
 
     Args:
@@ -365,13 +365,13 @@ def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
 
 
 @jit_entry
-def judge_joints(positions, velocities, places, lower, upper, fastest, angles, rates):
+def check_joints(positions, velocities, indices, lower, upper, fastest, angles, rates):
     """Fill angles and rates if they are plausible; return an index into VERDICTS.
 
     Args:
         positions: of a message, in its order, rad.
         velocities: the same, rad/s.
-        places: index of each joint in the message, shape (joints,).
+        indices: index of each joint in the message, shape (joints,).
         lower: smallest angles, rad, shape (joints,).
         upper: largest angles, the same.
         fastest: largest speeds, rad/s, the same.
@@ -379,26 +379,26 @@ def judge_joints(positions, velocities, places, lower, upper, fastest, angles, r
         rates: filled, rad/s, shape (joints,).
 
     """
-    for k in range(len(places)):
-        angle, rate = positions[places[k]], velocities[places[k]]
+    for k in range(len(indices)):
+        angle, rate = positions[indices[k]], velocities[indices[k]]
         if not math.isfinite(angle + rate):
             return 1
         if not lower[k] - BEYOND <= angle <= upper[k] + BEYOND:
             return 7
         if abs(rate) > OUTRUN * fastest[k]:
             return 8
-    for k in range(len(places)):
-        angles[k], rates[k] = positions[places[k]], velocities[places[k]]
+    for k in range(len(indices)):
+        angles[k], rates[k] = positions[indices[k]], velocities[indices[k]]
     return 0
 
 
 @jit_entry
-def judge_loads(loads, places, weight, dt, memory, forces):
+def check_loads(loads, indices, weight, dt, memory, forces):
     """Fill forces if they are plausible; return an index into VERDICTS.
 
     Args:
         loads: of the feet, N, in any order.
-        places: index of each foot among them, shape (legs,).
+        indices: index of each foot among them, shape (legs,).
         weight: of the robot, N.
         dt: since the last ones, s.
         memory: shape (1,), zeros at first; overwritten.
@@ -415,8 +415,8 @@ def judge_loads(loads, places, weight, dt, memory, forces):
     memory[0] += min(dt / TELLING, 1.0) * (whole - memory[0])
     if memory[0] > HEAVIEST * weight:
         return 9
-    for k in range(len(places)):
-        forces[k] = loads[places[k]]
+    for k in range(len(indices)):
+        forces[k] = loads[indices[k]]
     return 0
 
 

@@ -52,7 +52,7 @@ class BodyPose:
     ``go_to`` may be called from another thread than the ticks.
 
     Attributes:
-        obstacle: why the body cannot be moved, '' if it can.
+        unavailable: why the body cannot be moved, '' if it can.
         now: present pose.
         target: pose to reach.
         address: of its struct in the core.
@@ -62,13 +62,13 @@ class BodyPose:
     def __init__(self, robot: Robot) -> None:
         """Begin in the stand."""
         legs = robot.geometry.legs if robot.geometry is not None else {}
-        self.obstacle = (
+        self.unavailable = (
             f"robot '{robot.name}' balances on its soles: its feedback moves the body"
             if robot.biped is not None else
             next((f"robot file '{robot.name}' has no geometry of the leg {leg} (part geometry: "
                   'check_robot --make writes it, and tune)' for leg in robot.legs
                   if leg not in legs), ''))
-        legs = {} if self.obstacle else {leg: legs[leg] for leg in robot.legs}
+        legs = {} if self.unavailable else {leg: legs[leg] for leg in robot.legs}
         self._robot, self._stand = robot, robot.column('offset')
         self._low, self._high, self._fast = (robot.column(key)
                                              for key in ('lower', 'upper', 'velocity'))
@@ -112,12 +112,12 @@ class BodyPose:
                 would leave its limits in the pose, or in the gait of ``plan`` about it.
 
         """
-        if self.obstacle:
-            raise InputError(self.obstacle)
+        if self.unavailable:
+            raise InputError(self.unavailable)
         angles, far = self._stand.copy(), 0.0
-        for share in np.arange(1, WAYPOINTS + 1) / WAYPOINTS:
-            wanted = share * np.asarray(pose, dtype=float)
-            far = core().cpg_pose(self.address, wanted.ctypes.data, angles.ctypes.data, STEPS)
+        for fraction in np.arange(1, WAYPOINTS + 1) / WAYPOINTS:
+            waypoint = fraction * np.asarray(pose, dtype=float)
+            far = core().cpg_pose(self.address, waypoint.ctypes.data, angles.ctypes.data, STEPS)
         if not far < REACHED:
             raise InputError(f'{_text(pose)}: the feet do not reach their places on the ground')
         spans = np.zeros((2, len(angles))) if plan is None else plan.span

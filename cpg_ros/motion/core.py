@@ -76,7 +76,7 @@ Core = _struct(
 
 _FUNCTIONS: dict[str, tuple[Any, ...]] = {
     'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
-    'cpg_follow': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
+    'cpg_move': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
     'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_approach_stand': (_POINTER, _REAL),
     'cpg_reach': (_POINTER, _REAL), 'cpg_let_go': (_POINTER, _REAL),
     'cpg_report': (_POINTER,) * 3,
@@ -203,9 +203,9 @@ class CTrack:
             self.struct.clocks[k] = row.ctypes.data
         self.address = ctypes.addressof(self.struct)
         self._kept: dict[str, Any] = {}
-        self.follow(gait)
+        self.set_gait(gait)
 
-    def follow(self, gait: CGait) -> None:
+    def set_gait(self, gait: CGait) -> None:
         """Read joints and legs by this gait."""
         self._kept['gait'] = gait
         self.struct.gait = ctypes.addressof(gait.struct)

@@ -75,7 +75,7 @@ class JointDescription:
     passive: bool = False
 
     @property
-    def flaw(self) -> str:
+    def undrivable(self) -> str:
         """Why no cell can drive it, '' if one can."""
         if self.mimic:
             return f"follows '{self.mimic}' (mimic)"
@@ -236,12 +236,12 @@ class RobotDescription:
 
     def _below(self, last: str) -> list[tuple[np.ndarray, np.ndarray, LinkDescription]]:
         """Return position, axes and link of everything below a joint, all joints at 0."""
-        found = [(*self.frame(last), self.joints[last].child)]
-        for place, turned, link in found:
-            found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
+        frames = [(*self.frame(last), self.joints[last].child)]
+        for place, turned, link in frames:
+            frames += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
                       for joint in self.joints.values() if joint.parent == link]
         return [(place, turned, self.links.get(link, LinkDescription()))
-                for place, turned, link in found]
+                for place, turned, link in frames]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -360,7 +360,7 @@ def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescr
 
 def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]:
     """Return joints without a motor, where most of the others have one."""
-    turning = [name for name, joint in joints.items() if not joint.flaw]
+    turning = [name for name, joint in joints.items() if not joint.undrivable]
     motors = {joint.get('name', '') for joint in tree.iterfind('transmission/joint')}
     motors |= {joint.get('name', '') for joint in tree.iterfind('ros2_control/joint')
                if joint.find('command_interface') is not None}

@@ -146,10 +146,10 @@ def _geometry(geometry: Element) -> Mesh:
                 raise ValueError(f'a mesh has more than {MOST} points')
     for kind in ('triangles', 'polylist', 'polygons'):
         for element in geometry.iter(kind):
-            places = {use.get('semantic'): use for use in element.findall('input')}
+            inputs = {use.get('semantic'): use for use in element.findall('input')}
             width = 1 + max((int(use.get('offset', 0)) for use in element.findall('input')),
                             default=0)
-            use = places['VERTEX']
+            use = inputs['VERTEX']
             first, offset = firsts[use.get('source', '').removeprefix('#')], use.get('offset', 0)
             rows = [first + _numbers(element_of.text, int).reshape(-1, width)[:, int(offset)]
                     for element_of in element.findall('p')]
@@ -241,9 +241,9 @@ def find_mesh(reference: str, urdf: Path | None, folder: str = '') -> Path:
         package, rest = match[1], unquote(match[2]).lstrip('/')
     if urdf is None:
         return _installed(reference, package, rest)
-    places = _packaged(package, rest, urdf) if package else iter(
+    paths = _packaged(package, rest, urdf) if package else iter(
         [urdf.parent / rest, urdf.parent / folder / rest, urdf.parent / folder / Path(rest).name])
-    for directory in places:
+    for directory in paths:
         if directory.is_file():
             return directory
     raise MeshError(one_line(f'{reference[:200]}: ' + (

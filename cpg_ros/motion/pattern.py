@@ -36,8 +36,8 @@ __all__ = ['HOLD', 'SUBSTEP', 'GaitRunner', 'Pattern']
 
 #: SETTLING: strides in which the network has to find its new gait after a transition of 0 s.
 SETTLING = 40.0
-#: KICK: least amplitude of the new gait in the state when such a transition starts, as a share of
-#: the full gait's.
+#: KICK: least amplitude of the new gait in the state when such a transition starts, as a fraction
+#: of the full gait's.
 KICK = 0.05
 
 
@@ -98,7 +98,7 @@ class GaitRunner:
     def _start_on(self, plan: GaitPlan) -> None:
         """Set the orbit to start on, and create a network for it."""
         self.plan, self._own = plan, plan.seed.copy()
-        self._track.follow(plan.core)
+        self._track.set_gait(plan.core)
         self._track.run('seed', plan.seed)
         self._track.run('home', self._own)
 
@@ -225,13 +225,13 @@ class Pattern:
         """The runners in the core, the newest one last."""
         struct = self._struct
         # From the last one on: the core moves them forward as the first one ends.
-        found = [struct.track[k] for k in reversed(range(struct.tracks))]
-        return [self._runners[one] for one in reversed(found)]
+        slots = [struct.track[k] for k in reversed(range(struct.tracks))]
+        return [self._runners[address] for address in reversed(slots)]
 
     def _keep(self, track: GaitRunner) -> None:
         """Keep a runner alive as long as the core may run it."""
         waiting = self._struct.waiting
-        used = {waiting, track.address, *(one.address for one in self._tracks)}
+        used = {waiting, track.address, *(runner.address for runner in self._tracks)}
         for old in list(self._runners)[:-2 * MOST_TRACKS]:
             if old not in used:
                 del self._runners[old]
@@ -370,14 +370,14 @@ class Pattern:
     def addresses(self) -> dict[str, Any]:
         """The addresses by which C advances the pattern.
 
-        They are the core's functions of a pattern and a time in s: advance (plan, then follow),
-        resume after a stall, plan (compute the wanted angles, which may then be corrected), follow
+        They are the core's functions of a pattern and a time in s: advance (plan, then move),
+        resume after a stall, plan (compute the wanted angles, which may then be corrected), move
         (move the joints to them within limits); report, which fills Instant.numbers and gaits;
-        what, the pattern; asked, a 32-bit integer that is not 0 if take_drift is to be called; and
-        the pointers to the arrays position, velocity, legs (phases) and state.
+        what, the pattern; asked, a 32-bit integer that is not 0 if start_drift is to be called;
+        and the pointers to the arrays position, velocity, legs (phases) and state.
         """
         functions = {name: ctypes.cast(getattr(self._core, f'cpg_{name}'), ctypes.c_void_p).value
-                     for name in ('advance', 'resume', 'plan', 'follow', 'report')}
+                     for name in ('advance', 'resume', 'plan', 'move', 'report')}
         return {**functions, 'what': self._address, 'asked': ctypes.addressof(self._asked),
                 **{name: self._address + getattr(Core, name).offset
                    for name in ('position', 'velocity', 'legs', 'state')}}
@@ -392,21 +392,21 @@ class Pattern:
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s and fill position, velocity and phases."""
-        self.take_drift()
+        self.start_drift()
         self._core.cpg_advance(self._address, dt)
 
     def plan_tick(self, dt: float) -> np.ndarray:
         """Begin to advance by dt in s; return the wanted angles, rad, for a correction."""
-        self.take_drift()
+        self.start_drift()
         self._core.cpg_plan(self._address, dt)
         return self._wanted
 
-    def follow(self, dt: float, goal: np.ndarray) -> None:
+    def move(self, dt: float, goal: np.ndarray) -> None:
         """Move the joints to the corrected angles, rad, shape (joints,)."""
         self._goal[:] = goal
-        self._core.cpg_follow(self._address, dt, 1)
+        self._core.cpg_move(self._address, dt, 1)
 
-    def take_drift(self) -> None:
+    def start_drift(self) -> None:
         """Change to a plan without a transition, if one has been asked for."""
         if self._asked.value:
             self._asked.value = 0

@@ -39,7 +39,7 @@ STEPS_A_PERIOD = 40
 
 
 @dataclass(frozen=True)
-class Obstacle:
+class Rejection:
     """Why the generator cannot run a gait.
 
     Attributes:
@@ -52,29 +52,29 @@ class Obstacle:
     aside: str
 
 
-def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None:
+def rejection(orbit: Orbit, assessed: Stability, harmonics: int) -> Rejection | None:
     """Find why the generator cannot run a gait: its period, its stability, or its waveform.
 
     Args:
         orbit: of the gait.
-        judged: its stability.
+        assessed: its stability.
         harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
 
     """
     shortest = STEPS_A_PERIOD * orbit.network.step
     if orbit.period < shortest:
         period = f'period of {orbit.period:.3g} model time units'
-        return Obstacle(f'has a {period}, too short for steps of {orbit.network.step}: at least '
+        return Rejection(f'has a {period}, too short for steps of {orbit.network.step}: at least '
                         f'{shortest:g} is needed', f'its {period} is below {shortest:g}')
-    if judged.reason:
-        verdict = ('may not attract' if judged.reason.startswith('cannot tell') else
+    if assessed.reason:
+        verdict = ('may not attract' if assessed.reason.startswith('cannot tell') else
                    'does not attract')
-        return Obstacle(f'exists at these parameters but {verdict}: {judged.reason}',
-                        f'it {verdict}: {judged.reason}')
+        return Rejection(f'exists at these parameters but {verdict}: {assessed.reason}',
+                        f'it {verdict}: {assessed.reason}')
     try:
         joint_readout(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
     except NoPhase as error:
-        return Obstacle(f'at these parameters cannot drive joints: {error}',
+        return Rejection(f'at these parameters cannot drive joints: {error}',
                         f'it cannot drive joints: {error}')
     return None
 
@@ -254,15 +254,15 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     start = None if preset.start is None else solve_preset(preset)
     orbits = coexisting_orbits(network, preset.gait, start, starts=False, everything=False)
     orbit = orbits.orbits[0]
-    judged = stability(orbit)
-    if judged.reason and orbits.searched:
+    assessed = stability(orbit)
+    if assessed.reason and orbits.searched:
         count = len(orbits.orbits)
         whole = 'this is the only orbit' if count == 1 else f'none of {count} orbits attracts'
-        judged = replace(judged, reason=f'{judged.reason}; {whole}, {orbits.searched}')
-    return orbit, judged
+        assessed = replace(assessed, reason=f'{assessed.reason}; {whole}, {orbits.searched}')
+    return orbit, assessed
 
 
-def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
+def validate_orbit(orbit: Orbit, gait: str, harmonics: int) -> str:
     """Return why the generator would reject a gait on any robot, or ''.
 
     Args:
@@ -272,13 +272,13 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
 
     """
     try:
-        reached, judged = gait_of(orbit.network.presets()[gait], orbit.network)
+        reached, assessed = gait_of(orbit.network.presets()[gait], orbit.network)
     except CpgError as error:
         return f'from its preset it is not found: {error}'
     if abs(reached.period / orbit.period - 1.0) > SAME:
         return (f'its preset leads to another orbit, of period {reached.period:.6g} instead of '
                 f'{orbit.period:.6g}')
-    reason = obstacle(reached, judged, harmonics)
+    reason = rejection(reached, assessed, harmonics)
     return '' if reason is None else reason.aside
 
 
@@ -309,10 +309,10 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         raise PlanError(f'{network.delay_parameter} {network.delay:g} must be from {network.step} '
                         f'to {network.longest_delay:g}')
     try:
-        orbit, judged = gait_of(preset, network)
+        orbit, assessed = gait_of(preset, network)
     except CpgError as error:
         raise PlanError(str(error)) from error
-    if (reason := obstacle(orbit, judged, robot.harmonics)) is not None:
+    if (reason := rejection(orbit, assessed, robot.harmonics)) is not None:
         raise PlanError(f'the {gait} {reason.message}')
 
     motion = robot.motion(name, gait)
@@ -339,8 +339,8 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         if key == 'velocity':
             cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
         raise OutOfLimits(cause, message, excess, key)
-    gain = judged.lock_gain if gain < 0.0 else gain
-    return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
+    gain = assessed.lock_gain if gain < 0.0 else gain
+    return GaitPlan(name, robot, gait, orbit, assessed, gain, strides, motion, shift, readout,
                     in_place, span, speed, stands.fractions)
 
 

@@ -193,7 +193,7 @@ class Robot(ShortRepr):
         return {} if self.biped is None else self.biped.held
 
     @property
-    def places(self) -> np.ndarray:
+    def order_indices(self) -> np.ndarray:
         """Index into ``joints`` of each name in ``order``, shape (joints,)."""
         names = [joint.name for joint in self.joints]
         return np.array([names.index(name) for name in self.order])

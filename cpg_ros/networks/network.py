@@ -160,7 +160,7 @@ class Network(NetworkDefinition):
         """Return the coupling above which a gait bifurcates at some delay, if it is known."""
         return None
 
-    def obstacle(self, gait: str) -> str:
+    def validate_gait(self, gait: str) -> str:
         """Return why the parameters rule a gait out, if it is known in advance, or ''."""
         return ''
 

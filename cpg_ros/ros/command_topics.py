@@ -133,7 +133,7 @@ class Commands:
         self._node, self._robot, self._period = node, robot, period
         self.angles = np.array(angles, dtype=float)
         self._index = {name: k for k, name in enumerate(robot.order)}
-        # One for each topic: the subscription, what reads a message, and names -> places.
+        # One for each topic: the subscription, what reads a message, and names -> slots.
         self._sources: list[tuple[PolledSubscription, Any]] = []
         self._known: dict[str, tuple[list[str], np.ndarray]] = {}
         self._fresh: list[bool] = []
@@ -224,9 +224,9 @@ class Commands:
                            f"{'there twice' if name in names else 'missing'}")
         return np.array([self._index[name] for name in names])
 
-    def _write(self, topic: str, names: Sequence[str], places: Any, values: Sequence[float]
+    def _write(self, topic: str, names: Sequence[str], slots: Any, values: Sequence[float]
                ) -> None:
         for name, value in zip(names, values, strict=True):
             if not abs(value) <= LARGEST:
                 raise _Bad(f"{topic}: joint '{name}' at {value}")
-        self.angles[places] = values
+        self.angles[slots] = values

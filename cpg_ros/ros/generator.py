@@ -310,7 +310,7 @@ class Generator(StartedNode):
                 return SetParametersResult(successful=False, reason=str(error))
             if reason := self._feedback.validate_plan(plan):
                 return SetParametersResult(successful=False, reason=reason)
-        reason = self._posture.validate(parameters, plan) or self._feedback.judge(parameters)
+        reason = self._posture.validate(parameters, plan) or self._feedback.validate(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
@@ -505,7 +505,7 @@ class Generator(StartedNode):
     def _prepare(self, loop: native.Loop) -> Iterator[None]:
         """Give ``tick.c`` all that its ticks need until ``Ticker.attend``; see Ticker."""
         pattern, feedback = self.pattern.addresses, self._feedback.loop
-        self.pattern.take_drift()
+        self.pattern.start_drift()
         loop.asked = loop.advance = loop.resume = loop.correct = None
         loop.outputs[:] = [None] * len(loop.outputs)
         with ExitStack() as kept:

@@ -77,7 +77,7 @@ class Outputs:
             messages.append((f'{leg}/joint_states', joint_state(
                 [joint.name for joint in joints], positions[part], velocities[part])))
             start = part.stop
-        order = list(robot.places)
+        order = list(robot.order_indices)
         positions, velocities = positions[order], velocities[order]
         if combined_topic:
             messages.append((combined_topic, joint_state(robot.order, positions, velocities)))
@@ -128,11 +128,11 @@ def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
                     numbers=[(message, name, part) for name, part in fields])
 
 
-def labelled(names: tuple[str, ...], places: np.ndarray) -> Template:
+def labelled(names: tuple[str, ...], slots: np.ndarray) -> Template:
     """Return a template of an array with one number for each name, listed in its label."""
     message = Float64MultiArray()
     message.layout.dim = [MultiArrayDimension(label=','.join(names), stride=1, size=len(names))]
-    return Template(message, numbers=[(message, 'data', places)])
+    return Template(message, numbers=[(message, 'data', slots)])
 
 
 # The joint angles that the robot's own driver publishes.

@@ -63,7 +63,7 @@ class Posture:
     """
 
     def __init__(self, node: Node, pattern: Pattern, plan: Callable[[], GaitPlan],
-                 walk: Callable[[bool], str], refusal: Callable[[], str]) -> None:
+                 walk: Callable[[bool], str], validate_stand: Callable[[], str]) -> None:
         """Create topic and services.
 
         Args:
@@ -71,14 +71,14 @@ class Posture:
             pattern: with the body.
             plan: returns the gait of the parameters.
             walk: ramps into the gait, or down to the stand.
-            refusal: returns why the robot cannot sit or stand up now, or ''.
+            validate_stand: returns why the robot cannot sit or stand up now, or ''.
 
         Raises:
             InputError: the robot cannot take the pose in the parameters.
 
         """
         self._node, self._pattern, self._plan = node, pattern, plan
-        self._walk, self._refusal, self._body = walk, refusal, pattern.body
+        self._walk, self._validate_stand, self._body = walk, validate_stand, pattern.body
         self.seated = self.walks = self._rises = False
         self._timer = node.create_timer(LOOK, self._go_on, clock=STEADY, autostart=False)
         self._pose = self._asked({})
@@ -100,8 +100,8 @@ class Posture:
         """Return why a batch of changes, or a plan, is rejected, or ''."""
         changes = {parameter.name: parameter.value for parameter in parameters}
         end = changes.get('end', self._node.get_parameter('end').value)
-        if end == 'sit' and self._body.obstacle:
-            return f'end: {self._body.obstacle}'
+        if end == 'sit' and self._body.unavailable:
+            return f'end: {self._body.unavailable}'
         changed = any(name.startswith(PREFIX) for name in changes)
         return self._reason(self._asked(changes) if changed else self._pose, plan)
 
@@ -122,7 +122,7 @@ class Posture:
     def _aim(self, pose: tuple[float, ...]) -> None:
         """Go to a pose, or keep it for when the robot has risen."""
         self._pose = pose
-        if not (self.seated or self._body.obstacle):
+        if not (self.seated or self._body.unavailable):
             self._move(pose)
 
     def _move(self, pose: Sequence[float] | np.ndarray) -> None:
@@ -152,9 +152,9 @@ class Posture:
 
     def _serve(self, name: str, text: str, act: Callable[[], None]) -> None:
         def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            refusal = self._body.obstacle or self._refusal()
-            response.success, response.message = not refusal, refusal or text
-            if not refusal:
+            reason = self._body.unavailable or self._validate_stand()
+            response.success, response.message = not reason, reason or text
+            if not reason:
                 act()
             self._node.get_logger().info(response.message)
             return response

@@ -306,7 +306,7 @@ class RobotSim(StartedNode):
                                   self._body.stand)
         self._held = HeldSubscription(self, robot) if robot.held else None
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
-                                  robot.leg_of_joint[robot.places])
+                                  robot.leg_of_joint[robot.order_indices])
         sensors = SimulatedSensors(self._body, 1.0 / self._rate, SensorNoise(
             self._value('imu_delay'), seed=self._value('noise_seed'), **{
                 name: self._value(name) for name in (

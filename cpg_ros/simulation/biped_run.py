@@ -92,7 +92,7 @@ class BipedRun:
         self._speeds = self.body.model.jnt_dofadr[joints]
         self.senses = SensorData.zeros(1, 2, len(order))
         self._velocity = np.zeros((1, 3))
-        self._limits = np.stack([robot.column(name)[robot.places]
+        self._limits = np.stack([robot.column(name)[robot.order_indices]
                                  for name in ('lower', 'upper', 'velocity')])
         self._target, self._rate = np.zeros((2, len(robot.order)))
         self._behind = np.zeros(len(robot.order), dtype=bool)
@@ -149,7 +149,7 @@ class BipedRun:
                     feedback.walk(forward, left, turn)
                     began = min(began, time)
             while changes and changes[0][0] <= time:
-                feedback.follow(changes.pop(0)[1])
+                feedback.set_gait(changes.pop(0)[1])
             while forces and forces[0][0] <= time:
                 body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH)
             true = self.measure(before)

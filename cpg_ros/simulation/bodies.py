@@ -28,7 +28,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.simulation.body import add_payload, Anatomy, Body
 from cpg_ros.simulation.robot_model import engine
-from cpg_ros.simulation.run_metrics import judge, RunMetrics
+from cpg_ros.simulation.run_metrics import metrics_of, RunMetrics
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import lay, set_friction, Terrain
 import numpy as np
@@ -134,7 +134,7 @@ def targets(plan: GaitPlan, duration: float, timestep: float,
     for row in table:
         pattern.advance(timestep)
         row[:] = pattern.position
-    return table[:, robot.places]
+    return table[:, robot.order_indices]
 
 
 class OpenLoopBatch(BatchPhysics):
@@ -167,7 +167,7 @@ class OpenLoopBatch(BatchPhysics):
                 joints[k], force[k] = angles, scenario.forces(len(angles), self.timestep)
             state, sensors = self.rollout([self.model(scenario) for _, scenario in part],
                                           np.tile(self.start, (len(part), 1)), control)
-            outcomes += [judge(self.body, self.parts, angles, scenario.mass, run, sensed)
+            outcomes += [metrics_of(self.body, self.parts, angles, scenario.mass, run, sensed)
                       for (angles, scenario), run, sensed
                       in zip(part, state, sensors, strict=True)]
         return outcomes

@@ -27,7 +27,7 @@ import numpy as np
 #: FALLEN: lean of the base above which the robot has fallen, rad.
 FALLEN = math.radians(60.0)
 #: LEVEL: largest lean of the base of a robot that sits on the floor, rad; FOLDED: height of the
-#: base over the feet by the joints' targets, as a share of the stand's, below which it sits.
+#: base over the feet by the joints' targets, as a fraction of the stand's, below which it sits.
 LEVEL, FOLDED = 0.35, 0.6
 
 
@@ -68,7 +68,7 @@ class Body:
         #: The joints at their targets.
         self._posed: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
-        self.stand = robot.column('offset')[robot.places]
+        self.stand = robot.column('offset')[robot.order_indices]
         self._kp, self._kp_scale = self.model.actuator_gainprm[:, 0].copy(), 1.0
         count, n = len(robot.legs), len(robot.order)
         joints = self.model.actuator_trnid[:n, 0]

@@ -66,21 +66,21 @@ class Patterns:
         self._patterns = [Pattern(first, RAMP, strides=StrideCommand(len(first.robot.legs)))
                           for _ in scenarios]
         self.planned = PlannedMotion.zeros(runs, len(first.robot.joints))
-        self.planned.velocity[:, 0] = [one.speed for one in scenarios]
+        self.planned.velocity[:, 0] = [scenario.speed for scenario in scenarios]
         self._position = self.planned.angles.copy()
-        for run, (pattern, one) in enumerate(zip(self._patterns, scenarios, strict=True)):
-            pattern.begin_at(one.phase)
-            if any(one.pose):
-                pattern.body.go_to(one.pose, RAMP)
+        for run, (pattern, scenario) in enumerate(zip(self._patterns, scenarios, strict=True)):
+            pattern.begin_at(scenario.phase)
+            if any(scenario.pose):
+                pattern.body.go_to(scenario.pose, RAMP)
             if trimmed and pattern.strides is not None:
                 pattern.strides.trim = feedback.memory.stride[run]
             self._steer(run, first)
         self._time = 0.0
         self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(
-            [(command[0], run, '', command[1:]) for run, one in enumerate(scenarios)
-             for command in one.commands]
-            + [(when, run, name, ()) for run, one in enumerate(scenarios)
-               for when, name in one.switches], reverse=True)
+            [(command[0], run, '', command[1:]) for run, scenario in enumerate(scenarios)
+             for command in scenario.commands]
+            + [(when, run, name, ()) for run, scenario in enumerate(scenarios)
+               for when, name in scenario.switches], reverse=True)
 
     def _steer(self, run: int, plan: GaitPlan) -> None:
         if plan.motion.steering is not None:
@@ -116,10 +116,10 @@ class Patterns:
             old, new, planned.mix[run] = pattern.fading
             planned.gaits[run] = feedback.slot(old), feedback.slot(new)
 
-    def follow(self, angles: np.ndarray) -> np.ndarray:
+    def move(self, angles: np.ndarray) -> np.ndarray:
         """Return angles, rad, shape (runs, joints), within the joints' limits and speeds."""
         for pattern, goal, position in zip(self._patterns, angles, self._position, strict=True):
-            pattern.follow(self._dt, goal)
+            pattern.move(self._dt, goal)
             position[:] = pattern.position
         return self._position
 
@@ -188,7 +188,7 @@ class ClosedLoopBatch(BatchPhysics):
             self.model(item, gains.stiffen_kp) for item in scenarios]
         control, joints, force = self.controls(runs, 1)
         forces = np.stack([item.forces(steps, dt) for item in scenarios], axis=1)
-        order, places = np.argsort(self._robot.places), self._robot.places
+        order, indices = np.argsort(self._robot.order_indices), self._robot.order_indices
         state, sensors = np.tile(self.start, (runs, 1)), np.zeros((runs, model.nsensordata))
         moving = slice(1 + model.nq, 1 + model.nq + model.nv)
         free = 1 + model.nq + int(model.jnt_dofadr[model.body_jntadr[parts.base]])
@@ -216,10 +216,10 @@ class ClosedLoopBatch(BatchPhysics):
             else:
                 angles = pattern.planned.angles
                 state_of.update(noticed, dt)
-            angles = pattern.follow(angles)
+            angles = pattern.move(angles)
             if gains is not None and gains.virtual_stiffness:
                 stretch(angles, noticed.joint_positions, memory.stiff, gains, limits)
-            joints[:, 0], force[:, 0] = angles[:, places], forces[k]
+            joints[:, 0], force[:, 0] = angles[:, indices], forces[k]
             signals = {'place': state[:, 1 + parts.pose[:2]], 'rpy': senses.rpy,
                        'velocity': velocity, 'estimated': estimated,
                        'angular_velocity': senses.angular_velocity,
@@ -229,8 +229,8 @@ class ClosedLoopBatch(BatchPhysics):
                 if not k:
                     record[key] = np.zeros((steps, *value.shape))
                 record[key][k] = value
-            speeds = senses.joint_velocities[:, places]
-            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
+            speeds = senses.joint_velocities[:, indices]
+            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, indices], speeds,
                                  memory.kp_scale)
             work[k] = motor_power(applied, speeds)
             observe(noticed, applied[:, order])

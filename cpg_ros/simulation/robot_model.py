@@ -113,7 +113,7 @@ G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
 SQUARE = 0.25
 #: GRAIN: smallest feature of a mesh that is drawn, m; less than a pixel, and far fewer faces.
 GRAIN = 0.004
-#: BALL: radius of a foot in place of a missing one, as a share of the leg's length.
+#: BALL: radius of a foot in place of a missing one, as a fraction of the leg's length.
 BALL = 0.04
 
 
@@ -331,16 +331,16 @@ def _limit(motor: Any) -> list[float] | None:
 def _give_feet(path: Path, robot: Robot, joints: dict[str, Any], say: Callable[[str], None]
                ) -> None:
     """Add a ball where the foot of a leg is if nothing there collides, as without meshes."""
-    last = {leg: max((joints[one.name] for one in robot.legs[leg]),
+    last = {leg: max((joints[joint.name] for joint in robot.legs[leg]),
                      key=lambda joint: _depth(joint.parent)) for leg in robot.legs}
     bare = [leg for leg, joint in last.items()
             if not any(geom.contype or geom.conaffinity for geom in joint.parent.geoms)]
     if not bare:
         return
-    known = load_urdf(path)
+    urdf = load_urdf(path)
     for leg in bare:
-        chain, name = known.leg(one.name for one in robot.legs[leg]), last[leg].name
-        place, axes = known.frame(name)
+        chain, name = urdf.leg(joint.name for joint in robot.legs[leg]), last[leg].name
+        place, axes = urdf.frame(name)
         foot, radius = (chain.foot - place) @ axes, chain.radius
         if not radius:
             # The ball ends where the leg does.

@@ -81,7 +81,7 @@ class RunMetrics:
         return math.isinf(self.fell)
 
 
-def judge(body: Body, parts: Anatomy, target: np.ndarray, mass: float, states: np.ndarray,
+def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, mass: float, states: np.ndarray,
           sensors: np.ndarray) -> RunMetrics:
     """Return the metrics of a run.
 

@@ -80,7 +80,7 @@ def disturbance(orbit, point):
     return lambda theta: critical(theta) / size
 
 
-def share_of(orbit, base, mode, cycles):
+def fraction_of(orbit, base, mode, cycles):
     """How much of a disturbance an orbit has beside another: by least squares over a cycle."""
     theta = np.arange(240) / 240
     best = None
@@ -103,7 +103,7 @@ def beside_a_branch(branch, point, leaving, cycles):
         known = multipliers(base)
         every = np.concatenate([known.within, known.transverse])
         growth = np.log(abs(every[np.abs(every - critical).argmin()])) / base.period
-        squares.append(share_of(beside.orbit, base, disturbance(base, point), cycles)**2)
+        squares.append(fraction_of(beside.orbit, base, disturbance(base, point), cycles)**2)
         ratios.append(-growth / squares[-1])
     # Carried on to z = 0, where the normal form holds.
     return ratios[0] - squares[0] * (ratios[1] - ratios[0]) / (squares[1] - squares[0])

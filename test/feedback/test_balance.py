@@ -64,7 +64,7 @@ class Walker:
             pattern.sensors = None if self.blind else sensors
             pattern.advance(DT)
             self.check()
-            body.command(pattern.position[pattern.robot.places])
+            body.command(pattern.position[pattern.robot.order_indices])
             body.step()
             body.hold(self.held)
             self.tilt = max(self.tilt, math.acos(min(body.axes[2, 2], 1.0)))
@@ -80,7 +80,7 @@ class Walker:
             self.crossed.append('speed')
         if pattern.balance is not None and np.abs(step - pattern.velocity).max() > 1e-6:
             self.crossed.append('published speed')
-        pull = self.kp * np.abs(position[pattern.robot.places] - self.run.body.position)
+        pull = self.kp * np.abs(position[pattern.robot.order_indices] - self.run.body.position)
         if pattern.balancing and (pull > 1.02 * self.effort).any():
             self.crossed.append('torque')
         held = pattern.held_angles

@@ -174,7 +174,7 @@ def test_the_clock_shares_the_weight():
     landed = np.zeros(2, dtype=bool)
     for phase in np.linspace(0.0, 1.0, 200, endpoint=False):
         phases = np.array([phase, (phase + 0.5) % 1.0])
-        stepping.load_shares(phases, landed, gains, fractions)
+        stepping.load_fractions(phases, landed, gains, fractions)
         assert fractions.sum() == pytest.approx(1.0)
         for leg in range(2):
             if phases[leg] < 1.0 - gains.duty:

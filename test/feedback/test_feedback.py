@@ -77,7 +77,7 @@ def test_feet_are_where_the_physics_has_them(loop, seed):
     angles = rng.uniform(GO2.column('lower'), GO2.column('upper'))
     data.qpos[:] = body.data.qpos
     data.qpos[parts.pose] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-    data.qpos[parts.angles] = angles[GO2.places]
+    data.qpos[parts.angles] = angles[GO2.order_indices]
     mujoco.mj_kinematics(body.model, data)
     assert forward(loop.geometry, angles) == pytest.approx(data.geom_xpos[parts.feet], abs=1e-9)
 
@@ -258,10 +258,10 @@ def patterns(loop, expected, gains, steps=1500):
         if correct is None:
             pattern.advance(DT)
         else:
-            pattern.follow(DT, correct(pattern.plan_tick(DT)))
+            pattern.move(DT, correct(pattern.plan_tick(DT)))
         held[k] = pattern.held > before
         row[:], rate[:] = pattern.position, pattern.velocity
-        body.command(pattern.position[GO2.places])
+        body.command(pattern.position[GO2.order_indices])
         body.step()
     return told, spun, held, body.base.copy()
 

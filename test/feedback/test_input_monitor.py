@@ -15,12 +15,12 @@
 """Measurements that are believed, and those that are not."""
 
 from cpg_ros.feedback.input_checks import (
+    check_imu,
+    check_joints,
     DELAYED,
     IMU,
     IMU_MEMORY,
     InputMonitor,
-    judge_imu,
-    judge_joints,
     LATE,
     note,
     STALE,
@@ -72,7 +72,7 @@ def test_silence_is_named(monitor):
 def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
     found = np.full((2, 2), 7.0)
     # In the message the joints are the other way round.
-    verdict = judge_joints(np.array(angles[::-1]), np.array(speeds[::-1]), np.array([1, 0]),
+    verdict = check_joints(np.array(angles[::-1]), np.array(speeds[::-1]), np.array([1, 0]),
                            np.full(2, -1.0), np.full(2, 1.0), FASTEST, *found)
     assert VERDICTS[verdict] == why
     assert (found == ([angles, speeds] if not why else 7.0)).all()
@@ -85,7 +85,7 @@ def test_a_spike_of_the_gyroscope_is_left_out():
     verdicts = []
     for spike in (0.0, 0.0, 30.0, 0.0, 0.0):
         message[13] = spike
-        verdicts.append(judge_imu(message, 0.002, False, mount, memory, *filled))
+        verdicts.append(check_imu(message, 0.002, False, mount, memory, *filled))
         assert not filled[1].any()
     # The jump back counts as one, too.
     assert [VERDICTS[verdict] for verdict in verdicts] == [
@@ -99,15 +99,15 @@ def test_gravity_is_judged_by_a_quarter_of_a_second_and_not_by_the_first_message
     # A robot that is put on the ground falls freely at first; before it, a second of silence.
     for k, dt in enumerate((1.0, *(100 * [0.002]))):
         message[27] = 9.81 * (k > 5)
-        assert judge_imu(message, dt, False, mount, memory, *filled) == 0
+        assert check_imu(message, dt, False, mount, memory, *filled) == 0
     # A walk's acceleration of an instant, after a second without messages.
     message[27] = 9.81
     for k, dt in enumerate((*(1000 * [0.002]), 1.0)):
         message[27] = 9.81 + 8.0 * (k == 1000)
-        assert judge_imu(message, dt, True, mount, memory, *filled) == 0
+        assert check_imu(message, dt, True, mount, memory, *filled) == 0
     # Gravity removed by the driver is named once it has been seen for long enough.
     memory[:], message[27] = 0.0, 0.0
-    verdicts = [judge_imu(message, dt, False, mount, memory, *filled)
+    verdicts = [check_imu(message, dt, False, mount, memory, *filled)
                 for dt in (1.0, *(140 * [0.002]))]
     assert verdicts[90] == 0 and 'gravity' in VERDICTS[verdicts[-1]]
 

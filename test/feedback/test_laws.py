@@ -93,7 +93,7 @@ def test_pace_quickens_with_the_error_up_to_its_most():
 
 
 def test_pace_tires_of_what_lasts():
-    """A velocity that stays, hurried or not, is no push: a share 1 / (1 + fatigue) is left."""
+    """A velocity that stays, hurried or not, is no push: a fraction 1 / (1 + fatigue) is left."""
     fatigue = 0.0
     for k in range(round(8.0 * GAINS.pace_memory / DT)):
         added = pace.frequency_change(5.0, fatigue, GAINS)
@@ -224,7 +224,7 @@ def test_reflexes_lift_reach_hold_and_fade():
 
 
 def test_a_stance_begins_with_its_touchdown():
-    """A share of the error in phase is corrected: forward of a foot that lands early."""
+    """A fraction of the error in phase is corrected: forward of a foot that lands early."""
     duty = 0.6
     early = touchdown.phase_change(True, 0.8, duty, GAINS)
     assert early == pytest.approx(GAINS.touchdown_gain * 0.2 * 0.4)

@@ -85,7 +85,7 @@ def test_its_covariance_is_that_of_draws():
     made = follow([(speed, 0.1)] * steps, headings, dt)
     rng = np.random.default_rng(20261125)
     stays = math.exp(-dt / module.SLOWLY)
-    slow = math.sqrt((1.0 - stays**2) * (module.STILL**2 + module.SHARE**2
+    slow = math.sqrt((1.0 - stays**2) * (module.STILL**2 + module.OF_SPEED**2
                                          * (speed**2 + 0.1**2)))
     error = rng.normal(0.0, module.STILL, (2, count))
     drift, place = np.zeros(count), np.zeros((2, count))

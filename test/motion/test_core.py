@@ -123,7 +123,7 @@ class Pair:
             if plain.correct is None:
                 core.advance(self.dt)
             else:
-                core.follow(self.dt, plain.correct(core.plan_tick(self.dt)))
+                core.move(self.dt, plain.correct(core.plan_tick(self.dt)))
             plain.advance(self.dt)
             self.time += self.dt
             assert np.abs(core.position - plain.position).max() <= self.alike

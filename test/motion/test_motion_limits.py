@@ -105,12 +105,12 @@ def test_a_leap_of_a_correction_is_followed_no_faster_than_joints_may():
     assert not pattern.held and (most < 0.1).all()
     before, steps = pattern.position.copy(), []
     for _ in range(50):
-        pattern.follow(dt, pattern.plan_tick(dt) + 0.2)
+        pattern.move(dt, pattern.plan_tick(dt) + 0.2)
         steps.append(pattern.position - before)
         before = pattern.position.copy()
     # Its first steps take all that is allowed; then it is there, and nothing holds it.
     assert steps[0] == pytest.approx(most, rel=1e-6)
     assert (np.abs(steps) <= most * (1.0 + 1e-6)).all()
     held = pattern.held
-    pattern.follow(dt, pattern.plan_tick(dt) + 0.2)
+    pattern.move(dt, pattern.plan_tick(dt) + 0.2)
     assert 0 < held == pattern.held

@@ -40,7 +40,7 @@ ROBOTS = {name: read_robot(Path(__file__).parents[2] / 'config' / f'{name}.yaml'
 #: Steep orbits: cells double back, and the angle in their plane hardly turns, or turns back.
 STEEP = [('trot', {'alpha': -0.6549, 'beta': -1.3162, 'gamma': -0.6, 'delta': -0.6}),
          ('walk', {'alpha': 0.0078, 'beta': -0.0085, 'gamma': -1.3068, 'delta': -1.201})]
-#: Random sets of each network, and how far they are from a preset's (share of each value).
+#: Random sets of each network, and how far they are from a preset's (fraction of each value).
 SETS, SPREAD = 4, 0.5
 #: Ticks of the twin in one.
 TICKS = 4

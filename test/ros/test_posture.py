@@ -28,11 +28,11 @@ GO2 = load_robot('unitree_go2')
 BODY = BodyPose(GO2)
 #: CURE: end of the message on a robot file without geometry.
 CURE = '(part geometry: check_robot --make writes it, and tune)'
-STAND = GO2.column('offset')[GO2.places]
+STAND = GO2.column('offset')[GO2.order_indices]
 
 
 def angles(*pose):
-    return BODY.angles(pose)[GO2.places]
+    return BODY.angles(pose)[GO2.order_indices]
 
 
 def ask(watcher, name):

@@ -55,14 +55,14 @@ def gait_plan(gait):
 def walked(pattern, body, time, standing=None):
     for _ in range(round(time / DT)):
         pattern.advance(DT)
-        body.command(pattern.position[HEXAPOD.places])
+        body.command(pattern.position[HEXAPOD.order_indices])
         body.step()
         if standing is not None:
             standing.append(body.feet > 0.0)
         assert not body.fallen
 
 
-# The largest share of legs in the air at once is what each gait is named for.
+# The largest fraction of legs in the air at once is what each gait is named for.
 @pytest.mark.parametrize(('gait', 'lengths', 'duty'), [
     ('tripod', 4.0, (0.5, 0.7)), ('ripple', 3.0, (0.6, 0.8)), ('wave', 1.5, (0.75, 0.9))])
 def test_it_walks_for_ten_seconds(gait, lengths, duty):

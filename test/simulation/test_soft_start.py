@@ -77,10 +77,10 @@ def test_a_gait_in_full_swing_is_taken_up_at_any_moment(gait):
         for _ in range(round((1.0 + part / running.frequency) / DT)):
             pattern.advance(DT)
         body.reset()
-        approach = Approach(round(1.0 / DT), body.stand, GO2.leg_of_joint[GO2.places])
+        approach = Approach(round(1.0 / DT), body.stand, GO2.leg_of_joint[GO2.order_indices])
         for _ in range(1500):
             pattern.advance(DT)
-            body.command(approach.towards(pattern.position[GO2.places]))
+            body.command(approach.towards(pattern.position[GO2.order_indices]))
             body.step()
             assert not body.fallen, (part, body.time)
         assert body.base[0] > 0.3

@@ -102,7 +102,7 @@ class FaultyGo2:
             self._ticks.tick(round(1e9 * self.time))
             self._count()
             self._gap = 0.0
-            body.command(self.loop.target[GO2.places])
+            body.command(self.loop.target[GO2.order_indices])
             body.scale_kp(self.loop.feedback.memory.kp_scale[0])
         body.step()
 

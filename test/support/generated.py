@@ -42,12 +42,12 @@ def ticked(robot, network, gait, changes=(), duty=0.0):
     rows = []
     for _ in range(int(LASTING * RATE)):
         pattern.advance(1.0 / RATE)
-        rows.append(pattern.position[robot.places])
+        rows.append(pattern.position[robot.order_indices])
     return np.array(rows)
 
 
 def generated(robot, network, gait, seed=None, noise=0.01, **settings):
-    """Return a recording of that, with noise of a share of each joint's range if seeded."""
+    """Return a recording of that, with noise of a fraction of each joint's range if seeded."""
     x = ticked(robot, network, gait, **settings)
     if seed is not None:
         x = x + noise * np.ptp(x, axis=0) * np.random.default_rng(seed).standard_normal(x.shape)

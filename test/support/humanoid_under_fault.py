@@ -109,7 +109,7 @@ class HumanoidUnderFault:
             self._ticks.tick(round(1e9 * self.time))
             self._check(DT)
             self._gap = 0.0
-        body.command(pattern.position[pattern.robot.places])
+        body.command(pattern.position[pattern.robot.order_indices])
         body.hold(pattern.held_angles)
         body.step()
         self.time += DT

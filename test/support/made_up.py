@@ -86,7 +86,7 @@ def record(orbit, cells, weights, rng=None, *, offsets=0.1, noise=0.02, jitter=5
         offsets: of the joints, rad.
         noise: of each sample, over the joint's range.
         jitter: of the stamps, s.
-        dropouts: share of the samples that are missing.
+        dropouts: fraction of the samples that are missing.
         cycles: how many are averaged.
         points: of a cycle.
         phase: of the orbit where the recording's cycle begins.

@@ -66,7 +66,7 @@ def stamps(rng, duration, rate, jitter=0.2, dropouts=0.01):
 
 
 def noisy(rng, x, fraction=0.02):
-    """Add noise of a share of each joint's range."""
+    """Add noise of a fraction of each joint's range."""
     return x + fraction * np.ptp(x, axis=0) * rng.standard_normal(x.shape)
 
 

@@ -38,7 +38,7 @@ class Follow:
     def __init__(self, body: Body, pattern: Pattern) -> None:
         """Reset the body; the pattern starts at the stand, too."""
         self.body, self.pattern = body, pattern
-        self._places = pattern.robot.places
+        self._places = pattern.robot.order_indices
         body.reset()
         self.track = np.zeros((1, 3))
 
@@ -74,7 +74,7 @@ class Proprioception:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._order = np.argsort(body.robot.places)
+        self._order = np.argsort(body.robot.order_indices)
         self._senses = SensorData.zeros(1, len(body.robot.legs), len(self._order))
         self._before, self._velocity = body.rates[None].copy(), np.zeros((1, 3))
 

@@ -153,10 +153,10 @@ class PhaseTrackReadout:
         c, s = math.cos(TURN * phase), math.sin(TURN * phase)
         along = (circle[::2] * c + circle[1::2] * s) @ gap
         across = (circle[1::2] * c - circle[::2] * s) @ gap
-        pull, share = 1.0 / (1.0 + 2.0 * strides), strides / (0.25 + strides)
-        self.speed[1, cell] += share * (np.clip(pull * across / TURN, -0.5, 0.5)
+        pull, fraction = 1.0 / (1.0 + 2.0 * strides), strides / (0.25 + strides)
+        self.speed[1, cell] += fraction * (np.clip(pull * across / TURN, -0.5, 0.5)
                                         - self.speed[1, cell])
-        self.growth[1, cell] += share * (pull * along - self.growth[1, cell])
+        self.growth[1, cell] += fraction * (pull * along - self.growth[1, cell])
         return np.max([*np.abs(here - there), abs(self.amount[cell] - 1.0)])
 
     def signal(self, cell, its_map):

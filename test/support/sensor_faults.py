@@ -67,11 +67,11 @@ class Fault:
         lasting: whether it is there from before the first step to the end.
         seconds: else how long it lasts.
         inputs: topics that it affects.
-        drop: share of the messages that do not arrive.
+        drop: fraction of the messages that do not arrive.
         every: interval of the messages, s; 0 for every tick.
         delay: from the measurement to its message, s.
         stamp: offset of the stamps, s; NaN for stamps of 0.
-        swap: share of the messages that arrive after their successor.
+        swap: fraction of the messages that arrive after their successor.
         twice: whether each message arrives again at the next tick, too.
         stall: the generator's process stands still for so long instead, s.
 

@@ -105,17 +105,17 @@ class _Finder:
             if np.isclose(orbit.period, periods, rtol=1e-6).any():
                 continue
             periods.append(orbit.period)
-            judged = _assess(orbit)
-            if best is None or judged['label'] > best[1]['label']:
-                best = orbit, judged
+            assessed = _assess(orbit)
+            if best is None or assessed['label'] > best[1]['label']:
+                best = orbit, assessed
             if best[1]['label'] >= LOCKED:
                 break
         point_data: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
                                       'label': NONE}
         self.last = best[0] if best else None
         if best:
-            orbit, judged = best
-            point_data |= judged | {'wave': _wave(orbit)}
+            orbit, assessed = best
+            point_data |= assessed | {'wave': _wave(orbit)}
             if self.row.basin:
                 point_data['basin'] = basin(orbit, STARTS, gain=point_data['lock']).fraction
         return point_data
@@ -259,7 +259,7 @@ class GaitMap(ShortRepr):
         self.computed = np.zeros(self.shape, dtype=bool)
         self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
 
-    def take(self, points: Iterable[dict[str, Any]]) -> None:
+    def add_points(self, points: Iterable[dict[str, Any]]) -> None:
         """Enter the points of a job where they are better than previous ones."""
         for point in points:
             at = point['row'], point['column']
@@ -419,7 +419,7 @@ def refine(chart: ParameterPlane, gaits: tuple[str, ...], curves: Iterable[Bound
     stride = COARSE
     while True:
         for row, points in run(jobs, len(jobs)):
-            sheets[row.gait].take(points)
+            sheets[row.gait].add_points(points)
         if stride == COARSE:
             jobs = [job for gait in gaits for job in worse_points(chart, gait, sheets[gait],
                                                                   before[gait])]

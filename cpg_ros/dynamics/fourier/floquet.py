@@ -309,7 +309,7 @@ class Variational:
         at: states at the nodes now and a delay ago, shape (n, components) each.
         slope: their derivatives by time.
         delay: model time.
-        flaw: reason why the derivatives of the rates do not describe disturbances, or ''.
+        unusable: reason why the derivatives of the rates do not describe disturbances, or ''.
 
     """
 
@@ -336,7 +336,7 @@ class Variational:
         field: Field = Field(network)
         _, self._now, self._past = field.linearised(*self.at)
         self._shift = collocation.shift_matrix(n, -self.delay / orbit.period)
-        self.flaw = 'the rates have kinks' if network.kinks else ''
+        self.unusable = 'the rates have kinks' if network.kinks else ''
 
     def critical(self, part: int, multiplier: complex) -> tuple[complex, np.ndarray]:
         """Return the factor of the disturbance with a multiplier, and a guess at it.

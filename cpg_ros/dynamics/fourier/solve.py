@@ -294,9 +294,9 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
     """
     symmetry = network.symmetry(gait)
     check_values(network, gait)
-    obstacle = network.obstacle(gait)
-    if obstacle:
-        raise NoOrbit(obstacle)
+    validate_gait = network.validate_gait(gait)
+    if validate_gait:
+        raise NoOrbit(validate_gait)
     name, delay, onset = network.delay_parameter, network.delay, _onset(network, gait)
     simple = _simple(network, symmetry)
     if simple and onset is not None and delay <= onset:

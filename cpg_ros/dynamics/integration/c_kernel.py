@@ -139,8 +139,8 @@ def c_kernels(network: type[Network]) -> Kernels:
     kind = _track_of(components)
 
     def set_slope(system: System, ring: Ring, head: int) -> None:
-        for one in _split(system, ring, ring.x.shape[1] // components):
-            library.set_slope(Lane(kind, *one).pointer, head)
+        for lane_arrays in _split(system, ring, ring.x.shape[1] // components):
+            library.set_slope(Lane(kind, *lane_arrays).pointer, head)
 
     def integrate(system: System, ring: Ring, head: int, steps: int, noise: float, seed: int,
                   record: Samples, row: int) -> int:
@@ -148,9 +148,9 @@ def c_kernels(network: type[Network]) -> Kernels:
             raise InputError('noise needs numba: kernels in C have none')
         every, states, slopes = record
         spare, end = np.empty((2, *states.shape[1:])), head
-        for lane, one in enumerate(_split(system, ring, ring.x.shape[1] // components)):
+        for lane, lane_arrays in enumerate(_split(system, ring, ring.x.shape[1] // components)):
             kept = (states[lane], slopes[lane]) if lane < len(states) else spare
-            end = library.steps(Lane(kind, *one).pointer, head, steps, every, row,
+            end = library.steps(Lane(kind, *lane_arrays).pointer, head, steps, every, row,
                                 *(array.ctypes.data for array in kept))
         return end
 

@@ -54,16 +54,16 @@ class LoopProgram:
         return sympy.Symbol(f'z{variable}', real=True)
 
     def _fetch(self, what: Any, source: Source) -> Any:
-        for symbol, known, place in self.fetched:
-            if known == what and place == source:
+        for symbol, quantity, origin in self.fetched:
+            if quantity == what and origin == source:
                 return symbol
         symbol = sympy.Symbol(f'g{len(self.fetched)}', real=True)
         self.fetched.append((symbol, what, source))
         return symbol
 
     def _function(self, call: Any) -> Any:
-        for symbol, known in self.functions:
-            if known == call:
+        for symbol, stored in self.functions:
+            if stored == call:
                 return symbol
         symbol = sympy.Symbol(f'w{len(self.functions)}', real=True)
         self.functions.append((symbol, call))
@@ -72,9 +72,9 @@ class LoopProgram:
     def lowered(self, part: Any) -> Any:
         """Replace arguments and functions in an expression by results of the loops."""
         if part in self._arguments:
-            one = self._arguments[part]
-            own = self.own(one.variable)
-            return own if one.source is None else self._fetch(own, one.source)
+            argument = self._arguments[part]
+            own = self.own(argument.variable)
+            return own if argument.source is None else self._fetch(own, argument.source)
         if part in self._powers:
             return self.lowered(self._powers[part])
         if not part.args:
@@ -82,14 +82,14 @@ class LoopProgram:
         if isinstance(part, sympy.Function):
             inputs = [self._arguments[symbol] for symbol in part.free_symbols
                       if symbol in self._arguments]
-            sources = {one.source for one in inputs}
+            sources = {argument.source for argument in inputs}
             if len(sources) == 1 and len(inputs) == len(part.free_symbols):
                 # Computed where the cell is whose state it reads.
                 source = sources.pop()
-                there = part.xreplace({symbol: self.own(one.variable)
-                                       for symbol, one in self._arguments.items()})
-                found = self._function(self._inner(there))
-                return found if source is None else self._fetch(found, source)
+                there = part.xreplace({symbol: self.own(argument.variable)
+                                       for symbol, argument in self._arguments.items()})
+                result = self._function(self._inner(there))
+                return result if source is None else self._fetch(result, source)
             return self._function(part.func(*(self.lowered(arg) for arg in part.args)))
         return part.func(*(self.lowered(arg) for arg in part.args))
 
@@ -147,8 +147,8 @@ class Writer:
         waiting_g = list(program.fetched)
         needed = {symbol for symbol, _ in waiting_f} | {symbol for symbol, _, _ in waiting_g}
         while waiting_f or waiting_g:
-            ready_f = [one for one in waiting_f if not one[1].free_symbols & needed - done]
-            ready_g = [one for one in waiting_g if not one[1].free_symbols & needed - done]
+            ready_f = [call for call in waiting_f if not call[1].free_symbols & needed - done]
+            ready_g = [call for call in waiting_g if not call[1].free_symbols & needed - done]
             for symbol, call in ready_f:
                 self._loop(str(symbol), self._elements(call))
                 done.add(symbol)
@@ -171,8 +171,8 @@ class Writer:
             self.lines += [f'to, of = {target}[:{shift} * lanes], {array}[m - {shift} * lanes:m]',
                            f'for i in range({shift} * lanes):', '    to[i] = of[i]']
             return
-        place = self.sources.setdefault(source, len(self.sources))
-        self.lines.append(f'fetch(lanes, SOURCE_{place}, {array}, {target})')
+        index = self.sources.setdefault(source, len(self.sources))
+        self.lines.append(f'fetch(lanes, SOURCE_{index}, {array}, {target})')
 
 
 # Kernel code for a network's right-hand side, written from its equations.
@@ -186,19 +186,19 @@ def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
     """
     calls = sorted({call for part in parts for call in part.atoms(sympy.tanh, sympy.cosh)},
                    key=str)
-    known: dict[Any, Any] = {}
+    rewritten: dict[Any, Any] = {}
     powers: dict[Any, Any] = {}
     for call in calls:
         if call.func is not sympy.cosh:
             continue
         base, power = call.args[0], sympy.Symbol(f'e{len(powers)}', real=True)
         powers[power] = sympy.exp(base)
-        known[call] = (power + 1 / power) / 2
+        rewritten[call] = (power + 1 / power) / 2
         for other in calls:
             ratio = sympy.nsimplify(sympy.simplify(other.args[0] / base), rational=True)
             if other.func is sympy.tanh and ratio.is_Integer and ratio > 0:
-                known[other] = 1 - 2 / (power**(2 * ratio) + 1)
-    return [part.xreplace(known) for part in parts], powers
+                rewritten[other] = 1 - 2 / (power**(2 * ratio) + 1)
+    return [part.xreplace(rewritten) for part in parts], powers
 
 
 def _split(rates: list[Any], delayed: set[Any], now: set[Any]) -> tuple[list[Any], list[Any]]:
@@ -256,16 +256,16 @@ def lowered_parts(equations: Equations) -> list[LoweredPart]:
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
     arguments = list(zip(symbols[:count], equations.arguments, strict=True))
-    delayed = {symbol for symbol, one in arguments if one.delayed}
-    now = {symbol for symbol, one in arguments if not one.delayed}
+    delayed = {symbol for symbol, argument in arguments if argument.delayed}
+    now = {symbol for symbol, argument in arguments if not argument.delayed}
     driven, rest = _split(rates, delayed, now)
     parts = []
     for name, results in (('drive', driven), ('field', rest)):
         if not results:
             continue
         results, powers = _share_exponentials(results)
-        program = LoopProgram([(symbol, one) for symbol, one in arguments
-                               if one.delayed == (name == 'drive')], powers)
+        program = LoopProgram([(symbol, argument) for symbol, argument in arguments
+                               if argument.delayed == (name == 'drive')], powers)
         parts.append(LoweredPart(name, program, [program.lowered(part) for part in results]))
     return parts
 
@@ -304,15 +304,15 @@ def kernel_source(equations: Equations) -> str:
                else 'Right-hand side at z.')
         texts.append(_function(name, head, doc, slices, writer.lines))
     code = '\n'.join(texts)
-    known = [word for word in ('exp', 'fetch', 'tanh') if f'{word}(' in code]
+    helpers = [word for word in ('exp', 'fetch', 'tanh') if f'{word}(' in code]
     others = [word for word in ('cos', 'log', 'sin', 'sqrt') if f'{word}(' in code]
     head = ''.join(line + '\n' for line in (
         f'from math import {", ".join(others)}' if others else '',
-        f'from cpg_ros.dynamics.integration.compilation import {", ".join(known)}' if known
+        f'from cpg_ros.dynamics.integration.compilation import {", ".join(helpers)}' if helpers
         else '') if line)
     head += 'from numpy import array\n' if sources else ''
-    places = ''.join(f'SOURCE_{k} = array({source!r})\n' for source, k in sources.items())
-    return (f'{head}\n{places}DRIVEN, WORK, EXTRA = {driven}, {most}, {extra}\n\n\n'
+    definitions = ''.join(f'SOURCE_{k} = array({source!r})\n' for source, k in sources.items())
+    return (f'{head}\n{definitions}DRIVEN, WORK, EXTRA = {driven}, {most}, {extra}\n\n\n'
             f'def compiled(decorate):\n{code}\n    return {"drive" if driven else None}, field\n')
 
 
@@ -418,11 +418,11 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
     inputs = {symbol: what for symbol, what, _ in part.program.fetched}
     needed = {symbol for symbol, _ in waiting}
     while waiting:
-        ready = [one for one in waiting if not
-                 {inputs.get(symbol, symbol) for symbol in one[1].free_symbols} & needed - done]
+        ready = [call for call in waiting if not
+                 {inputs.get(symbol, symbol) for symbol in call[1].free_symbols} & needed - done]
         lines += _loop([f'{symbol}[i] = {names.element(part, call)};' for symbol, call in ready])
         done |= {symbol for symbol, _ in ready}
-        waiting = [one for one in waiting if one not in ready]
+        waiting = [call for call in waiting if call not in ready]
     shared, results = sympy.cse(part.results, sympy.numbered_symbols('s'))
     out = 'driven' if part.name == 'drive' else 'out'
     lines += _loop([f'const cpg_real {symbol} = {names.element(part, value)};'

@@ -72,7 +72,7 @@ def power_coefficients(left: np.ndarray, slopes: np.ndarray, lengths: np.ndarray
     return coefficients
 
 
-def last_share(slopes: np.ndarray) -> np.ndarray:
+def last_fraction(slopes: np.ndarray) -> np.ndarray:
     """Return the size of the last Legendre coefficient of each interval, shape (n,)."""
     return np.abs(np.einsum('s,nsd->nd', LEGENDRE[-1], slopes)).max(axis=1)
 
@@ -188,7 +188,7 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
     """
     n, s, d, k = sources.shape
     answers, work = np.empty((n, s, d, d + k)), np.empty((s * d, s * d + d + k))
-    given = [np.ascontiguousarray(one) for one in (A, lengths, jacobians, sources)]
+    given = [np.ascontiguousarray(array) for array in (A, lengths, jacobians, sources)]
     if not solver().mesh_transfer(n, s, d, k, *addresses(*given, work, answers)):
         raise np.linalg.LinAlgError('an interval is singular')
     return answers
@@ -198,7 +198,7 @@ def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> n
     """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
     n, s, d, k = answers.shape
     steps = np.zeros((n, d, k))
-    given = [np.ascontiguousarray(one) for one in (lengths, jacobians, answers)]
+    given = [np.ascontiguousarray(array) for array in (lengths, jacobians, answers)]
     solver().mesh_sum(n, s, d, k, *addresses(WEIGHTS, *given, steps))
     return steps
 

@@ -93,7 +93,7 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
     points = whole @ end
     slopes = -np.einsum('nsij,nsjk,nk->nsi', back, answers, points[:-1])[::-1, ::-1]
     coefficients = collocation.power_coefficients(points[::-1][:-1], slopes, lengths)
-    ends = collocation.last_share(slopes) * lengths / np.abs(points).max()
+    ends = collocation.last_fraction(slopes) * lengths / np.abs(points).max()
     # The cells of a class share its response.
     alike = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
     return coefficients / alike, ends > RESOLVED
@@ -308,7 +308,7 @@ class Variational:
         return np.einsum('i,s,is...->i...', self._lengths, collocation.WEIGHTS, values)
 
     @property
-    def flaw(self) -> str:
+    def unusable(self) -> str:
         """Reason why derivatives of the rates do not describe disturbances, or ''."""
         met = bool(self._orbit.network.kinks) and kinks(self._reduced, self._orbit.solution).size
         return 'the rates have kinks' if met else ''

@@ -196,7 +196,7 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
 
     """
     h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
-    ends = collocation.last_share(slopes) * now.length * h / np.abs(now.points).max()
+    ends = collocation.last_fraction(slopes) * now.length * h / np.abs(now.points).max()
     if ends.max() <= RESOLVED:
         return None
     needed = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size

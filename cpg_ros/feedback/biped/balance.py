@@ -22,21 +22,21 @@ from cpg_ros.dynamics.integration.memory import call_at
 from cpg_ros.feedback.biped import substitutes
 from cpg_ros.feedback.biped.gains import SHIFT, STAND, WALK
 from cpg_ros.feedback.biped.modes import advance, follow, stand_anew
-from cpg_ros.feedback.biped.stepping import swing_share, WALKS
+from cpg_ros.feedback.biped.stepping import swing_fraction, WALKS
 from cpg_ros.feedback.biped.substitutes import FEET, IMU, JOINTS, LastStride, Substitutes
 from cpg_ros.feedback.biped.support import swing_arms
-from cpg_ros.feedback.closed_loop import NOW, take_in
+from cpg_ros.feedback.closed_loop import check_inputs, NOW
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.input_checks import BELIEVED, GOOD, is_out, MEASURED, WRONG
 from cpg_ros.motion.strides import smoothstep
 import numpy as np
 
 #: LEANS: lean of the base, rad, above which the robot has fallen; LOW: height of the centre of
-#: mass, as a share of the wanted one, below which it has fallen.
+#: mass, as a fraction of the wanted one, below which it has fallen.
 LEANS, LOW = 1.0, 0.6
 #: The robot is on its feet, and balance begins, if all of these hold for a time of STEADY, s:
 #: UPRIGHT: largest lean of the base, rad, in the stand; CROUCHED: the same in the crouch;
-#: NEAR: largest distance of a joint from the pose, rad; BORNE: least share of the weight on the
+#: NEAR: largest distance of a joint from the pose, rad; BORNE: least fraction of the weight on the
 #: feet.
 UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
 #: RETURN: duration of the way back into the stand, s; LOWER: duration of the way into the crouch,
@@ -47,15 +47,15 @@ RETURN, LOWER = 0.3, 0.45
 SETTLED, PATIENCE = 0.3, 4.0
 #: BEHIND: how far the centre of mass is behind the middle of the soles in a crouch from a walk, m.
 BEHIND = 0.025
-#: PASSING: begin and end, as shares of a swing, of the time in which the body passes over the foot
-#: that stands: the best time to crouch without any sensor.
+#: PASSING: begin and end, as fractions of a swing, of the time in which the body passes over the
+#: foot that stands: the best time to crouch without any sensor.
 PASSING = 0.38, 0.6
 #: CONTRARY: ratio of the swinging foot's load to the other's above which loads contradict the
 #: gait.
 CONTRARY = 4.0
-#: While both feet stand, each with a share of LOADED of the weight, soles that are not level for
-#: COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT: largest lean
-#: by IMU and joints, rad.
+#: While both feet stand, each with a fraction of LOADED of the weight, soles that are not level
+#: for COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT: largest
+#: lean by IMU and joints, rad.
 PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.1, 0.12, 0.06
 #: Largest deviation from the mean over USUAL, s, meanwhile: TWISTED: of the angle between the
 #: soles while the weight shifts; TURNED: of their lean, rad; SEEN_LEVEL: time for which they are
@@ -111,15 +111,16 @@ REST, CROUCH, BRACED, START = range(4)
 #: The robot: balancing: whether feedback bears it; known: whether it ever did; fallen; falls: how
 #: often; crouching: whether it crouches or is on its way there; holds: whether it holds a pose;
 #: low: whether that is the crouch; braces: whether that came from a walk; time: for how long it is
-#: held; stood: for how long the robot has been on its feet; share: of the transition to balance;
-#: waited: for how long it has stood to crouch; failing: for how long it is to stop; blind: whether
-#: it gives up in a walk; depth: how much lower the crouch is, m; weight: of the robot, N.
+#: held; stood: for how long the robot has been on its feet; fraction: of the transition to
+#: balance; waited: for how long it has stood to crouch; failing: for how long it is to stop;
+#: blind: whether it gives up in a walk; depth: how much lower the crouch is, m; weight: of the
+#: robot, N.
 STATE = np.dtype([
     *((name, float, 3) for name in ('ages', 'latencies', 'used', 'command')),
     ('tilts', float, (3, 2, 2)), ('doubts', np.int64, 3),
     *((name, float) for name in (
         'stood', 'contrary', 'gap', 'uneven', 'level', 'settles', 'good', 'time', 'waited',
-        'failing', 'share', 'depth', 'weight', 'apart')),
+        'failing', 'fraction', 'depth', 'weight', 'apart')),
     ('falls', np.int64), ('suspect', np.int64),
     *((name, np.bool_) for name in (
         'wanted', 'enabled', 'lowers', 'anew', 'seen', 'failed', 'refused', 'waiting', 'balancing',
@@ -137,7 +138,7 @@ class Watch(NamedTuple):
             not, s, shape (3, joints of all).
         poses: see REST, rad, shape (4, joints).
         goal, position: of the pattern, rad, shape (joints,).
-        places: of the joints of ``robot.order`` among these, shape (joints,).
+        indices: of the joints of ``robot.order`` among these, shape (joints,).
         functions: addresses, see ADVANCE.
         core: address of the pattern's core.
         track: address of the network in the core, shape (1,).
@@ -153,7 +154,7 @@ class Watch(NamedTuple):
     poses: np.ndarray
     goal: np.ndarray
     position: np.ndarray
-    places: np.ndarray
+    indices: np.ndarray
     functions: np.ndarray
     core: int
     track: np.ndarray
@@ -189,7 +190,7 @@ def _doubted(state):
 def _passes(gait, laws):
     """Tell whether the body is over the foot that stands."""
     for leg in range(2):
-        fraction = laws.phases[leg] / swing_share(gait)
+        fraction = laws.phases[leg] / swing_fraction(gait)
         if laws.swinging[leg] and PASSING[0] < fraction < PASSING[1]:
             return True
     return False
@@ -301,16 +302,16 @@ def _lean(rpy):
 
 
 @jit
-def _is_near(joints, rows, pose, places):
+def _is_near(joints, rows, pose, indices):
     """Tell whether the joints of the legs are near a pose, rad."""
     off = 0.0
-    for k in range(len(places)):
-        off = max(off, abs(joints[rows[k]] - pose[places[k]]))
+    for k in range(len(indices)):
+        off = max(off, abs(joints[rows[k]] - pose[indices[k]]))
     return off < NEAR
 
 
 @jit
-def _look(state, lean, near, load, leaps, dt):
+def _ready_to_balance(state, lean, near, load, leaps, dt):
     """Find out how the robot is; return whether it stands on its feet again.
 
     Args:
@@ -361,11 +362,11 @@ def _sense(biped, watch, dt):
     substitutes.fill(biped.links, measured, state, biped.memory, filled, dt)
     sensors = filled.sensors
     near = _is_near(sensors.joint_positions[0], biped.servos.rows,
-                    watch.poses[CROUCH if state.low else REST], watch.places)
+                    watch.poses[CROUCH if state.low else REST], watch.indices)
     load = sensors.foot_forces[0, 0] + sensors.foot_forces[0, 1]
-    if _look(state, _lean(sensors.rpy[0]), near, load, leaps[0], dt):
+    if _ready_to_balance(state, _lean(sensors.rpy[0]), near, load, leaps[0], dt):
         stand_anew(laws, biped.state[0], state.weight, state.depth if state.crouching else 0.0)
-        state.balancing, state.fallen, state.share, state.known = True, False, 0.0, True
+        state.balancing, state.fallen, state.fraction, state.known = True, False, 0.0, True
         if state.crouching:
             # Soles rock while the robot rises.
             state.uneven, state.crouching = -USUAL, False
@@ -408,7 +409,7 @@ def _decide(gait, mode, laws, state, dt):
 
 
 @jit
-def _take_command(velocity, state):
+def _read_command(velocity, state):
     """Fill the commanded velocity, m/s and rad/s, shape (3,); return whether the robot walks."""
     walks = state.enabled and not (state.good < GOOD or state.lowers)
     velocity[:] = state.command
@@ -420,16 +421,16 @@ def _take_command(velocity, state):
 
 
 @jit
-def _go_over(target, start, goal, places, state, dt):
+def _go_over(target, start, goal, indices, state, dt):
     """Fill the goal with angles on the way to those of balance; return False after a fall."""
     for angle in target:
         if not math.isfinite(angle):
             _fall(state)
             return False
-    state.share = min(1.0, state.share + dt / TAKEOVER)
-    for k in range(len(places)):
-        begin = start[places[k]]
-        goal[places[k]] = begin + state.share * (target[k] - begin)
+    state.fraction = min(1.0, state.fraction + dt / TAKEOVER)
+    for k in range(len(indices)):
+        begin = start[indices[k]]
+        goal[indices[k]] = begin + state.fraction * (target[k] - begin)
     return True
 
 
@@ -437,7 +438,7 @@ def _go_over(target, start, goal, places, state, dt):
 def _balance(biped, watch, dt):
     """Fill the goal with the angles that balance requests; return False after a fall."""
     state, own, laws = watch.state[0], biped.state[0], biped.memory.laws[0]
-    own.walks = _take_command(biped.velocities[0], state)
+    own.walks = _read_command(biped.velocities[0], state)
     if state.holds:
         state.holds = False
         watch.poses[START] = watch.position
@@ -445,7 +446,7 @@ def _balance(biped, watch, dt):
     target, soles = biped.servos.positions, biped.memory.pose.soles
     if state.unseen:
         substitutes.replay(watch.stride, laws.phases[0], target)
-    if not _go_over(target, watch.poses[START], watch.goal, watch.places, state, dt):
+    if not _go_over(target, watch.poses[START], watch.goal, watch.indices, state, dt):
         return False
     height = laws.center[0, 2] - min(soles[0, 2], soles[1, 2])
     if height < LOW * (biped.gaits[own.gait].height - laws.crouch):
@@ -465,17 +466,17 @@ def _hold(poses, position, goal, state, dt):
             if abs(pose[k] - start[k]) > JUMP:
                 state.settles = duration + SETTLED
     state.time += dt
-    share, bracing = _smooth(min(state.time / duration, 1.0)), 0.0
+    fraction, bracing = _smooth(min(state.time / duration, 1.0)), 0.0
     if state.crouching and state.braces:
         bracing = _smooth(min(max(2.0 - state.time / LOWER, 0.0), 1.0))
     for k in range(len(pose)):
         end = pose[k] + bracing * poses[BRACED, k]
-        goal[k] = start[k] + share * (end - start[k])
+        goal[k] = start[k] + fraction * (end - start[k])
 
 
 @jit_entry
 def balance(biped, watch, dt):
-    """Take a tick of dt in s; arguments Biped and Watch, changed in place."""
+    """Take a tick of dt in s; arguments BipedArrays and Watch, changed in place."""
     state, own, functions = watch.state[0], biped.state[0], watch.functions
     laws = biped.memory.laws[0]
     if not state.wanted:
@@ -504,17 +505,17 @@ def balance(biped, watch, dt):
     call_at(functions[REACH], watch.core, dt)
     if state.balancing and not (state.unseen and own.mode == WALK and gait.kind == WALKS):
         substitutes.record(watch.stride, own.mode, gait.kind, laws.phases[0], watch.position,
-                           watch.places)
+                           watch.indices)
 
 
 @jit
-def take_measurements(senses, sensors, legs, numbers, rows, watch):
+def read_measurements(senses, sensors, legs, numbers, rows, watch):
     """Check the messages that have come, and fill what a balanced pattern knows of its inputs.
 
     Args:
         senses: Senses of the robot.
         sensors: SensorData of one run, joints as the messages have them; filled.
-        legs: see take_in.
+        legs: see check_inputs.
         numbers: see closed_loop.NOW.
         rows: place of each of these joints in the feedback's order.
         watch: Watch, changed in place.
@@ -523,7 +524,7 @@ def take_measurements(senses, sensors, legs, numbers, rows, watch):
     state, now, measured, inputs = watch.state[0], numbers[NOW], watch.measured, len(senses.news)
     if not state.wanted:
         return
-    take_in(senses, sensors, legs, now, state.enabled)
+    check_inputs(senses, sensors, legs, now, state.enabled)
     failed = waiting = refused = False
     for k in range(inputs):
         monitor = senses.monitors[k]

@@ -101,7 +101,7 @@ class BalancedPattern(Pattern):
 
     def prepare(self, feedback: BipedFeedback) -> None:
         """Prepare to tick with a feedback, which ``balance`` then switches on."""
-        joints, size = len(feedback.order), self.robot.places.size
+        joints, size = len(feedback.order), self.robot.order_indices.size
         rest = self._offset
         (low, depth), (leant, _) = (crouch_pose(self.robot, feedback.biped.links, behind)
                                     or (rest, 0.0) for behind in (0.0, compiled.BEHIND))
@@ -111,7 +111,7 @@ class BalancedPattern(Pattern):
             SensorData.zeros(1, 2, joints), Substitutes.empty(feedback.biped.links),
             LastStride.empty(size), np.zeros((3, joints)),
             np.stack([rest, low, leant - low, self.position]), self._goal, self.position,
-            self.robot.places, addresses('cpg_advance', 'cpg_let_go', 'cpg_reach'),
+            self.robot.order_indices, addresses('cpg_advance', 'cpg_let_go', 'cpg_reach'),
             self._address, self._view('track', np.int64), self._view('stall', float),
             self._record)
         self._feedback, self._advance = feedback, None
@@ -161,7 +161,7 @@ class BalancedPattern(Pattern):
     def apply(self, plan: GaitPlan, transition: float) -> None:
         """Change to a plan; with feedback at once, whatever the transition."""
         if self._feedback is not None and plan.balanced:
-            self._feedback.follow(GaitRunner(plan, SHORTEST))
+            self._feedback.set_gait(GaitRunner(plan, SHORTEST))
             self._know(self._feedback)
         if self.balance is None:
             super().apply(plan, transition)
@@ -234,7 +234,7 @@ class BalancedPattern(Pattern):
             super().advance(dt)
             return
         if self.balance is None:
-            self.take_drift()
+            self.start_drift()
         arguments = self._feedback.biped, self.watch, dt
         if self._advance is None:
             self._advance = specialised(compiled.balance, *arguments)

@@ -119,7 +119,7 @@ class _Ahead:
         """Tell whether the hips are above the knees."""
         self._place(angles)
         hip, knee = self._chain[:2]
-        return bool(self._pose.places[hip, 2] > self._pose.places[knee, 2])
+        return bool(self._pose.origins[hip, 2] > self._pose.origins[knee, 2])
 
     def torques(self, angles: np.ndarray, pairs: Sequence[np.ndarray]) -> np.ndarray:
         """Return what pairs of joints bear at rest on level soles, N m, (angles,), else 0."""

@@ -21,7 +21,7 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped.gains import BipedGains, BipedMemory, GAIT
 from cpg_ros.feedback.biped.links import links_of
-from cpg_ros.feedback.biped.modes import advance, Biped, Servos, SLOTS, STATE, STOPPING
+from cpg_ros.feedback.biped.modes import advance, BipedArrays, ServoArrays, SLOTS, STATE, STOPPING
 from cpg_ros.feedback.biped.stepping import HOPS, RUNS, WALKS
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
@@ -107,11 +107,11 @@ class BipedFeedback:
         chained = (links.chains - 1).ravel().tolist()
         kp, effort = np.array([(body.links[name].kp, body.links[name].effort)
                                for name in robot.order]).T.copy()
-        servos = Servos(rows, np.array([chained.index(row) for row in rows]), kp, effort,
+        servos = ServoArrays(rows, np.array([chained.index(row) for row in rows]), kp, effort,
                         *np.zeros((2, len(rows))))
         state, gaits = (np.zeros(size, kind).view(np.recarray)
                         for size, kind in ((1, STATE), (SLOTS, GAIT)))
-        self.biped = Biped(links, gaits, Arms.of(robot, SLOTS), servos,
+        self.biped = BipedArrays(links, gaits, Arms.of(robot, SLOTS), servos,
                            addresses('cpg_track_advance', 'cpg_track_reseed'),
                            BipedMemory.empty(links), np.zeros((2, 3)), state)
         self.state, self.arms, self.command = state[0], self.biped.arms, self.biped.velocities[1]
@@ -170,7 +170,7 @@ class BipedFeedback:
             if track is not None and track.plan.gait == gait:
                 self._fill(slot, track)
 
-    def follow(self, track: GaitRunner) -> None:
+    def set_gait(self, track: GaitRunner) -> None:
         """Change to the gait of a network that has not moved yet, at its frequency.
 
         Raises:

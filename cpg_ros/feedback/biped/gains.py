@@ -39,18 +39,18 @@ import numpy as np
 STAND, SHIFT, WALK = 0, 1, 2
 
 
-#: What the laws remember; world axes, places from the base unless stated otherwise.
-#: velocity: of the base, m/s; center: of mass, m, then its velocity, m/s; turning: angular
-#: velocity of the base, rad/s; soles: velocities of the soles from the base's, m/s and rad/s;
-#: loads: share of the weight on each foot; wanted: velocity forward and left as it is approached,
-#: m/s; heading: wanted, rad; integral: of the missing speed, m; phases, before: of the legs from
-#: their lift-off on, now and at the last tick, cycles; swinging, landed: whether each leg swings
-#: and has landed early; lift_off: where each swing began, from the other sole, or, in gaits with
-#: flight, from the base, m; target: where it is to end, likewise; ground: height of the ground, m;
-#: fractions: of the weight that each leg is to bear; dcm_error: of the capture point, forward and
-#: left, m; force: that the ground is to exert on all feet, N; reaction: moment that the swing leg
-#: takes, N m; path: of a swinging foot, scratch; clock: factor of the clock, and by how much it is
-#: to leap, cycles; crouch: how much lower than usual the centre of mass is to be, m.
+#: What the laws remember; world axes, places from the base unless stated otherwise. velocity: of
+#: the base, m/s; center: of mass, m, then its velocity, m/s; turning: angular velocity of the
+#: base, rad/s; soles: velocities of the soles from the base's, m/s and rad/s; loads: fraction of
+#: the weight on each foot; wanted: velocity forward and left as it is approached, m/s; heading:
+#: wanted, rad; integral: of the missing speed, m; phases, before: of the legs from their lift-off
+#: on, now and at the last tick, cycles; swinging, landed: whether each leg swings and has landed
+#: early; lift_off: where each swing began, from the other sole, or, in gaits with flight, from the
+#: base, m; target: where it is to end, likewise; ground: height of the ground, m; fractions: of
+#: the weight that each leg is to bear; dcm_error: of the capture point, forward and left, m;
+#: force: that the ground is to exert on all feet, N; reaction: moment that the swing leg takes, N
+#: m; path: of a swinging foot, scratch; clock: factor of the clock, and by how much it is to leap,
+#: cycles; crouch: how much lower than usual the centre of mass is to be, m.
 LAWS = np.dtype([
     *((name, float, shape) for name, shape in (
         ('velocity', 3), ('center', (2, 3)), ('turning', 3), ('soles', (2, 6)), ('loads', 2),

@@ -62,7 +62,7 @@ class Pose(NamedTuple):
 
     Attributes:
         rotations: of each link, shape (joints + 1, 3, 3).
-        places: of the joints' anchors, m, shape (joints + 1, 3).
+        origins: of the joints' anchors, m, shape (joints + 1, 3).
         axes: of the joints, shape (joints + 1, 3).
         carried: mass from each joint on, kg, shape (joints + 1,).
         moments: that mass times the place of its centre, kg m, shape (joints + 1, 3).
@@ -71,7 +71,7 @@ class Pose(NamedTuple):
     """
 
     rotations: np.ndarray
-    places: np.ndarray
+    origins: np.ndarray
     axes: np.ndarray
     carried: np.ndarray
     moments: np.ndarray
@@ -139,7 +139,7 @@ def place(links, rpy, joints, pose):
 
     """
     count = links.masses.size
-    rotations, places, axes = pose.rotations, pose.places, pose.axes
+    rotations, origins, axes = pose.rotations, pose.origins, pose.axes
     rotate(rpy[0], rpy[1], rpy[2], rotations[0])
     for row in range(count):
         before, rotation, at = links.parents[row], rotations[row], links.anchors[row]
@@ -149,7 +149,7 @@ def place(links, rpy, joints, pose):
             off = (at[0] - start[0], at[1] - start[1], at[2] - start[2])
             v = 1.0 - c
             for k in range(3):
-                places[row, k] = places[before, k] + carry(base, off, k)
+                origins[row, k] = origins[before, k] + carry(base, off, k)
                 axes[row, k] = carry(base, u, k)
                 # Rodrigues' formula, times the rotation before, row by row.
                 a, b, d = base[k, 0], base[k, 1], base[k, 2]
@@ -161,7 +161,7 @@ def place(links, rpy, joints, pose):
         off = (center[0] - at[0], center[1] - at[1], center[2] - at[2])
         pose.carried[row] = links.masses[row]
         for k in range(3):
-            pose.moments[row, k] = links.masses[row] * (places[row, k] + carry(rotation, off, k))
+            pose.moments[row, k] = links.masses[row] * (origins[row, k] + carry(rotation, off, k))
     for row in range(count - 1, 0, -1):
         before = links.parents[row]
         pose.carried[before] += pose.carried[row]
@@ -172,20 +172,20 @@ def place(links, rpy, joints, pose):
         at = links.anchors[last]
         off = (sole[0] - at[0], sole[1] - at[1], sole[2] - at[2])
         for k in range(3):
-            pose.soles[leg, k] = places[last, k] + carry(rotations[last], off, k)
+            pose.soles[leg, k] = origins[last, k] + carry(rotations[last], off, k)
 
 
 @jit
 def column(pose, row, point):
     """Return the velocity of a point at a unit speed of a joint before it, m/rad."""
-    at = pose.places[row]
+    at = pose.origins[row]
     return cross(pose.axes[row], (point[0] - at[0], point[1] - at[1], point[2] - at[2]))
 
 
 @jit
 def gravity_torque(pose, row):
     """Return the torque that a joint needs against the weight of all beyond it, N m."""
-    moment, mass, at = pose.moments[row], pose.carried[row], pose.places[row]
+    moment, mass, at = pose.moments[row], pose.carried[row], pose.origins[row]
     lever = (moment[0] - mass * at[0], moment[1] - mass * at[1], 0.0)
     return GRAVITY * cross(pose.axes[row], lever)[2]
 
@@ -206,7 +206,7 @@ def center_velocity(pose, turning, rates, out):
     out[0], out[1], out[2] = cross(turning, (moment[0] / mass, moment[1] / mass,
                                              moment[2] / mass))
     for row in range(1, pose.carried.size):
-        moment, own, at = pose.moments[row], pose.carried[row], pose.places[row]
+        moment, own, at = pose.moments[row], pose.carried[row], pose.origins[row]
         lever = (moment[0] - own * at[0], moment[1] - own * at[1], moment[2] - own * at[2])
         moved = cross(pose.axes[row], lever)
         for k in range(3):

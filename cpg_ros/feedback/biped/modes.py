@@ -55,12 +55,12 @@ STATE = np.dtype([*((name, np.int64) for name in ('mode', 'gait', 'goal', 'reque
                   ('time', float), ('walks', np.bool_), ('ready', np.bool_)])
 
 
-class Servos(NamedTuple):
+class ServoArrays(NamedTuple):
     """The servos of the legs, in ``robot.order``, shape (joints,) each.
 
     Attributes:
         rows: place of each joint among the links'.
-        places: among the legs' torques, leg by leg.
+        indices: among the legs' torques, leg by leg.
         kp: N m/rad.
         effort: N m.
         torques: wanted, N m, within what servos can; filled.
@@ -69,14 +69,14 @@ class Servos(NamedTuple):
     """
 
     rows: np.ndarray
-    places: np.ndarray
+    indices: np.ndarray
     kp: np.ndarray
     effort: np.ndarray
     torques: np.ndarray
     positions: np.ndarray
 
 
-class Biped(NamedTuple):
+class BipedArrays(NamedTuple):
     """The feedback of a biped, as compiled code takes it.
 
     Attributes:
@@ -95,7 +95,7 @@ class Biped(NamedTuple):
     links: Links
     gaits: np.ndarray
     arms: Arms
-    servos: Servos
+    servos: ServoArrays
     functions: np.ndarray
     memory: BipedMemory
     velocities: np.ndarray
@@ -117,7 +117,7 @@ def stand_anew(laws, state, weight, crouch):
 
 
 @jit
-def follow(gaits, functions, state):
+def _accept_request(gaits, functions, state):
     """Want the gait requested last; another frequency of the same gait is taken at once."""
     requested, now = gaits[state.requested], gaits[state.gait]
     same = requested.name == now.name and state.gait == state.goal
@@ -246,7 +246,7 @@ def advance(biped, sensors, dt):
     """Fill where the servos are to be driven.
 
     Args:
-        biped: Biped, changed in place.
+        biped: BipedArrays, changed in place.
         sensors: SensorData of one run, joints in the order of the links.
         dt: since the last time, s.
 
@@ -254,7 +254,7 @@ def advance(biped, sensors, dt):
     gaits, memory, functions, state = biped.gaits, biped.memory, biped.functions, biped.state[0]
     laws = memory.laws[0]
     if state.requested != state.goal:
-        follow(gaits, functions, state)
+        _accept_request(gaits, functions, state)
     if not state.ready:
         laws.heading, state.ready = sensors.rpy[0, 2], True
     _choose(gaits, functions, laws, memory.pose.soles, state, dt)
@@ -272,7 +272,7 @@ def advance(biped, sensors, dt):
                state.mode == WALK and gait.kind == WALKS, dt)
     servos, size = biped.servos, memory.torque.shape[1]
     for k in range(len(servos.kp)):
-        torque, most = memory.torque[servos.places[k] // size, servos.places[k] % size], (
+        torque, most = memory.torque[servos.indices[k] // size, servos.indices[k] % size], (
             servos.effort[k])
         # One that is not a number stays so.
         if abs(torque) > most:

@@ -117,7 +117,7 @@ LATE = 0.6
 
 
 @jit
-def swing_share(gains):
+def swing_fraction(gains):
     """Return the fraction of the stride that a leg swings."""
     return 1.0 - gains.duty
 
@@ -125,7 +125,7 @@ def swing_share(gains):
 @jit
 def time_in_step(phase, gains):
     """Return how long ago the other foot took over, s, by the phase of the leg that swings."""
-    swing = swing_share(gains)
+    swing = swing_fraction(gains)
     if phase >= swing and phase > 0.5 + 0.5 * swing:
         phase -= 1.0
     time = (phase + 0.5 * (gains.duty - 0.5)) / gains.frequency
@@ -133,9 +133,9 @@ def time_in_step(phase, gains):
 
 
 @jit
-def load_shares(phases, landed, gains, fractions):
+def load_fractions(phases, landed, gains, fractions):
     """Fill the fraction of the weight that each leg is to bear; phases from lift-off, cycles."""
-    swing, double = swing_share(gains), max(gains.duty - 0.5, 1e-4)
+    swing, double = swing_fraction(gains), max(gains.duty - 0.5, 1e-4)
     total = 0.0
     for leg in range(2):
         if phases[leg] < swing:
@@ -227,9 +227,9 @@ def foothold(speed, target, side, remaining, gains):
 
 
 @jit
-def stance_share(phase, gains):
+def stance_fraction(phase, gains):
     """Return the fraction of a leg's stance that is over, by its phase from lift-off."""
-    return min(max((phase - swing_share(gains)) / gains.duty, 0.0), 1.0)
+    return min(max((phase - swing_fraction(gains)) / gains.duty, 0.0), 1.0)
 
 
 PLACEMENT_GAINS = {
@@ -335,4 +335,4 @@ def integrate(integral, missing, dt):
 @jit
 def time_to_touchdown(phase, gains):
     """Return when a leg that swings will bear half of the weight, s; phase from lift-off."""
-    return ((swing_share(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency
+    return ((swing_fraction(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency

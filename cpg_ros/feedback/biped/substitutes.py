@@ -90,7 +90,7 @@ class LastStride(NamedTuple):
 
 
 @jit
-def record(stride, mode, kind, phase, position, places):
+def record(stride, mode, kind, phase, position, indices):
     """Keep the command of a tick of a walk.
 
     Args:
@@ -99,15 +99,15 @@ def record(stride, mode, kind, phase, position, places):
         kind: of its gait.
         phase: of the first leg, cycles.
         position: of all joints, rad.
-        places: of the legs' joints among these, in ``robot.order``, shape (joints,).
+        indices: of the legs' joints among these, in ``robot.order``, shape (joints,).
 
     """
     if mode != WALK or kind != WALKS:
         stride.phases[:] = math.inf
         return
     row = stride.row[0]
-    for k in range(len(places)):
-        stride.commands[row, k] = position[places[k]]
+    for k in range(len(indices)):
+        stride.commands[row, k] = position[indices[k]]
     stride.phases[row] = phase
     stride.row[0] = (row + 1) % KEPT
 

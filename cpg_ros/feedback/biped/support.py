@@ -36,7 +36,7 @@ import numpy as np
 VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
                                         'in which the soles that stand correct the '
                                "accelerometer's velocity")}
-#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, shares of the
+#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, fractions of the
 #: weight.
 FROM, OVER = 0.06, 0.18
 #: SLIP: speed of a sole at which it counts half, m/s; ROLL: angular speed with the same effect,
@@ -52,7 +52,7 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
         turn: rotation of the base, shape (3, 3).
         acceleration: as an accelerometer measures it, m/s^2, shape (3,).
         soles: velocities of the soles relative to the base, m/s and rad/s, shape (2, 6).
-        loads: share of the weight on each foot, shape (2,).
+        loads: fraction of the weight on each foot, shape (2,).
         dt: since the last time, s.
         gains: BipedGains.
         velocity: changed.
@@ -109,7 +109,7 @@ class Arms(NamedTuple):
         rest: where they are held, rad, shape (joints,), in the order of the robot file.
         swings: how far they go from there, rad, the same.
         cells: index of the cell of each, the same.
-        places: index of that variable in the state of each gait's network, shape (gaits, joints).
+        indices: index of that variable in the state of each gait's network, shape (gaits, joints).
         middle, half: of its range, the same.
         waves: of the variables, -1 to 1, shape (joints,).
         level: 0 at rest to 1 in full swing, shape (1,).
@@ -120,7 +120,7 @@ class Arms(NamedTuple):
     rest: np.ndarray
     swings: np.ndarray
     cells: np.ndarray
-    places: np.ndarray
+    indices: np.ndarray
     middle: np.ndarray
     half: np.ndarray
     waves: np.ndarray
@@ -141,10 +141,10 @@ class Arms(NamedTuple):
         """Read the cells of a gait, in a place among the gaits, from its own orbit."""
         orbit = plan.orbit
         network = orbit.network
-        places = self.cells + network.cells * (len(network.states) - 1)
-        waves = orbit(np.arange(SAMPLES) / SAMPLES * orbit.period)[:, places]
+        indices = self.cells + network.cells * (len(network.states) - 1)
+        waves = orbit(np.arange(SAMPLES) / SAMPLES * orbit.period)[:, indices]
         low, high = waves.min(axis=0), waves.max(axis=0)
-        self.places[slot], self.middle[slot] = places, 0.5 * (low + high)
+        self.indices[slot], self.middle[slot] = indices, 0.5 * (low + high)
         self.half[slot] = 0.5 * (high - low)
 
 
@@ -163,7 +163,7 @@ def swing_arms(arms, slot, state, moving, dt):
     arms.level[0] = min(max(arms.level[0] + (dt if moving else -dt) / RISE, 0.0), 1.0)
     for k in range(len(arms.rest)):
         if state:
-            value = number_at(state + 8 * arms.places[slot, k])
+            value = number_at(state + 8 * arms.indices[slot, k])
             arms.waves[k] = (value - arms.middle[slot, k]) / arms.half[slot, k]
         target = arms.rest[k] + arms.level[0] * arms.swings[k] * arms.waves[k]
         arms.positions[k] += min(max(target - arms.positions[k], -FASTEST * dt), FASTEST * dt)
@@ -187,7 +187,8 @@ STANCE_GAINS = {
     'cop_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
     'stand': Gain(2.5, 10.0, '', 'centre of pressure by the capture point while standing'),
     'stance_damping': Gain(1.63, 20.0, 'N m s/rad', 'of the joints of a leg that stands'),
-    'reaction': Gain(0.0032, 1.5, '', "share of the swing leg's moment that the stance leg gives"),
+    'reaction': Gain(0.0032, 1.5, '',
+                     "fraction of the swing leg's moment that the stance leg gives"),
     'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
     'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
     'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}

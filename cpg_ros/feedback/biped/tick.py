@@ -67,23 +67,23 @@ def _approach(gains, memory, command, dt):
 def _follow_clock(gains, memory, kind):
     """Let legs lift off and land by their phases, and early by the load on them."""
     laws = memory.laws[0]
-    soles, swing_share = memory.pose.soles, stepping.swing_share(gains)
+    soles, swing_fraction = memory.pose.soles, stepping.swing_fraction(gains)
     laws.clock[1] = 0.0
     for leg in range(2):
         phase = laws.phases[leg]
-        if phase < swing_share and not laws.swinging[leg]:
+        if phase < swing_fraction and not laws.swinging[leg]:
             laws.swinging[leg], laws.landed[leg] = True, False
             for k in range(3):
                 laws.lift_off[leg, k] = soles[leg, k] - (
                     soles[1 - leg, k] if kind == stepping.WALKS else 0.0)
-        if phase >= swing_share and laws.swinging[leg]:
+        if phase >= swing_fraction and laws.swinging[leg]:
             laws.swinging[leg] = laws.landed[leg] = False
         if (laws.swinging[leg] and not laws.landed[leg]
-                and phase > stepping.LATE * swing_share
+                and phase > stepping.LATE * swing_fraction
                 and laws.loads[leg] > gains.touchdown):
             laws.landed[leg] = True
-            laws.clock[1] = max(laws.clock[1], swing_share - phase)
-    stepping.load_shares(laws.phases, laws.landed, gains, laws.fractions)
+            laws.clock[1] = max(laws.clock[1], swing_fraction - phase)
+    stepping.load_fractions(laws.phases, laws.landed, gains, laws.fractions)
 
 
 @jit
@@ -136,7 +136,7 @@ def _fly(links, gains, memory, axes, kind, dt):
     soles, base, phases, (c, s) = memory.pose.soles, laws.velocity, laws.phases, axes
     center, velocity, fractions = laws.center[0], laws.center[1], laws.fractions
     for leg in range(2):
-        fractions[leg] = 1.0 if phases[leg] >= stepping.swing_share(gains) else 0.0
+        fractions[leg] = 1.0 if phases[leg] >= stepping.swing_fraction(gains) else 0.0
     total = fractions[0] + fractions[1]
     if total > 1.5:
         fractions[0] = fractions[1] = 0.5
@@ -152,7 +152,7 @@ def _fly(links, gains, memory, axes, kind, dt):
         if laws.swinging[leg]:
             for k in range(3):
                 laws.lift_off[leg, k] -= dt * base[k]
-            remaining = (stepping.swing_share(gains) - phases[leg]) / gains.frequency
+            remaining = (stepping.swing_fraction(gains) - phases[leg]) / gains.frequency
             ahead, left = stepping.foothold(speed, target, links.sides[leg], remaining,
                                             gains)
             laws.target[leg, 0] = center[0] + c * ahead - s * left
@@ -174,7 +174,7 @@ def _upward(gains, memory, mass, mode, kind, level):
     if fractions[0] + fractions[1] < 0.5:
         return 0.0
     leads = 0 if fractions[0] >= fractions[1] else 1
-    return stepping.upward_force(stepping.stance_share(laws.phases[leads], gains), kind,
+    return stepping.upward_force(stepping.stance_fraction(laws.phases[leads], gains), kind,
                                center - laws.ground, rise, mass, gains)
 
 
@@ -220,8 +220,8 @@ def _swing(links, gains, memory, leg, kind):
     """Add the torques of a leg that swings, and its reaction moment on the body, N m."""
     laws = memory.laws[0]
     pose, other, way = memory.pose, 1 - leg, laws.path
-    duration = stepping.swing_share(gains) / gains.frequency
-    fraction = min(max(laws.phases[leg] / stepping.swing_share(gains), 0.0), 1.0)
+    duration = stepping.swing_fraction(gains) / gains.frequency
+    fraction = min(max(laws.phases[leg] / stepping.swing_fraction(gains), 0.0), 1.0)
     stepping.path(fraction, duration, laws.lift_off[leg], laws.target[leg], gains, way)
     foot, still, moving = pose.soles[leg], pose.soles[other], laws.soles[leg]
     if kind == stepping.WALKS:

@@ -145,7 +145,7 @@ class FootContacts(ShortRepr):
 FALLS, GRAVITY, NEVER, OFTEN, HARMONICS = 0.7, 9.81, 0.02, 0.1, 6
 
 
-def falling_share(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
+def falling_fraction(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
     """Return the fraction of a stride in which a body falls freely, without a foot on the ground.
 
     Args:

@@ -172,12 +172,12 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
             variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
                                           - sum(mean * mean for mean in means), least)
         total = _summed(sum((column[lag:] - column[:-lag])**2 for column in columns))
-        places = total.size - window
-        inside = np.arange(places) + (window - width) // 2
+        count = total.size - window
+        inside = np.arange(count) + (window - width) // 2
         # The smaller of both: standing before a step is not like the step.
         both = np.minimum(variances[width][inside], variances[width][inside + lag])
         middle = (lag + window) // 2
-        row[middle:middle + places] = (total[window:] - total[:-window]) / window / (2.0 * both)
+        row[middle:middle + count] = (total[window:] - total[:-window]) / window / (2.0 * both)
     variance = np.zeros(n)
     if lags.size:
         width = max(variances)

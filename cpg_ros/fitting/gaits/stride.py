@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.fitting.gaits.foot_contacts import (
-    falling_share,
+    falling_fraction,
     foot_contacts,
     FootContacts,
 )
@@ -341,7 +341,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
-    gait = walk_or_run(gait, contacts, None if body is None else falling_share(
+    gait = walk_or_run(gait, contacts, None if body is None else falling_fraction(
         phases, body[inside][:, 2], warp.frequency))
     if known:
         gait = replace(gait, probability=1.0)

@@ -237,7 +237,7 @@ class CycleProblem:
         residual = self.best_readouts(values).residual
         return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - self.weights))
 
-    def stance_share(self, values: np.ndarray) -> float:
+    def stance_fraction(self, values: np.ndarray) -> float:
         """Return the fraction of the stride that the leg of the first joint stands."""
         duty = self.duty(values)
         if duty is not None:

@@ -37,9 +37,9 @@ from scipy.special import stdtrit
 
 #: QUANTILE: half the width of a 95 % interval, standard errors.
 QUANTILE = 1.959964
-#: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; SHARE:
+#: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; FRACTION:
 #: component of a number in such a direction above which the number is not determined.
-ZERO, SHARE = 1e-7, 1e-3
+ZERO, FRACTION = 1e-7, 1e-3
 #: CURVED: half width of an interval, over the value, above which costs are not taken for
 #: quadratic; STEPS: most steps to the end of such an interval; CLOSE: relative tolerance there;
 #: FURTHER: length of a step over that of the last one, at most; SHORT: what a step that meets the
@@ -119,7 +119,7 @@ class Spread(ShortRepr):
         """Standard errors, shape (n,); infinite for numbers that are not determined."""
         errors = np.sqrt(np.diag(self.covariance))
         if len(self.blind):
-            errors[np.abs(self.blind).max(axis=0) > SHARE] = np.inf
+            errors[np.abs(self.blind).max(axis=0) > FRACTION] = np.inf
         return errors
 
     @property

@@ -95,16 +95,17 @@ def stride_curves(result: RecordingFit) -> Figure:
     for leg, name, mean, spread in curves:
         panels.setdefault(role_of(name) or name, []).append((leg, mean, spread))
     figure, grid = _grid(max(1, len(panels)), 2.2)
-    legs, share = list(result.stride.phases), np.linspace(0.0, 100.0, len(result.stride.theta) + 1)
+    legs = list(result.stride.phases)
+    percent = np.linspace(0.0, 100.0, len(result.stride.theta) + 1)
     for axes, (role, own) in zip(grid, panels.items(), strict=False):
         for leg, *rows in own:
             # The end of the stride is its begin.
             mean, spread = (np.append(row, row[0]) for row in rows)
             color = LINES[legs.index(leg) % len(LINES)]
             if result.stride.cycles > 1:
-                axes.fill_between(share, mean - spread, mean + spread, color=color, alpha=0.2,
+                axes.fill_between(percent, mean - spread, mean + spread, color=color, alpha=0.2,
                                   linewidth=0.0)
-            axes.plot(share, mean, color=color, linewidth=1.4, label=leg)
+            axes.plot(percent, mean, color=color, linewidth=1.4, label=leg)
         axes.set_title(role, fontsize=9, loc='left')
         axes.set_ylabel('angle [deg]', fontsize=8)
         axes.set_xlabel('stride [%]', fontsize=8)
@@ -132,10 +133,10 @@ def phases(result: RecordingFit) -> Figure:
                                'markerfacecolor': 'none', 'label': result.fit.gait})]
         for value, style in marks:
             # Draw a phase near the seam on both sides of it.
-            places = [] if value is None else [
+            copies = [] if value is None else [
                 at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)
                 if -SEAM <= at <= 1.0 + SEAM]
-            for at in places:
+            for at in copies:
                 axes.plot(at, height, linestyle='none', **style)
     for seam in (0.0, 1.0):
         axes.axvline(seam, color=BAND, linewidth=1.0)
@@ -238,7 +239,7 @@ def _minima(result: RecordingFit) -> str:
         for trial in fit.minima) + '.'
 
 
-def _judged(result: RecordingFit) -> list[str]:
+def _stability(result: RecordingFit) -> list[str]:
     fit = result.fit
     lines = []
     if fit.hopf is not None:
@@ -255,7 +256,7 @@ def _judged(result: RecordingFit) -> list[str]:
     return lines
 
 
-def _shares(result: RecordingFit) -> str:
+def _order_errors(result: RecordingFit) -> str:
     return 'Mean RMS error over range by order of the readout: ' + ', '.join(
         f'{order}: {100 * fraction:.2f} %'
         for order, fraction in result.fit.fractions.items()) + '.'
@@ -268,10 +269,10 @@ def as_text(result: RecordingFit) -> str:
     lines = [*_stride(result), '', *table(stride_report.gait_summary(result, legs), '<>'), '',
              *table(stride_report.ranges(result), '<>>>>'), '',
              *table(parameters(result), '<>>'), '',
-             *table(joints(result), '<>>>'), _shares(result), '']
+             *table(joints(result), '<>>>'), _order_errors(result), '']
     if len(result.fit.starts) > 1:
         lines += [*table(starts(result), '<>>'), _minima(result), '']
-    lines += [*_judged(result), *(f'note: {note}' for note in notes),
+    lines += [*_stability(result), *(f'note: {note}' for note in notes),
               *(f'warning: {warning}' for warning in result.warnings)]
     return '\n'.join(lines)
 
@@ -338,8 +339,8 @@ def as_html(result: RecordingFit) -> str:
     title = f'{result.fit.gait} at {result.stride.frequency:.3f} Hz: {result.recording.source}'
     parts = [_warned(result), paragraphs(_stride(result)), *_strides(result),
              '<h2>Parameters</h2>',
-             _html_table(parameters(result)), paragraphs(_judged(result)), '<h2>Joints</h2>',
-             paragraphs([_shares(result)]), _html_table(joints(result))]
+             _html_table(parameters(result)), paragraphs(_stability(result)), '<h2>Joints</h2>',
+             paragraphs([_order_errors(result)]), _html_table(joints(result))]
     for name, draw in FIGURES:
         parts += [f'<h2>{escape(name)}</h2>', _image(draw(result), name)]
     parts += ['<h2>Starts</h2>', _html_table(starts(result)), paragraphs([_minima(result)])]

@@ -28,8 +28,8 @@ from cpg_ros.fitting.inversion.free_parameters import Free, TINY
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
 
-#: SHARES: names of free numbers that are the stance's fraction of a stride.
-SHARES = (GAIT_DUTY, 'duty')
+#: DUTY_NAMES: names of free numbers that are the stance's fraction of a stride.
+DUTY_NAMES = (GAIT_DUTY, 'duty')
 #: DUTIES: values of the gait's duty that are tried.
 DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)
 #: LATE: delays that are tried, over the critical one; PLACES: places in a narrow range, whose ends
@@ -100,7 +100,7 @@ def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
     With a free readout, an inverted waveform gives the same motion with stance and swing
     exchanged.
     """
-    fractions = [k for k, parameter in enumerate(problem.free) if parameter.name in SHARES]
+    fractions = [k for k, parameter in enumerate(problem.free) if parameter.name in DUTY_NAMES]
     if not fractions:
         return None
     there = values.copy()

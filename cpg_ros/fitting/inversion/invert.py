@@ -32,11 +32,11 @@ from cpg_ros.fitting.inversion.fit import (
     Estimate,
     estimates,
     Fit,
+    FRACTION,
     mean_share,
     model_error,
     ModelError,
     QUANTILE,
-    SHARE,
     Spread,
     spread,
 )
@@ -57,7 +57,7 @@ from cpg_ros.fitting.inversion.leg_duty import (
     GAIT_DUTY,
     GaitReadout,
 )
-from cpg_ros.motion.plan import refusal
+from cpg_ros.motion.plan import validate_orbit
 from cpg_ros.motion.readout import LEAST, MOST
 from cpg_ros.networks.network import Network
 import numpy as np
@@ -98,7 +98,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
             "counts as the network's motion, and is not known; ") + '; '.join(clauses))
     for row in spread.blind:
         blind = [estimate.name for estimate,
-                 fraction in zip(free, row, strict=False) if abs(fraction) > SHARE]
+                 fraction in zip(free, row, strict=False) if abs(fraction) > FRACTION]
         if len(blind) == 1:
             lines.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
         elif blind:
@@ -199,18 +199,18 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     values = _weighed(problem, best.values)
     problem.hold(values)
     values, others, turned = _preferred(problem, values, trials)
-    runs, flaw = _that_runs(problem, [values, *others], best.path[:, 1:])
+    runs, reason = _that_runs(problem, [values, *others], best.path[:, 1:])
     warnings = [] if problem.readout.weights else [
         'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
             f'{free.name} {value:.4g}' for free,
             value in zip(problem.free, candidate, strict=False))
         + ' fits as well, all joints reversed' for candidate in turned]
-    if flaw:
-        warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
+    if reason:
+        warnings += [f'the generator would refuse the {gait} that fits best: {reason}' + (
             '' if runs is None else '; using the best fit that the generator can run')]
     done(0.6)
-    fit = _judged(problem, trials, others, values if runs is None else runs,
-                  straight or bool(flaw), warnings)
+    fit = _fit_at(problem, trials, others, values if runs is None else runs,
+                  straight or bool(reason), warnings)
     done(1.0)
     return fit
 
@@ -328,7 +328,7 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
 
     def meant(there: np.ndarray) -> float:
         agrees = problem.readout.agreement(problem.joints.names, readouts(there))
-        return agrees or problem.stance_share(there)
+        return agrees or problem.stance_fraction(there)
 
     candidates, least = [values], problem.cost(values)
     for trial in trials:
@@ -375,30 +375,30 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
         way: the values from the start on, shape (steps, values).
 
     """
-    def flaw_at(values: np.ndarray) -> str:
+    def reason_at(values: np.ndarray) -> str:
         try:
-            return refusal(problem.best_readouts(values).orbit, problem.gait,
+            return validate_orbit(problem.best_readouts(values).orbit, problem.gait,
                            problem.readout.harmonics)
         except NoOrbit as error:
             return str(error)
 
-    first = flaw_at(by_cost[0])
+    first = reason_at(by_cost[0])
     if not first:
         return by_cost[0], ''
     for values in by_cost[1:]:
-        if not flaw_at(values):
+        if not reason_at(values):
             return values, first
-    places = [*way, by_cost[0]]
-    runs, refused = 0, len(places) - 1
-    if flaw_at(places[0]):
+    trail = [*way, by_cost[0]]
+    runs, refused = 0, len(trail) - 1
+    if reason_at(trail[0]):
         return None, first
     while refused - runs > 1:
         middle = (runs + refused) // 2
-        runs, refused = (runs, middle) if flaw_at(places[middle]) else (middle, refused)
-    here, beyond = places[runs], places[refused]
+        runs, refused = (runs, middle) if reason_at(trail[middle]) else (middle, refused)
+    here, beyond = trail[runs], trail[refused]
     for _ in range(HALVINGS):
         between = 0.5 * (here + beyond)
-        here, beyond = (here, between) if flaw_at(between) else (between, beyond)
+        here, beyond = (here, between) if reason_at(between) else (between, beyond)
     here = problem.rephased(here)
     problem.hold(here)
     return here, first
@@ -456,7 +456,7 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
     return lines
 
 
-def _judged(problem: CycleProblem, trials: Sequence[Minimisation], others: Sequence[np.ndarray],
+def _fit_at(problem: CycleProblem, trials: Sequence[Minimisation], others: Sequence[np.ndarray],
             values: np.ndarray, straight: bool, warnings: Sequence[str]) -> Fit:
     """Return the fit at values, with its uncertainties."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)

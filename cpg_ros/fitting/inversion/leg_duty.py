@@ -91,14 +91,14 @@ class OwnStance(NamedTuple):
     Attributes:
         begin: phase of the cell, cycles.
         fraction: of the stride.
-        d_begin, d_share: shape (parameters,).
+        d_begin, d_fraction: shape (parameters,).
 
     """
 
     begin: float
     fraction: float
     d_begin: np.ndarray
-    d_share: np.ndarray
+    d_fraction: np.ndarray
 
 
 def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
@@ -150,9 +150,9 @@ def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
         Phases, their derivatives by the free numbers, (..., numbers), and by theta.
 
     """
-    d_begin, d_share = own.d_begin @ members, own.d_share @ members
+    d_begin, d_fraction = own.d_begin @ members, own.d_fraction @ members
     k = math.tan(0.5 * math.pi * own.fraction) / math.tan(0.5 * math.pi * duty)
-    d_k = k * math.pi * (d_share / math.sin(math.pi * own.fraction)
+    d_k = k * math.pi * (d_fraction / math.sin(math.pi * own.fraction)
                          - of_duty / math.sin(math.pi * duty))
     angle = math.pi * (theta - (own.begin + 0.5 * duty + ahead))
     s, c = np.sin(angle), np.cos(angle)
@@ -160,5 +160,5 @@ def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
     steep = k / size
     phases = own.begin + 0.5 * own.fraction + ahead + np.arctan2(k * s, c) / math.pi
     moved = (np.multiply.outer(s * c / size / math.pi, d_k)
-             - np.multiply.outer(steep, d_begin + 0.5 * of_duty) + d_begin + 0.5 * d_share)
+             - np.multiply.outer(steep, d_begin + 0.5 * of_duty) + d_begin + 0.5 * d_fraction)
     return phases, moved, steep

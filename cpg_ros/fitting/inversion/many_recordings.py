@@ -90,7 +90,7 @@ def read(path: Path, settings: FitSettings) -> Recording:
     return read_recording(
         path, kind.name, progress=False,
         robot_joints=robot.order if robot else (),
-        **{name: value for name, value in settings.reading.items() if not kind.refusal(name)})
+        **{name: value for name, value in settings.reading.items() if not kind.validate(name)})
 
 
 def invert_recording(task: Task) -> dict[str, Any]:

@@ -113,9 +113,9 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
-        shares = rms_shares(others[rows], fit.fitted - others[rows])
-        fractions = {name: share for name, share in zip(fit.joints, shares.tolist(), strict=True)
-                     if np.isfinite(share)}
+        rms = rms_shares(others[rows], fit.fitted - others[rows])
+        fractions = {name: value for name, value in zip(fit.joints, rms.tolist(), strict=True)
+                     if np.isfinite(value)}
         comparisons.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
             free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=fractions))

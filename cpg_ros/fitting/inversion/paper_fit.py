@@ -77,8 +77,8 @@ def cycle_samples(orbit: Orbit, theta: np.ndarray) -> tuple[np.ndarray, np.ndarr
         States (samples, cells), and their derivatives (samples, cells, parameters).
 
     """
-    places = np.asarray(theta, dtype=float)[:, None] + orbit.phases
-    return orbit.waveform(places), orbit.d_waveform(places)
+    cycles = np.asarray(theta, dtype=float)[:, None] + orbit.phases
+    return orbit.waveform(cycles), orbit.d_waveform(cycles)
 
 
 def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,

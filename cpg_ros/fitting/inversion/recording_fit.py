@@ -33,7 +33,7 @@ from cpg_ros.fitting.recordings.recording import (
     Recording,
     repeat_stride,
 )
-from cpg_ros.motion.plan import refusal
+from cpg_ros.motion.plan import validate_orbit
 from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.network import Network, other_gait, Preset
 from cpg_ros.networks.registry import (
@@ -116,14 +116,14 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
         except NoOrbit as error:
             first = first or str(error)
             continue
-        flaw = refusal(fit.orbit, gait, fit.harmonics)
-        if not flaw:
+        reason = validate_orbit(fit.orbit, gait, fit.harmonics)
+        if not reason:
             return fit, (*notes, *((f'not fitted as asked for: {first}; {relaxation} instead',)
                                    if relaxation else ()))
-        first = first or f'the generator would refuse the {gait} that fits best: {flaw}'
+        first = first or f'the generator would refuse the {gait} that fits best: {reason}'
     fit = _as_it_is(cycle, cells, network, gait, order, readout, done)
-    if flaw := refusal(fit.orbit, gait, fit.harmonics):
-        raise NoOrbit(f'{first}; nor does the generator run the parameters given: {flaw}')
+    if reason := validate_orbit(fit.orbit, gait, fit.harmonics):
+        raise NoOrbit(f'{first}; nor does the generator run the parameters given: {reason}')
     return fit, (f'not fitted as asked for: {first}; the parameters stay those of the preset, '
                  'only the readouts are fitted',)
 

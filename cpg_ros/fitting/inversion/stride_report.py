@@ -286,11 +286,11 @@ def gait_summary(result: RecordingFit, legs: list[LegStrides]) -> Rows:
         ('stride rate [strides/min]', f'{60.0 * stride.frequency:.1f}'),
         ('stride time [s]', f'{1.0 / stride.frequency:.3f}{scatter}')]
     for leg in legs:
-        share = 100.0 * leg.fractions
-        if len(share) and np.isfinite(share).all():
+        percent = 100.0 * leg.fractions
+        if len(percent) and np.isfinite(percent).all():
             names = ('stance', 'swing') if leg.by_contacts else ('retraction', 'protraction')
             rows += [(f'{name} of {leg.leg} [% of stride]', f'{value:.1f}') for name, value in zip(
-                names, (share.mean(), 100.0 - share.mean()), strict=True)]
+                names, (percent.mean(), 100.0 - percent.mean()), strict=True)]
         else:
             rows.append((f'retraction of {leg.leg} [% of stride]', 'cannot tell'))
     if contacts is None:

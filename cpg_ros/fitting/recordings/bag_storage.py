@@ -138,8 +138,8 @@ class Bag:
     def choose(self, topics: Sequence[str]) -> list[str]:
         """Return the topics to read."""
         types: dict[str, set[str]] = {}
-        for one in self.connections:
-            types.setdefault(one.topic, set()).add(one.msgtype)
+        for connection in self.connections:
+            types.setdefault(connection.topic, set()).add(connection.msgtype)
         if not types:
             raise RecordingError(f'{self.path}: an empty bag, without topics')
         fitting = [topic for topic in types if types[topic] == {JOINT_STATE}]
@@ -156,7 +156,7 @@ class Bag:
         for topic in topics:
             name = topic if topic in types else '/' + topic.strip('/')
             resolved += [name] if name in types else [
-                one for one in fitting if one.startswith(f'{name}/')] or [name]
+                name_of for name_of in fitting if name_of.startswith(f'{name}/')] or [name]
         for topic in resolved:
             if topic not in types:
                 raise RecordingError(f'{self.path}: no topic {topic!r}; '

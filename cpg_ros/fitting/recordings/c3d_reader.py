@@ -86,16 +86,16 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
 def _point(parameters: Any, first: int) -> dict[str, Any]:
     """Return the values of the parameters of points and events that are used."""
     keys = ('RATE', 'LABELS', 'ANGLES', 'ANGLE_UNITS', 'UNITS')
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         key: [value if isinstance(value, str) else float(value) for value in entry['value']]
         for key, entry in parameters['POINT'].items() if key.startswith(keys)}
     if 'EVENT' in parameters:
         known = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
                  if key in parameters['EVENT']}
         minutes, seconds = np.asarray(known.pop('TIMES', np.zeros((2, 0)))).reshape(2, -1)
-        found['EVENT'] = {**known, 'TIMES': (60.0 * minutes + seconds
-                                             - first / found['RATE'][0]).tolist()}
-    return found
+        result['EVENT'] = {**known, 'TIMES': (60.0 * minutes + seconds
+                                             - first / result['RATE'][0]).tolist()}
+    return result
 
 
 def c3d_arrays(path: str) -> dict[str, Any]:
@@ -120,7 +120,7 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
             begin with the letter of the side, LHS.
 
     """
-    found = []
+    events = []
     labels = events.get('LABELS', ())
     sides = [*events.get('CONTEXTS', ()), *[''] * len(labels)]
     for label, side, time in zip(labels, sides, events.get('TIMES', ()), strict=False):
@@ -128,8 +128,8 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
         if leg not in ('left', 'right'):
             leg, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
         if leg and name in STRIKE + OFF:
-            found.append((leg, time, name in STRIKE))
-    return found
+            events.append((leg, time, name in STRIKE))
+    return events
 
 
 def c3d_markers(path: str | Path) -> Markers:
@@ -166,11 +166,11 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
     labels = labels[:count]
     if len(labels) != count:
         raise RecordingError(f'{path}: {len(labels)} labels for {pluralize(count, "point")}')
-    places = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
+    coordinates = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
     notes = ([f'{pluralize(frames, "frame")}, where the header states {stated}: it may be cut']
              if frames < stated else [])
-    names, doubles = marker_names(labels, places)
-    markers = Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
+    names, doubles = marker_names(labels, coordinates)
+    markers = Markers(names, stamps_of_frames(np.arange(frames), rate, path), coordinates, path,
                     notes=(*notes, *doubles),
                     unit=UNITS.get(''.join(map(str, point.get('UNITS', ['']))), math.nan))
     subjects = {name.rpartition(':')[2] for name in angles}
@@ -194,9 +194,9 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     if scale is None:
         raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
     names = matching(joints, angles, str(source))
-    places = points.points[:, [points.names.index(name) for name in names]]
+    coordinates = points.points[:, [points.names.index(name) for name in names]]
     # Some programs write zeros where a model had no value.
-    first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
+    first = np.where((coordinates == 0.0).all(axis=2), np.nan, scale * coordinates[..., 0])
     silent = [name for k, name in enumerate(names) if not np.isfinite(first[:, k]).any()]
     if silent and (joints or len(silent) == len(names)):
         raise RecordingError(f'{source}: no value of {abbreviate(silent)}')

@@ -163,13 +163,13 @@ class _Layout:
         for name in self.names:
             text(name)
         #: Field -> where its numbers are, and how many.
-        self.places: dict[str, tuple[int, int]] = {}
+        self.spans: dict[str, tuple[int, int]] = {}
         for which in FIELDS:
             number()
             count = len(getattr(message, which))
             if count:
                 end += (HEADER - end) % 8
-            self.places[which] = end, count
+            self.spans[which] = end, count
             end += 8 * count
         # Bytes are compared as words of four, which all of these but the first fill or pad.
         words = self.length // 4
@@ -195,4 +195,4 @@ class _Layout:
         nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
         return seconds * 10**9 + nanoseconds, [
             self._array(joined, self.order + 'f8', place, count if which in fields else 0)
-            .astype(np.float64) for which, (place, count) in self.places.items()]
+            .astype(np.float64) for which, (place, count) in self.spans.items()]

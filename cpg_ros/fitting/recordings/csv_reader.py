@@ -69,8 +69,8 @@ NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
 #: NAMED, VALUE: columns of names and of values in a table with a line for each value.
 NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
 VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
-#: SHARE: column of a stride's phase from 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
-SHARE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
+#: CYCLE: column of a stride's phase from 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
+CYCLE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
 #: POSITION: columns of joints among others: 'JointPosFR_hip', or in PlotJuggler's way
 #: '/joint_states/lf_knee/position'.
 POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
@@ -161,7 +161,7 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
             recording = merged(chunks(), printable(str(path)),
                                [column.joint for column in table.columns])
     return replace(recording, notes=(*dict.fromkeys(table.notes), *recording.notes),
-                   cycle=np.nan if table.shares else 0.0,
+                   cycle=np.nan if table.in_percent else 0.0,
                    loads=table.foot_loads(recording.start, recording.times[-1]))
 
 
@@ -307,7 +307,7 @@ class _Table:
 
     def _time(self, headers: list[str], option: str | None) -> Column:
         """Find the time column, or the column of seconds beside one of nanoseconds."""
-        self.rest, self.shares = -1, False
+        self.rest, self.in_percent = -1, False
         names, units = zip(*map(split, headers), strict=True)
 
         def called(kind: re.Pattern[str]) -> list[int]:
@@ -320,10 +320,10 @@ class _Table:
         if len(candidates) != 1 and len(seconds) == len(nanoseconds) == 1:
             self.rest = nanoseconds[0]
             return Column(seconds[0], headers[seconds[0]], '', 1.0)
-        shares = [k for k in called(SHARE) if units[k] in (None, '%')]
-        if not candidates and len(shares) == 1:
-            self.shares = True
-            return Column(shares[0], headers[shares[0]], '', 0.01)
+        in_percent = [k for k in called(CYCLE) if units[k] in (None, '%')]
+        if not candidates and len(in_percent) == 1:
+            self.in_percent = True
+            return Column(in_percent[0], headers[in_percent[0]], '', 0.01)
         candidates = candidates or [(k, None) for k in called(RECEIPT)[:1]]
         if len(candidates) != 1:
             raise RecordingError(
@@ -449,7 +449,7 @@ def _lines_before_header(head: Sequence[str]) -> int:
     for k, line in enumerate(head):
         cells = [split(cell.strip())[0] for cell in line.lstrip('#').strip().split(
             max(DELIMITERS, key=line.count))]
-        if len(cells) > 1 and any(kind.match(cell) for kind in (TIME, RECEIPT, SECONDS, SHARE)
+        if len(cells) > 1 and any(kind.match(cell) for kind in (TIME, RECEIPT, SECONDS, CYCLE)
                                   for cell in cells):
             return k
     return 0

@@ -45,7 +45,7 @@ from cpg_ros.fitting.recordings.recording import (
 
 #: FORMATS: name -> format. To add one, write a file like those of the others and name it here.
 FORMATS: dict[str, RecordingFormat] = {
-    one.name: one for one in (BAG, CSV, MOT, TRC, C3D, POSE, BVH, NPZ)}
+    kind.name: kind for kind in (BAG, CSV, MOT, TRC, C3D, POSE, BVH, NPZ)}
 
 
 def reading_options() -> list[Option]:
@@ -108,7 +108,7 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     given = {name: value for name, value in options.items() if value is not None and value != ()
              and value != []}
     for name in given:
-        if why := args.refusal(name):
+        if why := args.validate(name):
             raise InputError(f'{path}: option {name}: {why}')
     if robot_joints and 'joints' not in given and 'some' in args.features:
         given |= {'joints': robot_joints, 'some': True}
@@ -158,9 +158,9 @@ def check_reading_options(args: Namespace) -> None:
     """
     if name := chosen_format(args):
         for option in reading_options():
-            if getattr(args, option.name) and (why := FORMATS[name].refusal(option.name)):
+            if getattr(args, option.name) and (why := FORMATS[name].validate(option.name)):
                 raise InputError(f'argument --{option.name}: {why}')
-        if args.kp is not None and (why := FORMATS[name].refusal('servo')):
+        if args.kp is not None and (why := FORMATS[name].validate('servo')):
             raise InputError(f'argument --kp: {why}')
     if args.kp is None and args.kd is not None:
         raise InputError('argument --kd: without --kp')

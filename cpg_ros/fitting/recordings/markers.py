@@ -264,13 +264,13 @@ def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, 
     seen = np.isfinite(points).all(axis=2).sum(axis=0)
     notes = []
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-        places = sorted((k for k, other in enumerate(names) if other == name),
+        indices = sorted((k for k, other in enumerate(names) if other == name),
                         key=lambda k: -seen[k])
-        for number, k in enumerate(places[1:], 2):
+        for number, k in enumerate(indices[1:], 2):
             names[k] = f'{name}#{number}'
-        notes.append(f'{len(places)} markers are called {name!r}: the one seen in '
-                     f'{pluralize(int(seen[places[0]]), "sample")} is taken, the other in '
-                     f'{seen[places[1]]}')
+        notes.append(f'{len(indices)} markers are called {name!r}: the one seen in '
+                     f'{pluralize(int(seen[indices[0]]), "sample")} is taken, the other in '
+                     f'{seen[indices[1]]}')
     return tuple(names), notes
 
 

@@ -84,26 +84,26 @@ class _Poses:
         """Return the markers of one animal."""
         animals = list(dict.fromkeys(one[0] for one in self.columns if one))
         animal = _chosen(individual, animals, self.path)
-        places: dict[str, dict[str, int]] = {}
+        index: dict[str, dict[str, int]] = {}
         for k, one in enumerate(self.columns):
             if one and one[0] == animal:
-                own = places.setdefault(one[1], {})
+                own = index.setdefault(one[1], {})
                 if one[2] in own:
                     raise RecordingError(f'{self.path}: two columns {one[2]!r} of marker '
                                          f'{one[1]!r}')
                 own[one[2]] = k
-        flat = not any('z' in own for own in places.values())
+        flat = not any('z' in own for own in index.values())
         axes = 'xy' if flat else 'xyz'
-        names = tuple(name for name, own in places.items() if set(axes) <= set(own))
+        names = tuple(name for name, own in index.items() if set(axes) <= set(own))
         if not names:
             raise RecordingError(f'{self.path}: no marker has columns {abbreviate(list(axes))}')
         if not len(self.rows):
             raise RecordingError(f'{self.path}: no rows')
-        points = np.stack([self.rows[:, [places[name][axis] for name in names]] for axis in axes],
+        points = np.stack([self.rows[:, [index[name][axis] for name in names]] for axis in axes],
                           axis=2)
         if flat:
             points[:, :, 1] *= -1.0  # A picture's y points down.
-        scores = [places[name].get('likelihood', places[name].get('score')) for name in names]
+        scores = [index[name].get('likelihood', index[name].get('score')) for name in names]
         likelihoods = None if all(one is None for one in scores) else np.column_stack(
             [np.ones(len(points)) if one is None else self.rows[:, one] for one in scores])
         return Markers(names, stamps_of_frames(self.frames, fps, self.path), points, self.path,

@@ -604,7 +604,7 @@ class RecordingFormat:
     recognises: Callable[[Path], bool] | None = None
     files_in: Callable[[Path], list[Path]] | None = None
 
-    def refusal(self, argument: str) -> str:
+    def validate(self, argument: str) -> str:
         """Return why its reader does not take an argument, or ''."""
         if argument in (*(option.name for option in self.options), *self.features):
             return ''

@@ -94,9 +94,9 @@ def _far(column: np.ndarray) -> np.ndarray:
 
 #: LONG: number of samples (messages or rows) from which on a recording is long.
 LONG = 1 << 17
-#: STEPS: steps of the grid that are tried, ns, the coarsest first; SHARE: longest usual interval
-#: of the samples, in steps.
-STEPS, SHARE = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
+#: STEPS: steps of the grid that are tried, ns, the coarsest first; FRACTION: longest usual
+#: interval of the samples, in steps.
+STEPS, FRACTION = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
 #: A_PERIOD: fewest grid points of a period of the strongest motion; SLOWEST: least frequency that
 #: counts as motion, Hz.
 A_PERIOD, SLOWEST = 40.0, 0.2
@@ -203,7 +203,7 @@ def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
     frequencies = np.fft.rfftfreq(min(PART, len(values)), usual * 1e-9)
     strongest = frequencies[np.argmax(np.where(frequencies >= SLOWEST, power, 0.0))]
     steps = [step for step in STEPS if step * A_PERIOD * strongest <= 1e9
-             and usual <= SHARE * step]
+             and usual <= FRACTION * step]
     return (steps[0] if steps else 0), 1e9 / usual
 
 

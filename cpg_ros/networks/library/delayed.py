@@ -120,7 +120,7 @@ class Delayed(Network):
             j = 3
         return ring_symmetry(leg_count(type(self)), (j, k), variables=1, odd=True)
 
-    def obstacle(self, gait: str) -> str:
+    def validate_gait(self, gait: str) -> str:
         """Return why c rules a gait out: its sign, or that no delay makes it oscillate; or ''."""
         j, k = self.modes()[gait]
         if 2 * j % leg_count(type(self)) == 0 and self.c * (-1) ** k >= 0.0:

@@ -220,7 +220,7 @@ def settings_for(robot: Robot, indices: np.ndarray, *, kp: np.ndarray, kd: np.nd
     the largest ``torque`` (N m) and the pose ``lying`` (rad), clipped to the limits. ``indices``
     are those of ``motor_indices``, ``others`` further attributes of ``BridgeSettings``.
     """
-    order = robot.places[indices]
+    order = robot.order_indices[indices]
     lower, upper, velocity, stand = (robot.column(name)[order] for name in (
         'lower', 'upper', 'velocity', 'offset'))
     return BridgeSettings(tuple(robot.order[index] for index in indices), kp, kd, torque, lower,

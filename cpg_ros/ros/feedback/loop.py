@@ -162,7 +162,7 @@ class FeedbackLoop(SensorLoop):
         self._correction = self._corrects(
             self._instant.numbers, gaits=self._instant.gaits.ctypes.data,
             resets=ctypes.addressof(self._resets), parts=len(memory),
-            **{name: addresses[name] for name in ('report', 'plan', 'follow')})
+            **{name: addresses[name] for name in ('report', 'plan', 'move')})
         self.restart()
         self.learn(pattern.plan)
         self._close = by_address.closing_function(self._arguments)
@@ -224,16 +224,16 @@ class FeedbackLoop(SensorLoop):
     def faults(self) -> str:
         """Faults that interrupt it, such as 'imu: no messages for 3.2 s'; none while active."""
         inputs, plan = self.inputs, self._pattern.plan
-        found, _ = inputs.faults(self._instant.numbers[NOW])
+        reasons, _ = inputs.faults(self._instant.numbers[NOW])
         if mounted := MOUNTED[int(self._state[MOUNT])]:
-            found.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
+            reasons.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
                          f'legs on the ground: it seems to be mounted {mounted} '
                          '(feedback.imu_mount)')
         if plan.motion.efference is None:
-            found.append(f"the robot file has no efference copy of the gait '{plan.name}'")
+            reasons.append(f"the robot file has no efference copy of the gait '{plan.name}'")
         if self._state[CONTRARY]:
-            found.append(f'{inputs.feet}: the contacts do not go with the gait')
-        return '; '.join(found)
+            reasons.append(f'{inputs.feet}: the contacts do not go with the gait')
+        return '; '.join(reasons)
 
     def renew(self) -> None:
         """Take over the wanted motion."""
@@ -251,7 +251,7 @@ class FeedbackLoop(SensorLoop):
         return super().target if self._finish is None else self._sent
 
     @property
-    def share(self) -> np.ndarray:
+    def fraction_array(self) -> np.ndarray:
         """The fraction of all corrections, shape (1,), overwritten at every tick."""
         return self._state[FRACTION:FRACTION + 1]
 

@@ -37,23 +37,23 @@ def has_transforms() -> bool:
     return util.find_spec('tf2_msgs') is not None
 
 
-def odometry(topic: str, frames: tuple[str, str], *places: np.ndarray) -> tuple[str, Template]:
-    """Return topic and message; places are indices of its numbers in the block.
+def odometry(topic: str, frames: tuple[str, str], *slots: np.ndarray) -> tuple[str, Template]:
+    """Return topic and message; slots are indices of its numbers in the block.
 
     Args:
         topic: of the message.
         frames: of the pose, and of the twist and the child.
-        places: of position, orientation, twist and, if they change, both covariances.
+        slots: of position, orientation, twist and, if they change, both covariances.
 
     """
     message = OdometryMessage(child_frame_id=frames[1])
     message.header.frame_id = frames[0]
     pose, moving = message.pose.pose, message.twist.twist
-    numbers = [*each(pose.position, 'xyz', places[0]), *each(pose.orientation, 'wxyz', places[1]),
-               *each(moving.linear, 'xyz', places[2][:3]),
-               *each(moving.angular, 'xyz', places[2][3:])]
+    numbers = [*each(pose.position, 'xyz', slots[0]), *each(pose.orientation, 'wxyz', slots[1]),
+               *each(moving.linear, 'xyz', slots[2][:3]),
+               *each(moving.angular, 'xyz', slots[2][3:])]
     numbers += [(part, 'covariance', where) for part, where in zip(
-        (message.pose, message.twist), places[3:], strict=False)]
+        (message.pose, message.twist), slots[3:], strict=False)]
     return topic, Template(message, [message.header.stamp], numbers=numbers)
 
 
@@ -69,7 +69,7 @@ def transform(frames: tuple[str, str], position: np.ndarray, orientation: np.nda
 
 
 def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, str],
-                   transforms: bool, share: np.ndarray) -> MessageBlock:
+                   transforms: bool, fraction: np.ndarray) -> MessageBlock:
     """Return the messages on where the base is, of 50 times a second.
 
     Args:
@@ -78,7 +78,7 @@ def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, 
         topic: of the nav_msgs/Odometry.
         frames: the one in which the robot moves, and that of its base.
         transforms: whether to publish the transform between them, too.
-        share: of all corrections, (1,), without which nothing is published.
+        fraction: of all corrections, (1,), without which nothing is published.
 
     """
     sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
@@ -92,4 +92,4 @@ def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, 
             "('make messages' or ros-jazzy-tf2-msgs)")
     return MessageBlock(node, sizes, messages).feed(
         source.pose, source.orientation, source.twist, source.pose_covariance,
-        np.diag(np.square([*INSTANT, RATE, RATE, RATE])), period=PERIOD, while_not_0=share)
+        np.diag(np.square([*INSTANT, RATE, RATE, RATE])), period=PERIOD, while_not_0=fraction)

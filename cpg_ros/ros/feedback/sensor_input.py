@@ -62,7 +62,7 @@ class JointLayout:
         wrong: why the messages cannot be used, or ''.
         position, velocity, effort: first byte of the joints' doubles, in the message's order; None
             if missing.
-        places: index of each wanted joint in the message, shape (joints,).
+        indices: index of each wanted joint in the message, shape (joints,).
         same: range of bytes that identifies the layout: names and counts.
 
     """
@@ -72,7 +72,7 @@ class JointLayout:
         names = list(message.name)
         missing = [name for name in joints if names.count(name) != 1]
         self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
-        self.places = np.array([] if missing else [names.index(name) for name in joints], int)
+        self.indices = np.array([] if missing else [names.index(name) for name in joints], int)
         self.same = [(1, 2)]
         end = HEADER + 8
 
@@ -146,19 +146,19 @@ class _Input:
         self._unreadable = unreadable
         self.expect((), 0)
 
-    def expect(self, places: Sequence[int] | np.ndarray, length: int, known: bytes = b'',
+    def expect(self, indices: Sequence[int] | np.ndarray, length: int, known: bytes = b'',
                same: Sequence[tuple[int, int]] = (), wrong: str = '') -> None:
         """Expect messages of a layout from now on.
 
         Args:
-            places: first byte of each number; negative from the end.
+            indices: first byte of each number; negative from the end.
             length: of the messages, bytes; negative for the shortest ones.
             known: one of them.
             same: range of its bytes that all messages must have.
             wrong: why they cannot be used, or ''.
 
         """
-        self._kept = np.array(places, dtype=np.int64), np.array(same, dtype=np.int64), known
+        self._kept = np.array(indices, dtype=np.int64), np.array(same, dtype=np.int64), known
         struct, (offsets, ranges, _) = self.struct, self._kept
         struct.place, struct.count = offsets.ctypes.data, 0 if wrong else offsets.size
         struct.same, struct.ranges = ranges.ctypes.data, len(same)
@@ -248,10 +248,10 @@ class SensorInput:
     def held(self) -> Iterator[None]:
         """Let C take the messages in the meantime."""
         with ExitStack() as kept:
-            for one in self.inputs:
-                kept.enter_context(one.messages.handle)
-                one.struct.subscription = one.messages.handle.pointer
-                one.struct.depth = one.messages.depth
+            for item in self.inputs:
+                kept.enter_context(item.messages.handle)
+                item.struct.subscription = item.messages.handle.pointer
+                item.struct.depth = item.messages.depth
             yield
 
     def restart(self) -> None:
@@ -280,9 +280,9 @@ class SensorInput:
 
     def read(self) -> None:
         """Read the numbers of the messages that have arrived."""
-        for k, one in enumerate(self.inputs):
-            struct = one.struct
-            data = one.messages.newest()
+        for k, item in enumerate(self.inputs):
+            struct = item.struct
+            data = item.messages.newest()
             if data is None and struct.unread:
                 # C has taken it, and does not know its layout.
                 data = ctypes.string_at(struct.message.buffer, struct.message.length)
@@ -290,29 +290,29 @@ class SensorInput:
                 continue
             address = ctypes.byref(struct)
             if not self._library.read_input(address, data, len(data)):
-                self._learn(k, one, data)
+                self._learn(k, item, data)
                 self._library.read_input(address, data, len(data))
 
-    def _learn(self, number: int, one: _Input, data: bytes) -> None:
+    def _learn(self, number: int, item: _Input, data: bytes) -> None:
         """Find the positions of the numbers in messages of a new layout."""
-        places: Any = ()
+        indices: Any = ()
         same: Sequence[tuple[int, int]] = ()
         wrong = f'messages of {len(data)} bytes'
         if number == 1:
-            places, same, wrong = self._joint_places(data)
+            indices, same, wrong = self._joint_offsets(data)
         elif number == 2 and self._contacts == FOOT_CONTACTS:
             try:
                 order, wrong = legs_of(data, self._legs), ''
-                places = DOUBLE * (order - order.size)
+                indices = DOUBLE * (order - order.size)
             except ValueError as error:
                 wrong = str(error)
-        one.expect(places, len(data), data, same, wrong)
+        item.expect(indices, len(data), data, same, wrong)
 
-    def _joint_places(self, data: bytes) -> tuple[np.ndarray, list[tuple[int, int]], str]:
+    def _joint_offsets(self, data: bytes) -> tuple[np.ndarray, list[tuple[int, int]], str]:
         layout = JointLayout(data, self._names)
         if layout.wrong and len(self._names) > self._own:
             layout = JointLayout(data, self._names[:self._own])
-        wrong, joints = layout.wrong, layout.places
+        wrong, joints = layout.wrong, layout.indices
         if not wrong and self._contacts == EFFORTS and layout.effort is None:
             wrong = 'no efforts'
         begin = layout.position, layout.velocity, layout.effort or layout.position

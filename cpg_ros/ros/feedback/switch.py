@@ -198,8 +198,8 @@ class FeedbackSwitch:
         self.loop: Any = None
         self._delays_logged = False
         self.blocks: list[MessageBlock] = []
-        if refusal := self.judge([node.get_parameter(ENABLED)]):
-            raise StartError(refusal)
+        if reason := self.validate([node.get_parameter(ENABLED)]):
+            raise StartError(reason)
         self._hindrance = ''
         #: Whether the robot may already move.
         self._started = False
@@ -209,7 +209,7 @@ class FeedbackSwitch:
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(PREFIX + name).value
 
-    def obstacle(self) -> str:
+    def validate_setup(self) -> str:
         """Return why the feedback cannot be on, or ''."""
         if self._biped is not None and self._value('contacts') == 'efforts':
             return ("feedback.contacts 'efforts' is for feet that are points: a robot with soles "
@@ -222,12 +222,12 @@ class FeedbackSwitch:
                     "combined_topic to '', or name the robot's topic")
         return ''
 
-    def judge(self, parameters: Sequence[Parameter]) -> str:
+    def validate(self, parameters: Sequence[Parameter]) -> str:
         """Return why a batch of changes is rejected, or ''."""
         switched_on = any(parameter.name == ENABLED and parameter.value is True
                           for parameter in parameters)
-        obstacle = self.obstacle() if switched_on else ''
-        return f'no feedback: {obstacle}' if obstacle else ''
+        reason = self.validate_setup() if switched_on else ''
+        return f'no feedback: {reason}' if reason else ''
 
     def validate_plan(self, plan: GaitPlan) -> str:
         """Return why a gait cannot run, or ''; point feet run it without an efference copy."""
@@ -237,7 +237,7 @@ class FeedbackSwitch:
 
     def apply(self) -> None:
         """Apply the parameters."""
-        enabled = self._node.get_parameter(ENABLED).value and not self.obstacle()
+        enabled = self._node.get_parameter(ENABLED).value and not self.validate_setup()
         if enabled and self.loop is None:
             self.loop = self._make_balance() if self._biped is not None else self._make()
         if self.loop is not None:
@@ -276,7 +276,7 @@ class FeedbackSwitch:
             self.blocks.append(odometry_block(
                 self._node, odometry, topic,
                 (self._value('odom_frame'), self._value('base_frame')),
-                self._value('odometry_tf'), loop.share))
+                self._value('odometry_tf'), loop.fraction_array))
         return loop
 
     def _make_balance(self) -> BalanceLoop:

@@ -167,7 +167,7 @@ class ServiceClients:
                     client.remove_pending_request(answer)
                     raise CallError(f'{name} did not answer within {self._total or patience:g} s')
                 await asyncio.sleep(POLL)
-                _take_response(client)
+                _receive_response(client)
         except InvalidHandle:  # it was forgotten meanwhile
             raise NoService(name) from None
         return answer.result()
@@ -197,7 +197,7 @@ class ServiceClients:
             self._node.destroy_client(self._clients.pop(name))
 
 
-def _take_response(client: Any) -> None:
+def _receive_response(client: Any) -> None:
     """Take a response, if one has arrived, for the call that waits for it."""
     with client.handle:
         header, response = client.handle.take_response(client.srv_type.Response)

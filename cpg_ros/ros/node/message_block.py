@@ -132,10 +132,10 @@ def indices(sizes: Sequence[int]) -> list[np.ndarray]:
     return [np.arange(*edge) for edge in pairwise(np.cumsum([0, *sizes]))]
 
 
-def each(message: object, fields: str, places: np.ndarray
+def each(message: object, fields: str, arrays: np.ndarray
          ) -> list[tuple[object, str, np.ndarray]]:
     """Return the numbers of a message's scalar fields, each named by one letter."""
-    return [(message, field, places[k:k + 1]) for k, field in enumerate(fields)]
+    return [(message, field, arrays[k:k + 1]) for k, field in enumerate(fields)]
 
 
 def _exact(message: Any) -> bytes:
@@ -181,7 +181,7 @@ class MessageBlock:
         starts = np.cumsum([0, *(-(-len(raw) // WORD) for raw in raws)])
         memory = bytearray(WORD * int(starts[-1]))
         self._block = np.frombuffer(memory, dtype=np.uint32)
-        self._places = np.concatenate([start + here for start, here
+        self._targets = np.concatenate([start + here for start, here
                                        in zip(starts[:-1], changing, strict=True)])
         self._sources = np.concatenate(sources)
         for (topic, template), raw, start in zip(templates, raws, WORD * starts[:-1],
@@ -209,8 +209,8 @@ class MessageBlock:
         return native.SerializedMessages(
             native.address('rcl_publish_serialized_message'), self._pointers.ctypes.data,
             ctypes.addressof(self._messages), start, self._words.ctypes.data,
-            self._places.ctypes.data, self._sources.ctypes.data, len(self._handles),
-            len(self._places))
+            self._targets.ctypes.data, self._sources.ctypes.data, len(self._handles),
+            len(self._targets))
 
     def publish(self, stamp: int, values: Sequence[np.ndarray], duration: int = 0) -> None:
         """Publish all messages.
@@ -242,26 +242,26 @@ class MessageBlock:
             for handle in self._handles:
                 handle.__exit__(None, None, None)
 
-    def feed(self, *places: int | np.ndarray, period: float = 0.0, quiet: bool = False,
+    def feed(self, *arrays: int | np.ndarray, period: float = 0.0, quiet: bool = False,
              while_not_0: np.ndarray | None = None) -> 'MessageBlock':
         """Say from where ``tick.c`` fills the messages, and when; return the block.
 
         Args:
-            places: arrays that have the numbers of each part, or addresses of pointers to these.
+            arrays: arrays that have the numbers of each part, or addresses of pointers to these.
             period: between two publications, s; 0 for every tick.
             quiet: publish as the first number changes, and else only while it is not 1.
             while_not_0: publish only while this number, shape (1,), is not 0.
 
         """
         self._period, self._gate = period, while_not_0
-        self._kept = places
+        self._kept = arrays
         self._fixed = np.array([place.ctypes.data if isinstance(place, np.ndarray) else 0
-                                for place in places], dtype=np.uint64)
+                                for place in arrays], dtype=np.uint64)
         self._from = np.array([self._fixed[k:].ctypes.data if isinstance(place, np.ndarray) else
-                               place for k, place in enumerate(places)], dtype=np.uint64)
+                               place for k, place in enumerate(arrays)], dtype=np.uint64)
         self._output = native.Output(
             ctypes.addressof(self._native), self._from.ctypes.data, self._sizes.ctypes.data,
-            len(places), 1, self._output.since, quiet,
+            len(arrays), 1, self._output.since, quiet,
             None if while_not_0 is None else while_not_0.ctypes.data, self._output.first)
         return self
 

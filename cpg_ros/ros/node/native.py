@@ -84,7 +84,7 @@ class Copy(ctypes.Structure):
 class Correction(ctypes.Structure):
     """The struct ``correction`` of ``tick.c``."""
 
-    _fields_ = _fields((_POINTER, 'close finish arguments report plan follow take forget numbers '
+    _fields_ = _fields((_POINTER, 'close finish arguments report plan move take forget numbers '
                         'gaits inputs resets'), (_LONG, 'count parts'))
 
 

@@ -173,7 +173,7 @@ def bounded(service: type, most: int) -> type:
 MOST = 1000
 
 
-def _refused(reason: str) -> SetParametersResult:
+def _rejected(reason: str) -> SetParametersResult:
     return SetParametersResult(successful=False, reason=reason)
 
 
@@ -235,9 +235,9 @@ class StrictParameterService(ParameterService):
     def _too_many(self, kind: type, count: int, response: Any) -> Any:
         reason = f'{count} parameters in one request: at most {MOST} are allowed'
         if kind is srv.SetParameters:
-            response.results = [_refused(reason)]
+            response.results = [_rejected(reason)]
         elif kind is srv.SetParametersAtomically:
-            response.result = _refused(reason)
+            response.result = _rejected(reason)
         else:
             self._get_node().get_logger().warning(f'{kind.__name__}: {reason}',
                                                   throttle_duration_sec=1.0)
@@ -282,7 +282,7 @@ class StrictParameterService(ParameterService):
             try:
                 changes.append(_Change(self._read(messages), partial(answer, k)))
             except ValueError as error:
-                answer(k, _refused(str(error)))
+                answer(k, _rejected(str(error)))
         return changes
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
@@ -336,7 +336,7 @@ class StrictParameterService(ParameterService):
                     waiting[:0] = change.replaced
                     continue
                 for earlier in change.replaced:
-                    earlier.answer(_refused('superseded: a later request that came while this '
+                    earlier.answer(_rejected('superseded: a later request that came while this '
                                             'one was waiting sets the same'))
 
     def _validated(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -347,7 +347,7 @@ class StrictParameterService(ParameterService):
             # One bad request must not end a node that moves a robot.
             if not self._ending:
                 node.get_logger().error('a request failed:\n' + traceback.format_exc())
-            return _refused(f'{type(error).__name__}: {error}')
+            return _rejected(f'{type(error).__name__}: {error}')
 
 
 def _thinned(changes: list[_Change], barriers: frozenset[str]) -> list[_Change]:

@@ -122,15 +122,15 @@ typedef struct {
     int64_t size;
 } copy;
 
-/* The correction of the angles between plan and follow of the pattern; where these are NULL, close
+/* The correction of the angles between plan and move of the pattern; where these are NULL, close
  * moves the joints itself. */
 typedef struct {
     int64_t (*close)(const void *arguments);
-    int64_t (*finish)(const void *arguments);  /* called after follow; NULL for nothing to do */
+    int64_t (*finish)(const void *arguments);  /* called after move; NULL for nothing to do */
     const void *arguments;     /* replaced when gains change */
     void (*report)(const void *what, double *numbers, int64_t *gaits);
     void (*plan)(void *what, double dt);
-    void (*follow)(void *what, double dt, int corrected);
+    void (*move)(void *what, double dt, int corrected);
     int (*take)(const void *subscription, void *message, void *info, void *allocation);
     void (*forget)(void);
     double *numbers;           /* length of the tick and time, s, then those of report */
@@ -230,7 +230,7 @@ static void correct(correction *c, void *what, double dt, int64_t stamp)
         }
     }
     if (c->plan) {
-        c->follow(what, dt, 1);
+        c->move(what, dt, 1);
     }
     if (c->finish) {
         c->finish(arguments);

@@ -340,7 +340,7 @@ class Panel(StartedNode):
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
             lambda why: self._pages.later(self._recorded, why))
-        self._orders = RequestHandler(self._pages, self._calls, self._recorder, self._recorded)
+        self._handler = RequestHandler(self._pages, self._calls, self._recorder, self._recorded)
         self._server = WebServer(AccessControl(self._token), self._pages, self._recorder.packed,
                                  self._come, self._on_request, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
@@ -412,7 +412,7 @@ class Panel(StartedNode):
     def _update(self) -> None:
         graph, (text, when) = discover(self), self._start
         starting = text if not graph.generators and time.monotonic() < when + FRESH else ''
-        self._health.follow(HEALTH if self._pages.everyone or not graph.generators else {})
+        self._health.subscribe_to(HEALTH if self._pages.everyone or not graph.generators else {})
         if (graph, starting) != (self._graph, self._starting):
             self._graph, self._starting = graph, starting
             self._pages.send(self._pages.everyone, self._state())
@@ -512,12 +512,12 @@ class Panel(StartedNode):
                 bridge = request.values['bridge']
                 if bridge not in self._graph.bridges:
                     raise RequestError(f"there is no bridge '{bridge}'")
-                await self._orders.command(page, bridge, Trigger, STOPS[request.action])
+                await self._handler.command(page, bridge, Trigger, STOPS[request.action])
             elif page.node not in self._views:
                 raise RequestError(f'{page.node} is gone' if page.node else
                                    'there is no generator on the graph')
             else:
-                await self._orders.carry_out(page, self._views[page.node], request)
+                await self._handler.carry_out(page, self._views[page.node], request)
         except CpgError as error:
             self._pages.notify([page], str(error))
         except Exception:

@@ -75,7 +75,7 @@ class Subscriptions:
         self._watch = watch
         self._topics: dict[str, PolledSubscription] = {}
 
-    def follow(self, topics: Mapping[str, tuple[type, QoSProfile | None]]) -> None:
+    def subscribe_to(self, topics: Mapping[str, tuple[type, QoSProfile | None]]) -> None:
         """Subscribe to these topics, name -> type and quality, and to no others."""
         for name in set(self._topics) - set(topics):
             self._topics.pop(name).close()
@@ -237,7 +237,7 @@ async def robot_info(watch: Node, services: ServiceClients, graph: Graph, genera
 async def _once(watch: Node, kind: type, name: str) -> Any:
     """Return a topic's next or latched message, None if none arrives in time."""
     topic = Subscriptions(watch)
-    topic.follow({name: (kind, latched() if kind is String else None)})
+    topic.subscribe_to({name: (kind, latched() if kind is String else None)})
     try:
         for _ in range(round(SILENCE / 0.02)):
             if (message := topic.newest(name)) is not None:
@@ -245,7 +245,7 @@ async def _once(watch: Node, kind: type, name: str) -> Any:
             await asyncio.sleep(0.02)
         return None
     finally:
-        topic.follow({})
+        topic.subscribe_to({})
 
 
 class RobotView:
@@ -348,7 +348,7 @@ class RobotView:
                        if (name, floats) in graph.topics})
         if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
             topics[f'{space}/odom'] = Odometry, best_effort()
-        self._topics.follow(topics if listening else {})
+        self._topics.subscribe_to(topics if listening else {})
 
     def frame(self) -> dict[str, Any]:
         """Return the values that changed since the last frame."""
@@ -492,7 +492,7 @@ class BridgeViews:
             # A client that the bridge does not know yet would delay a stop.
             for service in STOPS.values():
                 self._services.client(Trigger, f'{name}/{service}')
-        self._states.follow({f'{name}/state': (String, latched())
+        self._states.subscribe_to({f'{name}/state': (String, latched())
                              for name in (names if listening else ())})
 
     def news(self, statuses: Iterable[DiagnosticStatus]) -> dict[str, Any] | None:

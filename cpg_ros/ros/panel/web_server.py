@@ -80,7 +80,7 @@ class AccessControl:
         """Require a token, as of ``token_for``."""
         self._token = token.encode()
 
-    def refuses(self, path: str, host: str, origin: str) -> str:
+    def validate(self, path: str, host: str, origin: str) -> str:
         """Return why a request is rejected, or ''.
 
         Args:
@@ -151,7 +151,7 @@ class WebServer:
     async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         path = urlsplit(request.path).path
         hosts, origins = (request.headers.get_all(name) for name in ('Host', 'Origin'))
-        refused = self._access.refuses(request.path, hosts[0] if len(hosts) == 1 else '',
+        refused = self._access.validate(request.path, hosts[0] if len(hosts) == 1 else '',
                                      origins[0] if origins else '')
         # The page's files are public: with them it can show that a token is missing.
         if path in self._files and (not refused or 'token' in refused):

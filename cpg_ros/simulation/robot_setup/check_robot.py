@@ -132,7 +132,7 @@ def _compared(args: Namespace, description: RobotDescription) -> RobotCheck:
         if name not in presets:
             raise InputError(f"--gaits: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(presets))}')
-    there = all(joint.name in description.joints and not description.joints[joint.name].flaw
+    there = all(joint.name in description.joints and not description.joints[joint.name].undrivable
                 for joint in robot.joints)
     return checked(robot, description, (args.robot or str(args.make), source),
                    list(dict.fromkeys(args.gaits)), args.frequency, args.amplitude,

@@ -93,7 +93,7 @@ class GaitCheck:
         frequency: strides per second (Hz), nan for a gait that does not exist.
         room: least distance of any joint from a limit, rad; negative beyond it.
         fraction: largest speed of any joint as a fraction of its limit.
-        room_at, share_at: joints of these two.
+        room_at, fraction_at: joints of these two.
         faults: of the gait.
 
     """
@@ -104,14 +104,14 @@ class GaitCheck:
     room: float
     room_at: str
     fraction: float
-    share_at: str
+    fraction_at: str
     faults: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {'network': self.network, 'gait': self.name, 'fits': not self.faults,
                 'frequency': self.frequency, 'room': self.room, 'room_at': self.room_at,
-                'speed_share': self.fraction, 'speed_share_at': self.share_at,
+                'speed_share': self.fraction, 'speed_share_at': self.fraction_at,
                 'faults': list(self.faults)}
 
 
@@ -159,7 +159,7 @@ class RobotCheck:
             measured = gait.frequency == gait.frequency
             rows.append((gait.name, gait.network, f'{gait.frequency:.3g}' if measured else '-',
                          f'{_room(gait.room)} ({gait.room_at})' if measured else '-',
-                         f'{100 * gait.fraction:.0f} % of its limit ({gait.share_at})'
+                         f'{100 * gait.fraction:.0f} % of its limit ({gait.fraction_at})'
                          if measured else '-', 'does not fit' if gait.faults else 'fits'))
         lines += ['', *table(rows, '<<><<<'), '']
         faults = self.faults
@@ -225,7 +225,7 @@ def _chains(robot: Robot, known: RobotDescription) -> dict[str, LegChain]:
     """Return the legs with joints and foot in the description."""
     found = {}
     for leg, joints in robot.legs.items():
-        if all(joint.name in known.joints and not known.joints[joint.name].flaw
+        if all(joint.name in known.joints and not known.joints[joint.name].undrivable
                for joint in joints):
             chain = known.leg(joint.name for joint in joints)
             if chain.lengths[-1] > 0.0:
@@ -369,8 +369,8 @@ def _faults(joint: Joint, description: RobotDescription, near: str) -> Iterator[
     if there is None:
         yield f'the {what} has no such joint' + (f", did you mean '{near}'?" if near else '')
         return
-    if there.flaw:
-        yield f'cannot be driven, in the {what} it {there.flaw}'
+    if there.undrivable:
+        yield f'cannot be driven, in the {what} it {there.undrivable}'
         return
     if joint.lower < there.lower - ROUNDING:
         yield (f'lower limit {joint.lower:g} rad is {there.lower - joint.lower:.4g} rad below the '
@@ -399,7 +399,7 @@ def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
                                        strict=True):
         limits: list[tuple[str, Joint | JointDescription]] = [("the robot file's", joint)]
         there = description.joints.get(joint.name)
-        if there and not there.flaw:
+        if there and not there.undrivable:
             limits.append((f"the {description.format}'s", there))
         lower, below = max((limit.lower, whose) for whose, limit in limits)
         upper, above = min((limit.upper, whose) for whose, limit in limits)
@@ -434,7 +434,7 @@ def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
     """Return the most similar names in the description for joints that it does not have."""
     there = {joint.name for joint in robot.joints}
     free = {name.lower(): name for name, joint in described.joints.items()
-            if not joint.flaw and name not in there}
+            if not joint.undrivable and name not in there}
     return {joint.name: free[near] for joint in robot.joints
             for near in get_close_matches(joint.name.lower(), list(free), 1)}
 
@@ -442,7 +442,7 @@ def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
 def _notes(robot: Robot, description: RobotDescription) -> Iterator[str]:
     driven, what = [joint.name for joint in robot.joints], description.format
     idle = [joint.name for joint in description.joints.values()
-            if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
+            if (not joint.undrivable or joint.kind == 'prismatic') and joint.name not in driven]
     if idle:
         yield f'moving joints of the {what} that no leg drives: ' + ', '.join(idle)
     yield from invented_limits(robot, what)

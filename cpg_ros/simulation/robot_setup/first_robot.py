@@ -83,8 +83,8 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
             f'legs of {len(first)} joints ({", ".join(first)}): on two legs a robot needs five '
             'or six in each, to step aside and to keep its soles level')
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
-    assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
-    networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
+    assignment, cells = next(entry for entry in usual.values() if set(entry[1]) == set(legs))
+    networks = tuple(name for name, entry in usual.items() if entry == (assignment, cells))
     standing = {leg: _StandingLeg.of(known, legs, leg) for leg in legs}
     # All feet are on one level.
     ground = float(np.mean([leg.ground for leg in standing.values()]))
@@ -216,9 +216,9 @@ class _StandingLeg:
         best, price = middle, inf
         for start in (middle, *(middle + (draws - 0.5) * width)):
             if price > NEAR:
-                found = least_squares(off, start, bounds=(self.low, self.high), x_scale=wide)
-                if (cost := 2.0 * float(found.cost) + self._way(found.x)) < price:
-                    best, price = found.x, cost
+                solution = least_squares(off, start, bounds=(self.low, self.high), x_scale=wide)
+                if (cost := 2.0 * float(solution.cost) + self._way(solution.x)) < price:
+                    best, price = solution.x, cost
         return np.clip(np.round(best, 3), self.low, self.high) + 0.0
 
     def _way(self, angles: np.ndarray) -> float:
@@ -228,8 +228,8 @@ class _StandingLeg:
         points = self.chain.posed(angles)[1]
         hip, foot = points[self.top], points[self.end]
         knees = points[self.top + 1:self.end]
-        shares = (knees[:, 2] - hip[2]) / min(foot[2] - hip[2], -1e-9)
-        bulges = knees[:, 0] - hip[0] - shares * (foot[0] - hip[0])
+        fractions = (knees[:, 2] - hip[2]) / min(foot[2] - hip[2], -1e-9)
+        bulges = knees[:, 0] - hip[0] - fractions * (foot[0] - hip[0])
         bulge = float(bulges[np.abs(bulges).argmax()]) * (1.0 if self.biped else -1.0)
         needed = BENT * float(sum(self.chain.lengths[self.top:self.end]))
         return 0.0 if bulge > needed else OTHER_WAY if bulge < -needed else STRAIGHT

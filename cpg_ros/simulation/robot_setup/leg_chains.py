@@ -46,7 +46,7 @@ UNLIKE = 0.2
 SHORTER, HIGHER = 0.35, 0.4
 #: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
 CROSSWISE = 1.3
-#: FLAT: share of the axes' directions up to which they lie in a plane.
+#: FLAT: fraction of the axes' directions up to which they lie in a plane.
 FLAT = 0.05
 #: ENDLESS: range of a joint from which on it counts as unlimited, rad.
 ENDLESS = 100.0
@@ -119,7 +119,7 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
     left = np.array([-ahead[1], ahead[0], 0.0])
     pairs = [pair for pair in _pairs(_limbs(description, paths, left), left) if all(
         limb_of(limb.joints) != 'other' and 1 < sum(
-            not description.joints[name].flaw for name in limb.joints) <= MOST_JOINTS
+            not description.joints[name].undrivable for name in limb.joints) <= MOST_JOINTS
         for limb in pair)]
     legs = [pair for pair in pairs if not any(limb_of(limb.joints) == 'arm' for limb in pair)]
     if not legs and len(pairs) > 1:
@@ -285,7 +285,7 @@ def _held(description: RobotDescription, leg: Sequence[str], name: str) -> str:
         raise DescriptionError(f"the joint '{name}' has no motor, and joints below it have: legs "
                                'with springs or passive joints between driven ones are not '
                                'supported')
-    return joint.flaw or ('is a wheel' if _wheel(description, leg, joint) else '')
+    return joint.undrivable or ('is a wheel' if _wheel(description, leg, joint) else '')
 
 
 def _wheel(description: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:

@@ -198,14 +198,14 @@ def _joined(path: Path, robot: Robot,
 
     joints = tuple(joint.name for joint in robot.joints)
     states = [message for _, message in messages_of['joint_states']]
-    places = []
+    indices = []
     for name in joints:
         if name not in states[0].name:
             raise RecordingError(f"{path}: joint_states has no joint '{name}'")
-        places.append(list(states[0].name).index(name))
+        indices.append(list(states[0].name).index(name))
     own = np.array([_stamp(message) for message in states])
-    angles, rates = (np.array([getattr(one, part)[places] if len(getattr(one, part)) else
-                               np.full(len(places), np.nan) for one in states])
+    angles, rates = (np.array([getattr(one, part)[indices] if len(getattr(one, part)) else
+                               np.full(len(indices), np.nan) for one in states])
                      for part in ('position', 'velocity'))
     # Without stamps: by when they were received, beside the IMU's.
     by_leg = {}
@@ -254,9 +254,9 @@ def _of_low_states(path: Path, robot: Robot, states: Sequence[tuple[int, bytes]]
     joints = tuple(joint.name for joint in robot.joints)
     if lacking := [name for name in joints if name not in block.names]:
         raise RecordingError(f"{path}: LowState has no joint '{lacking[0]}'")
-    places = [block.names.index(name) for name in joints]
+    indices = [block.names.index(name) for name in joints]
     return WalkRecording(str(path), joints, times, SensorData(
-        block.positions[:, places], block.velocities[:, places],
+        block.positions[:, indices], block.velocities[:, indices],
         own['feet'][:, [feet.index(leg) for leg in robot.legs]].astype(float),
         rpy_of(own['quaternion'].astype(float)), own['gyroscope'].astype(float),
         own['accelerometer'].astype(float)))

@@ -87,7 +87,7 @@ class Benefit:
                 f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
 
-def judged_gaits(robot: Robot) -> list[str]:
+def evaluated_gaits(robot: Robot) -> list[str]:
     """Return the gaits in which feedback is judged: those with an efference copy that do not hop.
 
     Feedback has little effect on hops, whose left and right legs land together.
@@ -163,7 +163,7 @@ class FeedbackTrial:
         return upright
 
 
-def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
+def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
                    kd: float | None = None, seed: int = 0) -> tuple[Robot, list[Benefit]]:
     """Return a robot whose file states whether its feedback helps in gaits, and the evidence.
 
@@ -327,7 +327,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
 
     Returns:
         The robot with the gains, or with those before if they are no better, and the results of
-            fresh pushes. ``judge_feedback`` decides whether its feedback is on.
+            fresh pushes. ``evaluate_feedback`` decides whether its feedback is on.
 
     Raises:
         SimulationError: CMA-ES is missing, or the model cannot be used.
@@ -364,7 +364,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     if benefits.better:
         listed = dimensionless(after, leg_length(geometry_of(robot)))
         own = replace(own, gains={**own.gains, **{name: listed[name] for name in names}})
-    robot, _ = judge_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
+    robot, _ = evaluate_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
     judged = robot.feedback or own
     return replace(robot, feedback=replace(
         judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '

@@ -42,7 +42,7 @@ from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.robot_setup.description_match import invented_limits
 from cpg_ros.simulation.tuning.biped import tune_biped
-from cpg_ros.simulation.tuning.feedback import judge_feedback, judged_gaits, tune_feedback
+from cpg_ros.simulation.tuning.feedback import evaluate_feedback, evaluated_gaits, tune_feedback
 from cpg_ros.simulation.tuning.gait_design import AIMS
 from cpg_ros.simulation.tuning.gaits import GOOD, LONG, tune, Tuned
 
@@ -138,11 +138,11 @@ def _tune_biped(args: argparse.Namespace, robot: Robot) -> int:
 def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
     if robot.biped is not None:
         return _tune_biped(args, robot)
-    gaits_judged = judged_gaits(robot)
-    if lacking := [gait for gait in args.gaits or [] if gait not in gaits_judged]:
+    gaits_evaluated = evaluated_gaits(robot)
+    if lacking := [gait for gait in args.gaits or [] if gait not in gaits_evaluated]:
         raise InputError(f"argument --gaits: robot file '{robot.name}' has no efference copy of "
                          f'{" and ".join(lacking)}, or it hops: tune the gait first')
-    gaits = args.gaits or gaits_judged
+    gaits = args.gaits or gaits_evaluated
     if not gaits:
         raise InputError(f"argument --feedback: robot file '{robot.name}' has no gait with an "
                          'efference copy and legs with a geometry: tune its gaits first')
@@ -195,8 +195,8 @@ def _tune(args: argparse.Namespace) -> int:
             executor=executor, seeds=args.seeds, kp=args.kp, kd=args.kd,
             threads=1 if executor else args.jobs, say=report)
     lines = [*figures(designs), *missing, *invented_limits(robot, 'model')]
-    if judged := judged_gaits(robot):
-        robot, _ = judge_feedback(robot, args.model, judged, args.kp, args.kd, args.seed)
+    if judged := evaluated_gaits(robot):
+        robot, _ = evaluate_feedback(robot, args.model, judged, args.kp, args.kd, args.seed)
         lines.append(_verdict(robot))
     write_robot(args.out, robot, '\n'.join([
         f'Gaits made by: ros2 run cpg_ros {args.command}',

@@ -84,14 +84,14 @@ def test_a_turn_on_the_spot():
 
 
 def bumps(turn, *places):
-    """Bends of the knee about shares of the stride from touchdown."""
+    """Bends of the knee about fractions of the stride from touchdown."""
     theta = turn / (2.0 * np.pi) % 1.0
     return sum(size * np.exp(-0.5 * (((theta - at + 0.5) % 1.0 - 0.5) / width) ** 2)
                for size, at, width in places)
 
 
 @pytest.mark.parametrize(('swing', 'places'), [
-    # After Winter (1991) and Novacheck (1998): load, and swing; rad and shares of the stride.
+    # After Winter (1991) and Novacheck (1998): load, and swing; rad and fractions of the stride.
     (0.35, ((0.25, 0.14, 0.06), (1.05, 0.72, 0.09))),
     (0.5, ((0.75, 0.16, 0.09), (1.7, 0.66, 0.12)))], ids=['walk', 'run'])
 @pytest.mark.parametrize('sense', [1.0, -1.0])

@@ -41,8 +41,8 @@ def height(t, frequency, flight):
     """
     if not flight:
         return 1.0 + 0.02 * np.cos(4.0 * np.pi * frequency * t)
-    share = np.arange(4096) / 4096
-    push = np.where(share < 1.0 - flight, np.sin(np.pi * share / (1.0 - flight)), 0.0)
+    cycle = np.arange(4096) / 4096
+    push = np.where(cycle < 1.0 - flight, np.sin(np.pi * cycle / (1.0 - flight)), 0.0)
     terms = np.fft.rfft(GRAVITY * (push / push.mean() - 1.0)) / 4096
     turn = 2.0 * np.pi * 2.0 * frequency * np.arange(1, terms.size)
     return 1.0 - 2.0 * (np.exp(1j * np.outer(t, turn[:60])) @ (terms[1:] / turn**2)[:60]).real

@@ -49,7 +49,7 @@ def recorded(course, noise=0.01, seed=0):
             pattern.apply(gait_plan, 1.0)
         for _ in range(round(seconds * RATE)):
             pattern.advance(1.0 / RATE)
-            rows.append(pattern.position[GO2.places])
+            rows.append(pattern.position[GO2.order_indices])
     x, rng = np.array(rows), np.random.default_rng(seed)
     x += noise * np.ptp(x, axis=0) * rng.standard_normal(x.shape)
     return Recording(GO2.order, np.arange(len(x)) / RATE, x, 'made up')
@@ -108,7 +108,7 @@ def test_a_schedule_repeats_the_recording(tmp_path, there_and_back, fitted):
         for k in range(round(8.0 * RATE)):
             pattern.advance(1.0 / RATE)
             if k > 3.0 * RATE:
-                rows.append(pattern.position[GO2.places])
+                rows.append(pattern.position[GO2.order_indices])
         again = np.array(rows)
         # Its first strides belong to the change.
         first = np.searchsorted(there_and_back.times, stretch.begin + 2.0)

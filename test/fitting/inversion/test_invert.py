@@ -24,7 +24,7 @@ from cpg_ros.fitting.inversion.fit_data import cells_of, Joints
 from cpg_ros.fitting.inversion.free_parameters import free_numbers
 from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout
-from cpg_ros.motion.plan import refusal
+from cpg_ros.motion.plan import validate_orbit
 from cpg_ros.motion.robot import HARMONICS
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -255,22 +255,22 @@ def test_names_units_and_the_begin_of_the_cycle_do_not_matter(order, factor, tur
 
 def test_what_the_generator_runs_is_preferred(monkeypatch):
     recording, cells = trot(None, network=replace(TROT, tau=0.5))
-    monkeypatch.setattr(inversion, 'refusal', lambda orbit, gait, harmonics: (
+    monkeypatch.setattr(inversion, 'validate_orbit', lambda orbit, gait, harmonics: (
         'it is too late' if orbit.network.tau > 0.45 else ''))
     fit = invert(recording, cells, TROT, 'trot', ('tau',))
     assert 0.44 < fit.parameters['tau'].value <= 0.45
     assert 'the generator would refuse the trot that fits best: it is too late' in fit.warnings[-1]
-    monkeypatch.setattr(inversion, 'refusal', lambda orbit, gait, harmonics: 'never')
+    monkeypatch.setattr(inversion, 'validate_orbit', lambda orbit, gait, harmonics: 'never')
     fit = invert(recording, cells, TROT, 'trot', ('tau',))
     assert fit.parameters['tau'].value == pytest.approx(0.5, abs=1e-4)
     assert fit.warnings[-1].endswith('never')
 
 
 def test_what_the_generator_refuses():
-    assert refusal(solve_orbit(TROT, 'trot'), 'trot', HARMONICS) == ''
-    assert refusal(solve_preset(PRESETS['biped']['walk']), 'walk', HARMONICS) == ''
+    assert validate_orbit(solve_orbit(TROT, 'trot'), 'trot', HARMONICS) == ''
+    assert validate_orbit(solve_preset(PRESETS['biped']['walk']), 'walk', HARMONICS) == ''
     fast = Delayed(-450.0, 100.0, 650.0, -200.0, 0.004)
-    assert 'its period' in refusal(solve_orbit(fast, 'trot'), 'trot', HARMONICS)
+    assert 'its period' in validate_orbit(solve_orbit(fast, 'trot'), 'trot', HARMONICS)
 
 
 def test_verdicts_come_with_a_fit():

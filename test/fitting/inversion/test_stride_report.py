@@ -100,6 +100,6 @@ def test_stance_swing_and_double_support_are_those_of_loads(tmp_path, capsys):
     assert main(['--csv', str(path), '--network', 'phase', '--gait', 'walk']) == 0
     rows = dict(line.rsplit(maxsplit=1) for line in capsys.readouterr().out.splitlines()
                 if '[% of stride]' in line)
-    for name, share in (('stance of left', 60.0), ('swing of right', 40.0),
+    for name, percent in (('stance of left', 60.0), ('swing of right', 40.0),
                         ('double support', 20.0), ('flight', 0.0)):
-        assert float(rows[f'{name} [% of stride]']) == pytest.approx(share, abs=1.5)
+        assert float(rows[f'{name} [% of stride]']) == pytest.approx(percent, abs=1.5)

@@ -84,7 +84,7 @@ def test_a_start_without_an_orbit_gives_way(tmp_path, capsys):
 def test_what_is_never_run_leaves_the_presets_parameters(tmp_path, capsys, monkeypatch):
     path = table_of(tmp_path / 'walk.csv', *walked())
     network = PRESETS['delayed']['trot'].network
-    monkeypatch.setattr(recording_fit, 'refusal', lambda orbit, gait, harmonics: (
+    monkeypatch.setattr(recording_fit, 'validate_orbit', lambda orbit, gait, harmonics: (
         '' if orbit.network.c == network.c else 'it is too far'))
     said = said_of(capsys, '--csv', path, '--start', 'c=6', '--report', tmp_path / 'report.html')
     assert trot_found(said) and said['parameters'] == {}

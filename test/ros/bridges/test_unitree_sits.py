@@ -63,7 +63,7 @@ def sits(plan, last, goes_on):
             assert not machine.rise(now)
         if now > 2.1 and (goes_on or now < last):
             pattern.advance(DT)
-            machine.set_target(pattern.position[GO2.places].copy(), now)
+            machine.set_target(pattern.position[GO2.order_indices].copy(), now)
         if goes_on and now >= last:
             machine.sit(now, 'SIGINT')
         machine.step(now)

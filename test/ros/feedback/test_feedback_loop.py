@@ -18,7 +18,7 @@ import importlib.util
 import math
 
 from c_ticks import CTicks
-from cpg_ros.feedback.closed_loop import take_in
+from cpg_ros.feedback.closed_loop import check_inputs
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_checks import FADE, GOOD, STALE
@@ -143,11 +143,11 @@ class Robot:
                 data = self.late[name][-1 - round(0.2 / DT)]
             wire.data = None if bad == 'dead' else data
         self.ticks.tick(self.stamp)
-        self.body.command(self.loop.target[GO2.places])
+        self.body.command(self.loop.target[GO2.order_indices])
         self.body.step()
 
     def walk(self, topic='', how='', last=LAST):
-        """Return the share of the feedback, and the joints' positions and velocities."""
+        """Return the fraction of the feedback, and the joints' positions and velocities."""
         steps = round(last / DT)
         fraction, told, spun = np.empty(steps), np.empty((steps, 12)), np.empty((steps, 12))
         self.named, self.free = '', np.ones(steps, dtype=bool)
@@ -290,5 +290,5 @@ def test_feet_in_the_air_may_be_minus_zero(monkeypatch):
     for k in range(100):
         Wire.wires['foot_contacts'].data = serialize_message(Float64MultiArray(data=[-0.0] * 4))
         inputs.read()
-        take_in(inputs.senses, inputs.sensor_data, inputs.legs, 0.002 * k, True)
+        check_inputs(inputs.senses, inputs.sensor_data, inputs.legs, 0.002 * k, True)
     assert not monitor.fault(0.2)

@@ -68,20 +68,20 @@ def test_tokens():
     ('/socket', 'evil.example:8080', 'http://evil.example:8080', 'not a name of this machine'),
     ('/socket', '', '', 'not a name of this machine')])
 def test_on_loopback_pages_of_this_machine_come_in(path, host, origin, said):
-    found = AccessControl('').refuses(path, host, origin)
+    found = AccessControl('').validate(path, host, origin)
     assert (said in found) if said else not found
 
 
 @pytest.mark.parametrize('query', ['', '?token=', '?token=wor', '?token=wordy', '?token=WORD',
                                    '?Token=word', '?token=w%00ord', '?token=\udcff'])
 def test_a_wrong_token_does_not(query):
-    assert 'token' in AccessControl('word').refuses(f'/socket{query}', 'robot:8080', '')
+    assert 'token' in AccessControl('word').validate(f'/socket{query}', 'robot:8080', '')
 
 
 def test_the_token_does_from_anywhere_but_another_sites_page():
     door = AccessControl('a b&c')
-    assert not door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
-    assert door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
+    assert not door.validate('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
+    assert door.validate('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
 
 
 @pytest.mark.parametrize('text', [

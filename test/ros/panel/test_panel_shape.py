@@ -219,7 +219,7 @@ def test_the_panel_and_robot_sim_find_the_same_meshes(tmp_path, monkeypatch, pla
 
 @pytest.fixture
 def installed(tmp_path, monkeypatch):
-    """Return the share folder of a package that is installed, and the package's sources."""
+    """Return the fraction folder of a package that is installed, and the package's sources."""
     prefix, sources = tmp_path / 'prefix', tmp_path / 'src' / 'arm_description'
     index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
     shared = prefix / 'share' / 'arm_description'

@@ -63,7 +63,7 @@ def messages():
     names = [joint.name for joint in GO2.joints]
     for k in range(round(10.0 / DT)):
         pattern.advance(DT)
-        body.command(pattern.position[GO2.places])
+        body.command(pattern.position[GO2.order_indices])
         body.step()
         senses, stamp = feel(), START + k * round(DT * 1e9)
         w, x, y, z = body.quaternion

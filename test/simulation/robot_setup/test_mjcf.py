@@ -105,8 +105,8 @@ def test_limits_and_frames_as_mujoco_takes_them(tmp_path):
     assert found['a'] == ('revolute', -0.5, pytest.approx(math.pi / 4), inf)
     assert found['b'] == ('revolute', -3.0, 2.0, 7.0)
     assert found['c'] == ('continuous', -inf, inf, inf)
-    assert found['d'][0] == 'prismatic' and joints['f'].flaw == 'is ball'
-    assert joints['e'].flaw == "follows 'a' (mimic)" and not joints['a'].flaw
+    assert found['d'][0] == 'prismatic' and joints['f'].undrivable == 'is ball'
+    assert joints['e'].undrivable == "follows 'a' (mimic)" and not joints['a'].undrivable
     # In the frame of the base, which is turned by half a turn in the world.
     assert known.frame('c')[0] == pytest.approx([1.0, 0.0, -1.0], abs=1e-9)
     assert known.direction('a') == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)

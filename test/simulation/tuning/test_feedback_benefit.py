@@ -25,7 +25,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.tuning import feedback  # noqa: I100
-from cpg_ros.simulation.tuning.feedback import Benefit, judge_feedback
+from cpg_ros.simulation.tuning.feedback import Benefit, evaluate_feedback
 from cpg_ros.simulation.tuning.gaits import Survivors
 
 
@@ -37,7 +37,7 @@ def quick(monkeypatch):
 
 
 def test_feedback_that_saves_a_robot_is_on(quick):
-    robot, (one,) = judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
+    robot, (one,) = evaluate_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
     pushes = one.pushes
     assert one.helps and one.upright == 4 and pushes.after > pushes.before
     assert pushes.won - pushes.lost == pushes.after - pushes.before
@@ -51,7 +51,7 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
     """Posture that answers a lean ten times as much fells it, with reflexes or without."""
     own = OwnFeedback(laws={'placement': False}, gains={'roll': 15.0, 'pitch': 11.0})
     monkeypatch.setattr(feedback, 'WITHOUT', ((), ('reflexes',)))
-    robot, (one,) = judge_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
+    robot, (one,) = evaluate_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
     assert not one.helps
     assert robot.feedback == replace(own, enabled=False, made=f'in simulation, {one}')
 
@@ -73,6 +73,6 @@ def test_it_is_judged_on_late_and_noisy_sensors(quick, monkeypatch):
     monkeypatch.setattr(feedback.ClosedLoopBatch, 'run', record)
     monkeypatch.setattr(feedback, 'WALKED', 0.5)
     monkeypatch.setattr(feedback, 'WATCHED', 0.5)
-    judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
+    evaluate_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
     assert {one.delay for one in seen} == {0.01, 0.02}
     assert all(one.gyroscope_noise and one.accelerometer_noise and one.force_noise for one in seen)

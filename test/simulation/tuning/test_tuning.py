@@ -63,7 +63,7 @@ def feet(batch):
 
 
 def in_order(pattern):
-    return pattern.position[GO2.places]
+    return pattern.position[GO2.order_indices]
 
 
 @examples(10)

@@ -55,7 +55,7 @@ static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *
     if (absorbing && c->jumped) {
         c->absorbed += dt;
     }
-    const cpg_real share = least(1.0, c->absorbed / ABSORB);
+    const cpg_real done = least(1.0, c->absorbed / ABSORB);
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
         cpg_real gap = 0.0, gap_rate = 0.0;
         if (absorbing) {
@@ -64,7 +64,7 @@ static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *
                 c->jump_rate[joint] = c->rate[joint] - rate[joint];
             }
             const cpg_ramp_part way = {c->jump[joint], c->jump_rate[joint], 0.0, ABSORB};
-            gap = come_to_rest(&way, share, &gap_rate);
+            gap = come_to_rest(&way, done, &gap_rate);
         }
         c->wanted[joint] = wanted[joint] + gap;
         c->rate[joint] = rate[joint] + gap_rate;
@@ -138,7 +138,7 @@ void cpg_plan(cpg *c, cpg_real dt)
 }
 
 /* Move the joints to the wanted angles, or to the goal of a correction. */
-void cpg_follow(cpg *c, cpg_real dt, int corrected)
+void cpg_move(cpg *c, cpg_real dt, int corrected)
 {
     cpg_real rate[CPG_JOINTS];
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
@@ -174,7 +174,7 @@ void cpg_reach(cpg *c, cpg_real dt)
     take(c);
     c->tracks = 1;
     rest(c);
-    cpg_follow(c, dt, 1);
+    cpg_move(c, dt, 1);
 }
 
 /* Fill the inputs of a correction: level, phase of the first leg, fraction of the gait that is
@@ -200,7 +200,7 @@ void cpg_report(const cpg *c, cpg_real *numbers, int64_t *gaits)
 void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_plan(c, dt);
-    cpg_follow(c, dt, 0);
+    cpg_move(c, dt, 0);
 }
 
 /* Go on with the gait after cpg_reach: the joints move there from where they are. */

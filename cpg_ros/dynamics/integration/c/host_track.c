@@ -1,6 +1,6 @@
 
 /* A network is off its orbit if, for more than PATIENCE strides, a cell is further away than the
- * share FAR of the peak, or the phase differs from the clock by more than ASTRAY cycles. */
+ * fraction FAR of the peak, or the phase differs from the clock by more than ASTRAY cycles. */
 #define FAR 0.3
 #define ASTRAY 0.15
 #define PATIENCE 0.5

@@ -51,9 +51,9 @@ static void ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
 static cpg_real come_to_rest(const cpg_ramp_part *way, cpg_real s, cpg_real *rate)
 {
     cpg_real slope;
-    const cpg_real share = smoothstep(s, &slope), left = R(1.0) - s;
+    const cpg_real weight = smoothstep(s, &slope), left = R(1.0) - s;
     *rate = slope * (way->end - way->start) / way->time + left * (R(1.0) - R(3.0) * s) * way->rate;
-    return way->start + share * (way->end - way->start) + s * left * left * way->time * way->rate;
+    return way->start + weight * (way->end - way->start) + s * left * left * way->time * way->rate;
 }
 
 static void advance_ramp(cpg_ramp *ramp, cpg_real clock)
@@ -101,15 +101,15 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
 {
     const cpg_real clock = R(0.5) * dt * (c->slowing + c->slower);
     uint8_t moving = c->tracks > 1 || c->ramp.parts > 0, approaching = 0;
-    cpg_real share[CPG_TRACKS] = {R(0.0)}, share_rate[CPG_TRACKS] = {R(0.0)};
+    cpg_real weight[CPG_TRACKS] = {R(0.0)}, weight_rate[CPG_TRACKS] = {R(0.0)};
     cpg_real frequency = gait_of(TRACK(0))->frequency;
     c->slowing = c->slower;
     for (int16_t n = 1; FADES && n < c->tracks; n++) {
         cpg_track *t = TRACK(n);
         t->progress = least(R(1.0), t->progress + clock / t->transition);
-        share[n] = smoothstep(t->progress, &share_rate[n]);
-        share_rate[n] /= t->transition;
-        frequency += share[n] * (gait_of(t)->frequency - frequency);
+        weight[n] = smoothstep(t->progress, &weight_rate[n]);
+        weight_rate[n] /= t->transition;
+        frequency += weight[n] * (gait_of(t)->frequency - frequency);
     }
 #ifdef CPG_STEERING
     /* Strides change by the slowed clock, as all that makes up the rates does. */
@@ -143,9 +143,9 @@ static void part_of_tick(cpg *c, cpg_real dt, cpg_real *wanted, cpg_real *rate)
         cpg_real angle = TRACK(0)->angle[joint], speed = speed_of(c, TRACK(0), joint, frequency);
         for (int16_t n = 1; FADES && n < c->tracks; n++) {
             const cpg_track *t = TRACK(n);
-            speed += share[n] * (speed_of(c, t, joint, frequency) - speed)
-                   + share_rate[n] * (t->angle[joint] - angle);
-            angle += share[n] * (t->angle[joint] - angle);
+            speed += weight[n] * (speed_of(c, t, joint, frequency) - speed)
+                   + weight_rate[n] * (t->angle[joint] - angle);
+            angle += weight[n] * (t->angle[joint] - angle);
         }
         rate[joint] = c->ramp.level * speed + c->ramp.rate * angle;
         wanted[joint] = c->ramp.level * angle + cpg_offset[joint];

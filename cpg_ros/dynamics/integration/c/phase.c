@@ -34,7 +34,7 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
     CPG_ROM cpg_real *table = gait->waves + (int32_t)wave * CPG_VARIABLES * gait->points * 2;
     const cpg_real phase = t->clocks[PHASE][cell], amount = t->clocks[AMOUNT][cell];
     const cpg_real pull = PULL / (R(1.0) + R(2.0) * PULL * strides);
-    const cpg_real share = strides / (SMOOTHING + strides);
+    const cpg_real gain = strides / (SMOOTHING + strides);
     const cpg_real c1 = F(cos)(TURN * phase), s1 = F(sin)(TURN * phase);
     cpg_real rest, slope, off[2];
 #ifdef CPG_HOST
@@ -55,9 +55,9 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
                          + (circle[2] * c1 + circle[3] * s1) * off[1];
     const cpg_real across = (circle[1] * c1 - circle[0] * s1) * off[0]
                           + (circle[3] * c1 - circle[2] * s1) * off[1];
-    t->clocks[NEXT_SPEED][cell] += share * (
+    t->clocks[NEXT_SPEED][cell] += gain * (
         within(pull * across / TURN, -MOST_TURN, MOST_TURN) - t->clocks[NEXT_SPEED][cell]);
-    t->clocks[NEXT_GROWTH][cell] += share * (pull * along - t->clocks[NEXT_GROWTH][cell]);
+    t->clocks[NEXT_GROWTH][cell] += gain * (pull * along - t->clocks[NEXT_GROWTH][cell]);
 }
 
 /* x and y of a cell by its clock, and their derivatives by the strides. */

@@ -5,7 +5,7 @@ const SPAN = 5;      // s shown
 const STANDS = 5;    // a foot stands from this force on, N
 const KEPT = 400;    // frames
 const USUAL = 1.7;   // times the usual time between two frames; after more, some were missed
-const CHORD = 0.1;   // share of a stride that a straight line may stand for
+const CHORD = 0.1;   // fraction of a stride that a straight line may stand for
 const STRIDE = 1;    // s; what speeds are averaged over where the stride rate is not known
 
 export class Plots {

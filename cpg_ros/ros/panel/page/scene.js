@@ -2,7 +2,7 @@
 import { identity, lookAt, multiply, perspective } from './matrices.js';
 
 const LIGHT = [0.35, 0.25, -1];
-const LEAST = 0.7;      // share of the screen's pixels that are drawn at least, each way
+const LEAST = 0.7;      // fraction of the screen's pixels that are drawn at least, each way
 const NEWTON = 0.0022;  // length of an arrow for each newton, m
 
 const SOLID = [`#version 300 es
@@ -50,7 +50,7 @@ export class Scene {
     this.moved = moved;
     this.target = [0, 0, 0.25];
     this.meshes = [];
-    this.share = 1;
+    this.resolution = 1;
     this.gl = canvas.getContext('webgl2', { stencil: true, antialias: true });
     this.drag();
     if (!this.gl) return;
@@ -114,7 +114,7 @@ export class Scene {
     const { gl, canvas, camera } = this;
     if (!gl) return;
     // One pixel for each of the screen's; the edges are smoothed by the context's antialiasing.
-    const scale = this.share * Math.min(window.devicePixelRatio || 1, 3);
+    const scale = this.resolution * Math.min(window.devicePixelRatio || 1, 3);
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((one) => one * scale | 0);
     if (canvas.width !== wide || canvas.height !== high)
       [canvas.width, canvas.height] = [wide, high];
@@ -126,11 +126,11 @@ export class Scene {
       const [x, y] = this.body.middle;
       // The camera goes along; a jump of the robot is one of the camera.
       const now = performance.now(), passed = now - (this.drawn || 0);
-      const share = Math.hypot(x - this.target[0], y - this.target[1]) > 1 ? 1
+      const step = Math.hypot(x - this.target[0], y - this.target[1]) > 1 ? 1
         : 1 - Math.exp(-passed / 150);
       this.drawn = now;
-      this.target = [this.target[0] + share * (x - this.target[0]),
-        this.target[1] + share * (y - this.target[1]), 0.22];
+      this.target = [this.target[0] + step * (x - this.target[0]),
+        this.target[1] + step * (y - this.target[1]), 0.22];
     }
     const [azimuth, elevation] = [camera.azimuth, camera.elevation].map((a) => a * Math.PI / 180);
     const away = camera.distance;
@@ -172,8 +172,8 @@ export class Scene {
     const passed = now - (this.before ?? now);
     this.before = now;
     if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.share = Math.max(LEAST, 0.9 * this.share);
-    else if (this.pace < 40) this.share = Math.min(1, 1.01 * this.share);
+    if (this.pace > 70) this.resolution = Math.max(LEAST, 0.9 * this.resolution);
+    else if (this.pace < 40) this.resolution = Math.min(1, 1.01 * this.resolution);
   }
 
   // Every pixel of the floor is darkened once, however many links are above it.

@@ -1,7 +1,7 @@
 // A tour of the gaits: this page steers the robot ahead, and changes its gait now and then.
 
 const EVERY = 6;     // s of the robot's time for each gait
-const SPEED = 0.8;   // share of the largest speed
+const SPEED = 0.8;   // fraction of the largest speed
 
 export class Tour {
   // Steering holds what it is told to, as if a key were down; set changes the gait.
