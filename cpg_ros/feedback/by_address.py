@@ -26,11 +26,10 @@ from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.closed_loop import (
     close,
-    closing_arguments,
     DT,
     finish,
     Instant,
-    STATE,
+    LoopData,
     warm_up_senses,
 )
 from cpg_ros.feedback.estimate import Odometry
@@ -53,30 +52,22 @@ _loaded: Any = intrinsic(_load)
 
 
 def _close(arguments):
-    return close(*_loaded(arguments)[:11])
+    return close(_loaded(arguments))
 
 
 def _finish(arguments):
-    (legs, _, gains, memory, senses, sensors, _, _, instant, state, _, odometry, position,
-     sent) = _loaded(arguments)
-    finish(legs, gains, memory, sensors, instant, state, odometry,
-           (senses.limits, position, sent))
+    finish(_loaded(arguments))
     return 0
 
 
-def closing_function(arguments: tuple) -> Any:
-    """Compile ``close`` as a function of C, ``int64_t f(const void *)``, at its ``address``.
-
-    Args:
-        arguments: of close, then the last three of finish.
-
-    """
-    return machine_function(_close, arguments)
+def closing_function(loop: LoopData) -> Any:
+    """Compile ``close`` as a function of C, ``int64_t f(const void *)``, at its ``address``."""
+    return machine_function(_close, loop)
 
 
-def finishing_function(arguments: tuple) -> Any:
-    """Compile ``finish`` as closing_function does ``close``, of the same arguments."""
-    return machine_function(_finish, arguments)
+def finishing_function(loop: LoopData) -> Any:
+    """Compile ``finish`` as closing_function does ``close``, of the same data."""
+    return machine_function(_finish, loop)
 
 
 def _balance(arguments):
@@ -128,8 +119,8 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     """Compile what a generator uses; joints is their number."""
     feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
     senses, sensors = warm_up_senses(legs, joints)
-    arguments = (*closing_arguments(
-        feedback, senses, sensors, Instant.empty(legs, np.zeros(1)), np.zeros(STATE),
-        np.zeros((1, joints)), np.zeros(joints)), Odometry.begin(), *np.zeros((2, 1, joints)))
-    closing_function(arguments)
-    finishing_function(arguments)
+    angles = np.zeros(joints)
+    loop = LoopData.of(feedback, senses, sensors, Instant.empty(legs, np.zeros(1)), angles, angles,
+                       Odometry.begin(), angles)
+    closing_function(loop)
+    finishing_function(loop)

@@ -15,17 +15,20 @@
 """One tick of the closed loop, compiled: from the values of messages to corrected angles."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.estimate import (
     advance_odometry,
     loads_of,
     lose_odometry,
+    Odometry,
     SensorData,
     TOUCH,
 )
-from cpg_ros.feedback.gait_tables import POINTS
+from cpg_ros.feedback.feedback import Feedback
+from cpg_ros.feedback.gains import Gains, Memory
+from cpg_ros.feedback.gait_tables import GaitTables, POINTS
 from cpg_ros.feedback.input_checks import (
     AGE,
     agreement,
@@ -225,48 +228,90 @@ def _slot(tables, key):
 
 
 @jit
-def _compare_contacts(legs, tables, senses, sensors, rates, instant, slot, state):
+def _compare_contacts(loop, slot):
     """Update the faults that interrupt the feedback; return whether there are any."""
-    numbers, out = instant.numbers, 0
-    dt = numbers[DT]
-    for k in range(len(senses.monitors)):
-        out += is_out(senses.monitors[k], numbers[NOW])
+    numbers, state, monitors, tables = (
+        loop.instant.numbers, loop.state, loop.senses.monitors, loop.tables)
+    dt, out = numbers[DT], 0
+    for k in range(len(monitors)):
+        out += is_out(monitors[k], numbers[NOW])
     state[OUT], state[MOUNT], state[CONTRARY] = out, 0.0, 0.0
     if out == 0:
-        state[MOUNT] = compare_rates(legs, sensors, dt, rates[0], rates[1], rates[2])
+        state[MOUNT] = compare_rates(loop.legs, loop.sensors, dt, *loop.rates)
     wrong = out > 0 or state[MOUNT] > 0.0 or not tables.copied[slot]
     if wrong or numbers[LEVEL] < 1.0 or numbers[CHANGES] > 0.0:
         state[AGREEMENT] = 1.0
         return wrong
     row = int(numbers[PHASE] * POINTS) % POINTS
-    state[AGREEMENT] = agreement(sensors.foot_forces[0], TOUCH * legs.weight,
+    state[AGREEMENT] = agreement(loop.sensors.foot_forces[0], TOUCH * loop.legs.weight,
                                  tables.swinging[slot, row], min(dt * numbers[FREQUENCY], 1.0),
                                  state[AGREEMENT])
     state[CONTRARY] = state[AGREEMENT] < AGREES
     return state[CONTRARY] > 0.0
 
 
-@jit_entry
-def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant, state, out):
+class LoopData(NamedTuple):
+    """Inputs, state and outputs of the closed loop of one robot, as compiled code takes them.
+
+    Attributes:
+        legs: of the robot.
+        tables: of its gaits.
+        gains: of the laws.
+        memory: of one run, changed in place.
+        senses: of the robot.
+        sensors: of one run, filled.
+        planned: of which angles are given, rad, shape (1, joints).
+        rates: memory and scratch of compare_rates.
+        instant: of the pattern.
+        state: see WANTED and what follows it.
+        corrected: angles, rad, shape (1, joints); filled.
+        odometry: of the base, advanced in place.
+        position: target angles within the limits, rad, shape (1, joints).
+        sent: angles to send, which virtual stiffness moves, rad, shape (1, joints); filled.
+
+    """
+
+    legs: LegArrays
+    tables: GaitTables
+    gains: Gains
+    memory: Memory
+    senses: Senses
+    sensors: SensorData
+    planned: PlannedMotion
+    rates: tuple[np.ndarray, ...]
+    instant: Instant
+    state: np.ndarray
+    corrected: np.ndarray
+    odometry: Odometry
+    position: np.ndarray
+    sent: np.ndarray
+
+    @classmethod
+    def of(cls, feedback: Feedback, senses: Senses, sensors: SensorData, instant: Instant,
+           angles: np.ndarray, goal: np.ndarray, odometry: Odometry, position: np.ndarray
+           ) -> 'LoopData':
+        """Return those of one robot; angles before and goal after the correction, (joints,)."""
+        planned = PlannedMotion.zeros(1, goal.size)._replace(angles=angles[None])
+        legs = feedback.geometry.arrays
+        return cls(legs, feedback.tables, feedback.gains, feedback.memory, senses, sensors,
+                   planned, rates_memory(len(legs.rows)), instant, np.zeros(STATE), goal[None],
+                   odometry, position[None], position[None].copy())
+
+
+@jit
+def close(loop):
     """Correct a tick's planned angles by the measurements.
 
     Args:
-        legs: LegArrays of the robot.
-        tables: GaitTables of its gaits.
-        gains: Gains of the laws.
-        memory: Memory of one run, changed in place.
-        senses: Senses.
-        sensors: SensorData of one run, filled.
-        planned: PlannedMotion, of which angles are given.
-        rates: memory and scratch of compare_rates.
-        instant: Instant.
-        state: see WANTED and what follows it.
-        out: angles, rad, shape (1, joints); filled.
+        loop: LoopData, changed in place.
 
     Returns:
         0 for no correction, 1 for one, and 2 for none from now on, so that memory is to be reset.
 
     """
+    legs, tables, memory, senses, sensors = (
+        loop.legs, loop.tables, loop.memory, loop.senses, loop.sensors)
+    planned, instant, state, out = loop.planned, loop.instant, loop.state, loop.corrected
     numbers, trim = instant.numbers, instant.trim
     dt, level = numbers[DT], numbers[LEVEL]
     wanted, wrong = state[WANTED] > 0.0, False
@@ -275,7 +320,7 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
         old, new = _slot(tables, instant.gaits[0]), _slot(tables, instant.gaits[1])
         new = max(new, 0)
         old = new if old < 0 else old
-        wrong = _compare_contacts(legs, tables, senses, sensors, rates, instant, new, state)
+        wrong = _compare_contacts(loop, new)
         state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], wanted and not wrong, dt)
         state[FRACTION] = state[WAY]**2 * (3.0 - 2.0 * state[WAY])
         state[SPENT] = 0.0 if state[FRACTION] > 0.0 else state[SPENT] + dt
@@ -296,57 +341,30 @@ def close(legs, tables, gains, memory, senses, sensors, planned, rates, instant,
     else:
         heading[0] = yaw
     age = senses.monitors[1, AGE]
-    tick(legs, tables, gains, memory, sensors, planned,
+    tick(legs, tables, loop.gains, memory, sensors, planned,
          (dt, state[FRACTION] * level, level, math.inf if math.isnan(age) else age), out)
     instant.scale[0], trim[:], state[CLOSED] = memory.frequency_scale[0], memory.stride[0], 1.0
     return 1
 
 
-@jit_entry
-def finish(legs, gains, memory, sensors, instant, state, odometry, angles):
+@jit
+def finish(loop):
     """Finish a corrected tick, once limits hold its angles: odometry, and the angles to send.
 
     Args:
-        legs: as of close, like all up to state.
-        gains: of the laws.
-        memory: of one run.
-        sensors: of one run.
-        instant: Instant.
-        state: see WANTED.
-        odometry: Odometry, advanced in place.
-        angles: limits of the joints, as of Senses, target angles within these, rad, shape
-            (1, joints), and the angles to send, which virtual stiffness moves, filled.
+        loop: LoopData, changed in place.
 
     """
-    limits, position, sent = angles
-    if state[CLOSED] > 0.0:
-        advance_odometry(odometry, legs, sensors, memory.velocity[0], memory.contact[0],
-                         instant.numbers[DT])
+    memory, sensors, dt = loop.memory, loop.sensors, loop.instant.numbers[DT]
+    if loop.state[CLOSED] > 0.0:
+        advance_odometry(loop.odometry, loop.legs, sensors, memory.velocity[0], memory.contact[0],
+                         dt)
     else:
-        lose_odometry(odometry, instant.numbers[DT])
-    sent[:] = position
-    if gains.virtual_stiffness:
-        virtual_stiffness.stretch(sent, sensors.joint_positions, memory.stiff, gains, limits)
-
-
-def closing_arguments(feedback: Any, senses: Senses, sensors: SensorData, instant: Instant,
-                      state: np.ndarray, angles: np.ndarray, out: np.ndarray) -> tuple:
-    """Return the arguments of close.
-
-    Args:
-        feedback: Feedback of one robot.
-        senses: see close.
-        sensors: see close.
-        instant: see close.
-        state: see close.
-        angles: planned, rad, shape (1, joints).
-        out: corrected, rad, shape (joints,).
-
-    """
-    planned = PlannedMotion.zeros(1, out.size)._replace(angles=angles)
-    legs = feedback.geometry.arrays
-    return (legs, feedback.tables, feedback.gains, feedback.memory, senses, sensors, planned,
-            rates_memory(len(legs.rows)), instant, state, out[None])
+        lose_odometry(loop.odometry, dt)
+    loop.sent[:] = loop.position
+    if loop.gains.virtual_stiffness:
+        virtual_stiffness.stretch(loop.sent, sensors.joint_positions, memory.stiff, loop.gains,
+                                  loop.senses.limits)
 
 
 def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:

@@ -46,7 +46,7 @@ class Feedback:
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
         self._legs, self.tables = geometry.arrays, GaitTables.empty(legs)
-        self._programs: list[GaitPlan | None] = [None] * SLOTS
+        self._plans: list[GaitPlan | None] = [None] * SLOTS
         self._learnt = 0
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
         self._tick: Callable | None = None
@@ -63,13 +63,13 @@ class Feedback:
         slot = self._learnt % SLOTS
         self.tables.fill(slot, Timetable(plan, self.geometry),
                           expected or EfferenceCopy.blank(), plan)
-        self._programs[slot] = plan
+        self._plans[slot] = plan
         self._learnt += 1
         return slot
 
     def slot(self, plan: GaitPlan) -> int:
         """Return the slot of a gait; learn a new one without an efference copy."""
-        for k, plan_of_slot in enumerate(self._programs):
+        for k, plan_of_slot in enumerate(self._plans):
             if plan_of_slot is plan:
                 return k
         return self.learn(plan)

@@ -33,9 +33,9 @@ import numpy as np
 
 #: POINTS: points of a cycle in the tables of an orbit; a cell may jump within 0.01 cycles.
 POINTS = 4096
-#: LEAST_SHARE: least fraction of the first harmonic in a waveform's variance for a phase to be
+#: LEAST_FRACTION: least fraction of the first harmonic in a waveform's variance for a phase to be
 #: read.
-LEAST_SHARE = 0.1
+LEAST_FRACTION = 0.1
 
 
 class PhaseMap(NamedTuple):
@@ -124,9 +124,9 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
         states = (states - mean) / half
         first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
         square = 0.5 * (np.abs(first)**2).sum()
-        if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
+        if square < LEAST_FRACTION * (states**2).mean(axis=0).sum():
             raise NoPhase('its waveform repeats within a cycle: the first harmonic, by which its '
-                          f'phase is followed, has less than {LEAST_SHARE:.0%} of it')
+                          f'phase is followed, has less than {LEAST_FRACTION:.0%} of it')
         maps.shape[wave] = *mean, *half
         maps.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
         maps.tables[wave] = np.hstack([states, slopes / half / POINTS])

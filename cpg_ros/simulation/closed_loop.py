@@ -124,6 +124,93 @@ class Patterns:
         return self._position
 
 
+class _Bodies:
+    """The bodies of all runs; one that has ended stays where it is.
+
+    Attributes:
+        place: of the bases on the ground, m, shape (runs, 2).
+        velocity: of the bases in their own frames, m/s, shape (runs, 3), by ``measure``.
+        fell: when they fell, s, infinite if they did not, shape (runs,).
+        arrived: when they reached the goal, likewise.
+
+    """
+
+    def __init__(self, physics: BatchPhysics, scenarios: Sequence[Scenario], gains: Gains | None,
+                 order: np.ndarray) -> None:
+        """Stand; order: indices in ``Robot.order`` of the joints as sensors have them."""
+        model, parts, runs = physics.body.model, physics.parts, len(scenarios)
+        self._physics, self._legs = physics, len(physics.body.robot.legs)
+        self._models = [physics.model(scenario) for scenario in scenarios]
+        self._stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
+            physics.model(scenario, gains.stiffen_kp) for scenario in scenarios]
+        self._control, self._joints, self._force = physics.controls(runs, 1)
+        self._state = np.tile(physics.start, (runs, 1))
+        self._sensors = np.zeros((runs, model.nsensordata))
+        self._moving = slice(1 + model.nq, 1 + model.nq + model.nv)
+        free = 1 + model.nq + int(model.jnt_dofadr[model.body_jntadr[parts.base]])
+        #: Columns of the state: velocity of the base, its orientation, and the joints.
+        self._base, self._turned = slice(free, free + 6), 1 + parts.pose[3:]
+        self._angles = 1 + parts.angles[order]
+        self._rates = self._moving.start + parts.speeds[order]
+        self._warm = np.zeros((runs, model.nv))
+        self._earlier = self._state[:, self._base].copy()
+        self.place, self.velocity = np.zeros((runs, 2)), np.zeros((runs, 3))
+        self.fell, self.arrived = np.full((2, runs), np.inf)
+        #: Runs that go on, as indices and as what selects their rows.
+        self._going = np.arange(runs)
+        self._some: slice | np.ndarray = slice(None)
+
+    def measure(self, senses: SensorData) -> None:
+        """Fill the sensors' exact values, and what is known of the bases."""
+        state = self._state
+        senses.joint_positions[:] = state[:, self._angles]
+        senses.joint_velocities[:] = state[:, self._rates]
+        np.negative(self._sensors[:, 2:3 * self._legs:3], out=senses.foot_forces)
+        fill_sensor_data(senses, state[:, self._turned], state[:, self._base], self._earlier,
+                         self._physics.timestep, self.velocity)
+        self.place[:] = state[:, 1 + self._physics.parts.pose[:2]]
+
+    def step(self, targets: np.ndarray, force: np.ndarray, kp_scale: np.ndarray) -> None:
+        """Take a step of the physics.
+
+        Args:
+            targets: of the joints, in ``Robot.order``, rad, shape (runs, joints).
+            force: on the bases, forward and to the left, N, shape (runs, 2).
+            kp_scale: factor of the servos' stiffness, shape (runs,).
+
+        """
+        some, state = self._some, self._state
+        self._joints[:, 0], self._force[:, 0] = targets, force
+        self._earlier[:] = state[:, self._base]
+        before = state[some, self._moving]
+        models = [(self._stiff if self._stiff and kp_scale[run] > 1.0 else self._models)[run]
+                  for run in self._going]
+        after, sensed = self._physics.rollout(models, state[some], self._control[some],
+                                              self._warm[some])
+        state[some], self._sensors[some] = after[:, 0], sensed[:, 0]
+        self._warm[some] = (state[some, self._moving] - before) / self._physics.timestep
+
+    def go_on(self, rpy: np.ndarray, goal: float, now: float) -> bool:
+        """End runs that have fallen or arrived, at a time in s; return whether any goes on.
+
+        Args:
+            rpy: of the bases before the step, rad, shape (runs, 3).
+            goal: way forward, m.
+            now: s.
+
+        """
+        level = np.cos(rpy[:, 0]) * np.cos(rpy[:, 1])
+        down = (level < math.cos(FALLEN)) | (self._sensors[:, 3 * self._legs] > 0.0)
+        far = self._state[:, 1 + self._physics.parts.pose[0]] > goal
+        ends = (down | far)[self._going]
+        if ends.any():
+            over = self._going[ends]
+            self.fell[over[down[over]]] = self.arrived[over[~down[over]]] = now
+            self._state[over, self._base] = self._earlier[over] = 0.0
+            self._some = self._going = self._going[~ends]
+        return bool(self._going.size)
+
+
 class ClosedLoopBatch(BatchPhysics):
     """Bodies of one robot with feedback from their sensors.
 
@@ -172,44 +259,30 @@ class ClosedLoopBatch(BatchPhysics):
                 joints); of a run that has ended they mean nothing.
 
         """
-        model, dt, parts = self.body.model, self.timestep, self.parts
-        runs, steps, legs = len(scenarios), round(duration / dt), len(self._robot.legs)
+        dt, runs, legs = self.timestep, len(scenarios), len(self._robot.legs)
         if not isinstance(expected, Mapping):
             expected = {} if expected is None else {self.plan.name: expected}
         feedback = Feedback(self.geometry, gains, runs, len(self._robot.joints))
         for name, plan in self.plans.items():
             feedback.learn(plan, expected.get(name))
         memory, state_of = feedback.memory, BodyState(self.geometry, runs)
-        estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = Patterns(self.plans, feedback, scenarios, dt, gains is not None)
         limits = np.stack([self._robot.column('lower'), self._robot.column('upper')])
-        models = [self.model(item) for item in scenarios]
-        stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
-            self.model(item, gains.stiffen_kp) for item in scenarios]
-        control, joints, force = self.controls(runs, 1)
-        forces = np.stack([item.forces(steps, dt) for item in scenarios], axis=1)
-        order, indices = np.argsort(self._robot.order_indices), self._robot.order_indices
-        state, sensors = np.tile(self.start, (runs, 1)), np.zeros((runs, model.nsensordata))
-        moving = slice(1 + model.nq, 1 + model.nq + model.nv)
-        free = 1 + model.nq + int(model.jnt_dofadr[model.body_jntadr[parts.base]])
-        base = slice(free, free + 6)
-        before, warm = state[:, moving].copy(), np.zeros((runs, model.nv))
-        earlier = state[:, base].copy()
-        angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
+        indices = self._robot.order_indices
+        order, steps = np.argsort(indices), round(duration / dt)
+        bodies = _Bodies(self, scenarios, gains, order)
         senses = SensorData.zeros(runs, legs, len(order))
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
-        velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
-        fell, arrived = np.full((2, runs), np.inf)
-        going, some, all_models = np.arange(runs), slice(None), models
-        record: dict[str, np.ndarray] = {}
-        delay = 0.0 if noise is None else noise.delay
+        forces = np.stack([scenario.forces(steps, dt) for scenario in scenarios], axis=1)
+        signals = {'place': bodies.place, 'rpy': senses.rpy, 'velocity': bodies.velocity,
+                   'estimated': memory.velocity if gains is not None else state_of.velocity,
+                   'angular_velocity': senses.angular_velocity, 'phase': pattern.planned.phase,
+                   'kp_scale': memory.kp_scale, 'stiff': memory.stiff}
+        record = {key: np.zeros((steps, *value.shape)) for key, value in signals.items()}
+        work, delay = np.zeros((steps, runs)), 0.0 if noise is None else noise.delay
         for k in range(steps):
             pattern.plan()
-            senses.joint_positions[:] = state[:, angle_at]
-            senses.joint_velocities[:] = state[:, rate_at]
-            np.negative(sensors[:, 2:3 * legs:3], out=senses.foot_forces)
-            fill_sensor_data(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt,
-                             velocity)
+            bodies.measure(senses)
             noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
@@ -219,44 +292,20 @@ class ClosedLoopBatch(BatchPhysics):
             angles = pattern.move(angles)
             if gains is not None and gains.virtual_stiffness:
                 stretch(angles, noticed.joint_positions, memory.stiff, gains, limits)
-            joints[:, 0], force[:, 0] = angles[:, indices], forces[k]
-            signals = {'place': state[:, 1 + parts.pose[:2]], 'rpy': senses.rpy,
-                       'velocity': velocity, 'estimated': estimated,
-                       'angular_velocity': senses.angular_velocity,
-                       'phase': pattern.planned.phase, 'kp_scale': memory.kp_scale,
-                       'stiff': memory.stiff}
             for key, value in signals.items():
-                if not k:
-                    record[key] = np.zeros((steps, *value.shape))
                 record[key][k] = value
             speeds = senses.joint_velocities[:, indices]
-            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, indices], speeds,
-                                 memory.kp_scale)
+            _, applied = torques(self.body.model, angles[:, indices],
+                                 senses.joint_positions[:, indices], speeds, memory.kp_scale)
             work[k] = motor_power(applied, speeds)
             observe(noticed, applied[:, order])
-            earlier, before = state[:, base].copy(), state[some, moving]
-            if stiff:
-                models = [(stiff if memory.kp_scale[run] > 1.0 else all_models)[run]
-                          for run in going]
-            after, sensed = self.rollout(models, state[some], control[some], warm[some])
-            state[some], sensors[some] = after[:, 0], sensed[:, 0]
-            warm[some] = (state[some, moving] - before) / dt
-            height = np.cos(senses.rpy[:, 0]) * np.cos(senses.rpy[:, 1])
-            down = (height < math.cos(FALLEN)) | (sensors[:, 3 * legs] > 0.0)
-            far = state[:, 1 + parts.pose[0]] > goal
-            ends = (down | far)[going]
-            if ends.any():
-                over = going[ends]
-                fell[over[down[over]]] = arrived[over[~down[over]]] = k * dt
-                state[over, base] = earlier[over] = 0.0
-                going = going[~ends]
-                some, models = going, [all_models[run] for run in going]
-                if not going.size:
-                    break
+            bodies.step(angles[:, indices], forces[k], memory.kp_scale)
+            if not bodies.go_on(senses.rpy, goal, k * dt):
+                break
         for rows in (*record.values(), work):
             rows[k + 1:] = rows[k]
         late = slice(min(round(BEGINNING / dt), steps // 2), None)
         cost = cost_of_transport(work[late].sum(axis=0) * dt, self.geometry.weight,
                                  record['velocity'][late, :, 0].sum(axis=0) * dt)
-        return Outcome(fell=fell, arrived=arrived, cost=cost,
+        return Outcome(fell=bodies.fell, arrived=bodies.arrived, cost=cost,
                        **{key: rows.swapaxes(0, 1) for key, rows in record.items()})

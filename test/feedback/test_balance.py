@@ -18,7 +18,6 @@ import math
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.feedback.biped import crouch
-from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.biped.links import links_of
 from cpg_ros.motion.plan import plan
@@ -26,6 +25,7 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.library.biped import Biped
 import numpy as np
 import pytest
+from ticked_pattern import TickedPattern
 
 pytest.importorskip('mujoco')
 
@@ -42,7 +42,7 @@ class Walker:
         self.run = BipedRun('humanoid', load_robot('humanoid'))
         robot, preset = self.run.robot, Biped.presets()['walk']
         gait_plan = plan(robot, 'walk', preset, preset.network, 1.65)
-        self.pattern = BalancedPattern(gait_plan, 1.0, enabled=False)
+        self.pattern = TickedPattern(gait_plan, 1.0, enabled=False)
         self.pattern.balance = BipedFeedback(robot, plan=gait_plan)
         self.before = self.run.body.rates[None].copy()
         self.blind, self.tilt, self.turned = False, 0.0, 0.0
@@ -61,7 +61,7 @@ class Walker:
             sensors = self.run.measure(self.before)
             self.before[0] = body.rates
             sensors.rpy[0, 1] += self.turned
-            pattern.sensors = None if self.blind else sensors
+            pattern.sense(None if self.blind else sensors)
             pattern.advance(DT)
             self.check()
             body.command(pattern.position[pattern.robot.order_indices])

@@ -21,12 +21,12 @@ import json
 import math
 from pathlib import Path
 
-from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.biped.links import links_of
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.motion.robot_file import load_robot
 import numpy as np
+from ticked_pattern import TickedPattern
 
 DT, EVERY, FREQUENCY = 0.002, 250, 1.65
 #: Fault, its begin and its end, s.
@@ -44,7 +44,7 @@ class PaperRobot:
 
     def __init__(self):
         self.robot = load_robot('humanoid')
-        self.pattern = BalancedPattern(gait_plan(self.robot, 'walk'), 1.0, enabled=False)
+        self.pattern = TickedPattern(gait_plan(self.robot, 'walk'), 1.0, enabled=False)
         self.pattern.balance = feedback = BipedFeedback(self.robot)
         offsets = {**{joint.name: joint.offset for joint in self.robot.joints}, **self.robot.held}
         self.stand = np.array([offsets[name] for name in feedback.order])
@@ -85,7 +85,7 @@ class PaperRobot:
             loads = np.where(swings & (pattern.level == 1.0), 0.0, 0.5)
             loads *= 9.81 * self.robot.biped.total / max(loads.sum(), 0.25)
             sensors.foot_forces[0] = loads[::-1] if 'swapped' in now else loads
-        pattern.sensors = sensors
+        pattern.sense(sensors)
 
     @property
     def found(self):

@@ -50,6 +50,17 @@ class _Disk(FunctionCache):
             super().save_overload(sig, data)
 
 
+def _disk(function, folder: Path) -> _Disk:
+    """Return a function's cache in a folder."""
+    # Read here and now: what others compile with numba is kept where it was.
+    numba: Any = config
+    others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
+    try:
+        return _Disk(function)
+    finally:
+        numba.CACHE_DIR = others
+
+
 def cached_on_disk(function, folder: Path | None, **options):
     """Compile a function on its first call, and cache its machine code on disk.
 
@@ -60,19 +71,13 @@ def cached_on_disk(function, folder: Path | None, **options):
         options: of numba, beside those of every kernel.
 
     """
+    compiled = njit(**OPTIONS, **options)(function)
     if folder is not None:
-        # Read here and now: what others compile with numba is kept where it was.
-        numba: Any = config
-        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
-        try:
-            compiled = njit(**OPTIONS, **options)(function)
-            compiled._cache = _Disk(function)
-        finally:
-            numba.CACHE_DIR = others
+        compiled._cache = _disk(function, folder)
         # Where the folder cannot be written numba tries others, whose code may be out of date.
-        if Path(compiled.stats.cache_path).is_relative_to(folder):
-            return compiled
-    return njit(**OPTIONS, **options)(function)
+        if not Path(compiled.stats.cache_path).is_relative_to(folder):
+            return njit(**OPTIONS, **options)(function)
+    return compiled
 
 
 def jit_entry(function):
@@ -115,15 +120,10 @@ def renamed(function, key: str):
 def machine_function(function, arguments: tuple) -> Any:
     """Compile a function of a pointer to arguments like these for C; it has an ``address``."""
     folder = equations.folder()
-    numba: Any = config
     kind = (types.CPointer(typeof(arguments)),), types.int64
     compiled: Any = CFunc(function, kind, {}, OPTIONS)
     if folder is not None:
-        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
-        try:
-            compiled._cache = _Disk(function)
-        finally:
-            numba.CACHE_DIR = others
+        compiled._cache = _disk(function, folder)
     compiled.compile()
     return compiled
 

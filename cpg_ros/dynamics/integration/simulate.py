@@ -124,6 +124,88 @@ def sample_history(history: History, nodes: int, step: float, components: int
     return x, slopes
 
 
+def _check(networks: Sequence[Network], t_end: float, step: float, every: int) -> None:
+    """Raise the errors of ``simulate`` about these arguments."""
+    if not (np.isfinite(t_end) and t_end > 0.0 and np.isfinite(step) and step > 0.0):
+        raise InputError(f't_end {t_end} and step {step} must be positive and finite')
+    for network in networks:
+        if not all(np.isfinite(value) for value in network.as_dict().values()):
+            raise InputError(f'a parameter is not finite: {network}')
+        if 0.0 < network.delay < step or (network.delay <= 0.0 and network.delay_parameter):
+            raise InputError(f'the delay {network.delay} is shorter than the step {step}')
+        if type(network) is not type(networks[0]):
+            raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
+                             f'{network.name}')
+    if every < 1:
+        raise InputError(f'every {every} must be at least 1')
+
+
+class _Lanes:
+    """Trajectories in blocks of lanes, which advance together in vector registers.
+
+    Trajectory m is lane m % lanes of block m // lanes; spare lanes repeat the last one.
+    """
+
+    def __init__(self, networks: Sequence[Network], histories: Sequence[History], step: float,
+                 batch: int) -> None:
+        """Fill the rings of past states from the histories."""
+        components, cells = networks[0].components, networks[0].cells
+        # Five nodes at least, so that slopes of a given history are of fourth order.
+        nodes = max(5, int(np.ceil(max(member.delay for member in networks) / step)) + 2)
+        lanes = min(LANES, batch)
+        blocks = -(-batch // lanes)
+        members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
+        #: States, and slopes after and before each node.
+        self._ring = np.empty((3, blocks, nodes, components, lanes))
+        p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
+        self._tau = np.empty((blocks, lanes))
+        samples = [sample_history(history, nodes, step, components) for history in histories]
+        for (block, lane), m in np.ndenumerate(members):
+            network = networks[m if len(networks) > 1 else 0]
+            p[block, :, :, lane], self._tau[block, lane] = network.coefficients, network.delay
+            past, slopes = samples[m if len(histories) > 1 else 0]
+            self._ring[:, block, :, :, lane] = past, slopes, slopes
+        self._p = p.reshape(blocks, -1, cells * lanes)
+        self._step, self._batch = float(step), batch
+
+    def run(self, compiled: Kernels, lock: tuple[float, np.ndarray], rows: int, every: int,
+            noise: float, seed: int, progress: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate by the kernels of the network, and by steps as of ``simulate``.
+
+        Returns:
+            States and slopes at the start and at ``rows`` nodes after it, shape (batch, rows + 1,
+                components) each.
+
+        """
+        _, blocks, nodes, components, lanes = self._ring.shape
+        flat = self._ring.reshape(3, blocks, nodes, components * lanes)
+        head, steps = nodes - 1, rows * every
+        systems = [System(p, tau, *lock) for p, tau in zip(self._p, self._tau, strict=True)]
+        rings = [Ring(self._step, *flat[:, block]) for block in range(blocks)]
+        for system, ring in zip(systems, rings, strict=True):
+            compiled.set_slope(system, ring, head)
+        states = np.empty((self._batch, rows + 1, components))
+        slopes = np.empty_like(states)
+        for m in range(self._batch):
+            states[m, 0], slopes[m, 0] = self._ring[:2, m // lanes, head, :, m % lanes]
+        record = Samples(every, states, slopes)
+        with progress_bar('simulating', steps, enabled=progress) as bar:
+            done = 0
+            while done < steps:
+                chunk = min(steps - done, max(1, CHUNK // (blocks * components * lanes)))
+                seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
+                if blocks == 1:
+                    head = compiled.integrate(systems[0], rings[0], head, chunk, noise, seeds[0],
+                                              record, done + 1)
+                else:
+                    head = compiled.integrate_many(
+                        System(self._p, self._tau, *lock), Ring(self._step, *flat), head, chunk,
+                        noise, seeds, record, done + 1)
+                done += chunk
+                bar(done)
+        return states, slopes
+
+
 def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
              t_end: float, step: float | None = None, *,
              lock: tuple[float, Symmetry] | None = None,
@@ -163,78 +245,17 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     if {len(networks), len(histories)} - {1, batch}:
         raise ValueError(f'{len(networks)} networks do not go with {len(histories)} histories')
     if step is None:
-        step = min((0.5 * networks[0].step, *(one.delay for one in networks if one.delay > 0.0)))
-    if not (np.isfinite(t_end) and t_end > 0.0 and np.isfinite(step) and step > 0.0):
-        raise InputError(f't_end {t_end} and step {step} must be positive and finite')
-    for one in networks:
-        if not all(np.isfinite(value) for value in one.as_dict().values()):
-            raise InputError(f'a parameter is not finite: {one}')
-        if 0.0 < one.delay < step or (one.delay <= 0.0 and one.delay_parameter):
-            raise InputError(f'the delay {one.delay} is shorter than the step {step}')
-        if type(one) is not type(networks[0]):
-            raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
-                             f'{one.name}')
-
-    components, cells = networks[0].components, networks[0].cells
-    if every < 1:
-        raise InputError(f'every {every} must be at least 1')
+        step = min((0.5 * networks[0].step,
+                    *(member.delay for member in networks if member.delay > 0.0)))
+    _check(networks, t_end, step, every)
     rows = int(np.ceil(t_end / (step * every) - 1e-9))
-    steps = rows * every
-    # Five nodes at least, so that slopes of a given history are of fourth order.
-    nodes = max(5, int(np.ceil(max(one.delay for one in networks) / step)) + 2)
-    lanes = min(LANES, batch)
-    blocks = -(-batch // lanes)
-
-    # Trajectory m is lane m % lanes of block m // lanes; spare lanes repeat the last one.
-    members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
-    x = np.empty((blocks, nodes, components, lanes))
-    after, before = np.empty_like(x), np.empty_like(x)
-    p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
-    tau = np.empty((blocks, lanes))
-    samples = [sample_history(one, nodes, step, components) for one in histories]
-    for block, row in enumerate(members):
-        for lane, m in enumerate(row):
-            one = networks[m if len(networks) > 1 else 0]
-            p[block, :, :, lane], tau[block, lane] = one.coefficients, one.delay
-            past, past_slopes = samples[m if len(histories) > 1 else 0]
-            x[block, :, :, lane] = past
-            after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
-    flat = [array.reshape(*array.shape[:2], components * lanes) for array in (x, after, before)]
-    flat_p = p.reshape(blocks, -1, cells * lanes)
-    step, noise = float(step), float(noise)
-    gain, basis = (0.0, np.zeros((1, components))) if lock is None else (
+    lanes = _Lanes(networks, histories, step, batch)
+    gain, basis = (0.0, np.zeros((1, networks[0].components))) if lock is None else (
         float(lock[0]), lock[1].basis)
-
     # A single run takes as long in C, which compiles sooner than numba's but has no noise.
     maker = c_kernels if batch == 1 and not noise else _maker
     compiled = (numba_kernels if noise and COMPILED else maker)(type(networks[0]))
-    head = nodes - 1
-    systems = [System(one_p, one_tau, gain, basis)
-               for one_p, one_tau in zip(flat_p, tau, strict=True)]
-    rings = [Ring(step, *block) for block in zip(*flat, strict=True)]
-    for system, ring in zip(systems, rings, strict=True):
-        compiled.set_slope(system, ring, head)
-    states = np.empty((batch, rows + 1, components))
-    slopes = np.empty_like(states)
-    for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
-        if m < batch:
-            states[m, 0], slopes[m, 0] = x[block, head, :, lane], after[block, head, :, lane]
-    record = Samples(every, states, slopes)
-    with progress_bar('simulating', steps, enabled=progress) as bar:
-        done = 0
-        while done < steps:
-            chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
-            seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
-            if blocks == 1:
-                head = compiled.integrate(systems[0], rings[0], head, chunk, noise, seeds[0],
-                                          record, done + 1)
-            else:
-                head = compiled.integrate_many(
-                    System(flat_p, tau, gain, basis), Ring(step, *flat), head,
-                    chunk, noise, seeds, record, done + 1)
-            done += chunk
-            bar(done)
-
+    states, slopes = lanes.run(compiled, (gain, basis), rows, every, float(noise), seed, progress)
     times = np.arange(rows + 1) * (step * every)
     if isinstance(network, Network) and one_history:
         return Trajectory(times, states[0], slopes[0])

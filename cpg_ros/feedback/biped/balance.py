@@ -21,7 +21,7 @@ from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.dynamics.integration.memory import call_at
 from cpg_ros.feedback.biped import substitutes
 from cpg_ros.feedback.biped.gains import SHIFT, STAND, WALK
-from cpg_ros.feedback.biped.modes import advance, follow, stand_anew
+from cpg_ros.feedback.biped.modes import accept_request, advance, stand_anew
 from cpg_ros.feedback.biped.stepping import swing_fraction, WALKS
 from cpg_ros.feedback.biped.substitutes import FEET, IMU, JOINTS, LastStride, Substitutes
 from cpg_ros.feedback.biped.support import swing_arms
@@ -492,7 +492,7 @@ def balance(biped, watch, dt):
         if not state.balancing:
             state.doubts[:] = 0
     if own.requested != own.goal:
-        follow(biped.gaits, biped.functions, own)
+        accept_request(biped.gaits, biped.functions, own)
     state.used[:] = state.ages
     if state.seen:
         _sense(biped, watch, dt)

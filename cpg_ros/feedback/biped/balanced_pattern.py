@@ -15,9 +15,7 @@
 """The pattern of a biped whose feedback bears it: joints go where balance wants them."""
 
 import math
-from typing import Any
 
-from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped import balance as compiled
 from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import addresses, BipedFeedback
@@ -49,8 +47,6 @@ class BalancedPattern(Pattern):
     Attributes:
         balance: the feedback, None for the open-loop pattern.
         watch: what compiled code takes and changes; it is there once a feedback is prepared.
-        sensors: to be set to the present measurements, joints in the feedback's order; None if
-            they are unknown.
         command: speeds forward and to the left, m/s, and rate of turning, rad/s.
         enabled: whether it is to walk.
         balancing: whether the feedback bears the robot now.
@@ -79,7 +75,6 @@ class BalancedPattern(Pattern):
         super().__init__(plan, ramp, enabled)
         self.ages, self.latencies = self._state.ages, self._state.latencies
         self._rest = np.array(list(self.robot.held.values()))
-        self._advance: Any = None
 
     @property
     def balance(self) -> BipedFeedback | None:
@@ -114,7 +109,7 @@ class BalancedPattern(Pattern):
             self.robot.order_indices, addresses('cpg_advance', 'cpg_let_go', 'cpg_reach'),
             self._address, self._view('track', np.int64), self._view('stall', float),
             self._record)
-        self._feedback, self._advance = feedback, None
+        self._feedback = feedback
 
     def _view(self, name: str, kind: type) -> np.ndarray:
         """Return a number of the core's struct as an array, shape (1,)."""
@@ -137,14 +132,6 @@ class BalancedPattern(Pattern):
     @command.setter
     def command(self, command: tuple[float, float, float]) -> None:
         self._state.command[:] = command
-
-    def _take_sensors(self, sensors: SensorData | None) -> None:
-        self._state.seen = sensors is not None
-        if sensors is not None and self._feedback is not None:
-            for own, given in zip(self.watch.measured, sensors, strict=True):
-                own[:] = given
-
-    sensors = property(fset=_take_sensors)
 
     @property
     def doubts(self) -> dict[int, str]:
@@ -227,15 +214,3 @@ class BalancedPattern(Pattern):
     def release(self) -> None:
         """Stop balancing, as without sensors, and hold the angles of the stand."""
         self._state.balancing, self._state.stood = False, 0.0
-
-    def advance(self, dt: float) -> None:
-        """Advance by dt in s and fill position, velocity and phases."""
-        if self._feedback is None:
-            super().advance(dt)
-            return
-        if self.balance is None:
-            self.start_drift()
-        arguments = self._feedback.biped, self.watch, dt
-        if self._advance is None:
-            self._advance = specialised(compiled.balance, *arguments)
-        self._advance(*arguments)

@@ -117,7 +117,7 @@ def stand_anew(laws, state, weight, crouch):
 
 
 @jit
-def _accept_request(gaits, functions, state):
+def accept_request(gaits, functions, state):
     """Want the gait requested last; another frequency of the same gait is taken at once."""
     requested, now = gaits[state.requested], gaits[state.gait]
     same = requested.name == now.name and state.gait == state.goal
@@ -254,7 +254,7 @@ def advance(biped, sensors, dt):
     gaits, memory, functions, state = biped.gaits, biped.memory, biped.functions, biped.state[0]
     laws = memory.laws[0]
     if state.requested != state.goal:
-        _accept_request(gaits, functions, state)
+        accept_request(gaits, functions, state)
     if not state.ready:
         laws.heading, state.ready = sensors.rpy[0, 2], True
     _choose(gaits, functions, laws, memory.pose.soles, state, dt)

@@ -36,7 +36,7 @@ from cpg_ros.fitting.gaits.leg_phases import (
     PhaseScatter,
     walk_or_run,
 )
-from cpg_ros.fitting.gaits.mean_cycle import average_cycles
+from cpg_ros.fitting.gaits.mean_cycle import average_cycles, PhaseAverage
 from cpg_ros.fitting.gaits.phase_estimation import (
     estimate_phase,
     grow_stretch,
@@ -286,35 +286,22 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
                          f'{", ".join(own)}')
     usable, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
-    times = recording.times
-    names = [name for name in recording.joints if any(name in one for one in usable.values())]
+    times, theta = recording.times, np.arange(POINTS) / POINTS
+    names = [name for name in recording.joints
+             if any(name in listed for listed in usable.values())]
     rough, others = _regions(times, positions, source)
     notes += others
     within = index_range(times, rough.begin, rough.end)
     names, usable, full = with_angles(names, usable, positions[within], source, notes)
     positions = positions[:, full]
-    warp = estimate_phase(times, positions, rough)
-    if warp.cycles < CYCLES:
-        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
-                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed: '
-                           f'record {SURE:g} strides or more, {SURE / warp.frequency:.3g} s')
+    warp = _phase(times, positions, rough, source)
     inside = index_range(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
-    theta = np.arange(POINTS) / POINTS
     # Strides that differ were left out at the ends of the rough stretch.
     names, usable, full = with_angles(names, usable, x, source, notes)
     x = x[:, full]
-    try:
-        average = average_cycles(phases, x, theta,
-                               [names.index(name) for name in usable[next(iter(own))]])
-    except InputError as error:
-        raise NoSteadyGait(f'{source}: {error}') from error
-    power = np.array([np.nanvar(column) for column in x.T])
-    left = float(np.sum(average.left * power) / np.sum(power))
-    if left > UNEXPLAINED:
-        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
-                           f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
-                           'variance')
+    average = _average(phases, x, theta, [names.index(name) for name in usable[next(iter(own))]],
+                       warp.frequency, source)
     notes += quality_notes(warp, average, names)
     c = dict(zip(names, average.coefficients.T, strict=True))
     # A leg's phase is that of its first cell.
@@ -357,9 +344,34 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                   phase_scatter(phases, x, average, leading, names), gait.gait,
                   gait.nearest, gait.alike, gait.distance, gait.margin,
                   gait.probability * float(np.prod([issue.factor for issue in issues])),
-                  tuple(one.message for one in issues if one.message),
+                  tuple(issue.message for issue in issues if issue.message),
                   (*notes, *by_legs, *limping(usable, c), *gait.notes),
                   replace(warp, phases=warp.phases - average.zero), contacts)
+
+
+def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> PhaseEstimate:
+    """Return the phase in a stretch, if enough of its cycles are alike."""
+    warp = estimate_phase(times, x, rough)
+    if warp.cycles < CYCLES:
+        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
+                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed: '
+                           f'record {SURE:g} strides or more, {SURE / warp.frequency:.3g} s')
+    return warp
+
+
+def _average(phases: np.ndarray, x: np.ndarray, theta: np.ndarray, leading: list[int],
+             frequency: float, source: str) -> PhaseAverage:
+    """Return the mean cycle, if it explains enough of the motion."""
+    try:
+        average = average_cycles(phases, x, theta, leading)
+    except InputError as error:
+        raise NoSteadyGait(f'{source}: {error}') from error
+    power = np.array([np.nanvar(column) for column in x.T])
+    left = float(np.sum(average.left * power) / np.sum(power))
+    if left > UNEXPLAINED:
+        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of {1.0 / frequency:.3g} s,'
+                           f' leaves {100.0 * left:.0f} % of the variance')
+    return average
 
 
 def _travel(body: np.ndarray | None, inside: slice, warp: PhaseEstimate) -> float:

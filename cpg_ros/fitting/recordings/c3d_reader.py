@@ -120,7 +120,7 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
             begin with the letter of the side, LHS.
 
     """
-    events = []
+    falls = []
     labels = events.get('LABELS', ())
     sides = [*events.get('CONTEXTS', ()), *[''] * len(labels)]
     for label, side, time in zip(labels, sides, events.get('TIMES', ()), strict=False):
@@ -128,8 +128,8 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
         if leg not in ('left', 'right'):
             leg, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
         if leg and name in STRIKE + OFF:
-            events.append((leg, time, name in STRIKE))
-    return events
+            falls.append((leg, time, name in STRIKE))
+    return falls
 
 
 def c3d_markers(path: str | Path) -> Markers:

@@ -467,9 +467,9 @@ COPIES = 6
 #: declared stride; GAP_RECOGNISED: of a recognised one.
 GAP_DECLARED, GAP_RECOGNISED = 0.3, 0.1
 #: Recognised strides. DURATIONS: shortest and longest, s; SEAM_SPEED: least speed at the seam,
-#: over the mean one, as a motion from rest to rest closes, too; ODD_SHARE: least fraction of odd
-#: harmonics in the power, as two strides have none.
-DURATIONS, SEAM_SPEED, ODD_SHARE = (0.1, 3.0), 0.3, 0.2
+#: over the mean one, as a motion from rest to rest closes, too; ODD_FRACTION: least fraction of
+#: odd harmonics in the power, as two strides have none.
+DURATIONS, SEAM_SPEED, ODD_FRACTION = (0.1, 3.0), 0.3, 0.2
 
 
 def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
@@ -523,7 +523,7 @@ def recognise_stride(recording: Recording) -> Recording | None:
     speeds = np.abs(normalised - np.roll(normalised, 1, axis=0)).mean(axis=1)
     power = np.sum(np.abs(np.fft.rfft(normalised - normalised.mean(axis=0), axis=0))**2, axis=1)
     if (gaps.max() > GAP_RECOGNISED or speeds[[0, 1, -1]].mean() < SEAM_SPEED * speeds.mean()
-            or power[1::2].sum() < ODD_SHARE * power.sum()
+            or power[1::2].sum() < ODD_FRACTION * power.sum()
             or not DURATIONS[0] <= recording.times[-1] <= DURATIONS[1]):
         return None
     return repeat_stride(recording)

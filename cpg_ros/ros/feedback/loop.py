@@ -24,14 +24,13 @@ from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.substitutes import FEET
 from cpg_ros.feedback.closed_loop import (
-    closing_arguments,
     CONTRARY,
     FRACTION,
     Instant,
+    LoopData,
     MOUNT,
     NOW,
     SPENT,
-    STATE,
     WANTED,
 )
 from cpg_ros.feedback.estimate import Odometry
@@ -143,12 +142,10 @@ class FeedbackLoop(SensorLoop):
         planned, goal, scale = pattern.planned
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._instant = Instant.empty(len(pattern.robot.legs), scale)
-        self._state = np.zeros(STATE)
         self._finishes, self.odometry = odometry is not None, odometry or Odometry.begin()
-        self._sent = pattern.position.copy()
-        self._arguments = (*closing_arguments(self.feedback, inputs.senses, inputs.sensor_data,
-                                              self._instant, self._state, planned[None], goal),
-                           self.odometry, pattern.position[None], self._sent[None])
+        self._data = LoopData.of(self.feedback, inputs.senses, inputs.sensor_data, self._instant,
+                                 planned, goal, self.odometry, pattern.position)
+        self._state = self._data.state
         # It loads numba.
         from cpg_ros.feedback import by_address
         self._by_address = by_address
@@ -165,7 +162,7 @@ class FeedbackLoop(SensorLoop):
             **{name: addresses[name] for name in ('report', 'plan', 'move')})
         self.restart()
         self.learn(pattern.plan)
-        self._close = by_address.closing_function(self._arguments)
+        self._close = by_address.closing_function(self._data)
         self._correction.close = self._close.address
         self.set_gains(self.feedback.gains)
 
@@ -192,12 +189,12 @@ class FeedbackLoop(SensorLoop):
         """
         gains.check()
         self.feedback.gains = gains
-        self._arguments = (*self._arguments[:2], gains, *self._arguments[3:])
+        self._data = self._data._replace(gains=gains)
         # A tick under way may still read those before.
-        self._memories = [*self._memories[-1:], self._by_address.memory_of(self._arguments)]
+        self._memories = [*self._memories[-1:], self._by_address.memory_of(self._data)]
         self._correction.arguments = ctypes.addressof(self._memories[-1])
         if self._finish is None and (self._finishes or gains.virtual_stiffness):
-            self._finish = self._by_address.finishing_function(self._arguments)
+            self._finish = self._by_address.finishing_function(self._data)
             self._correction.finish = self._finish.address
 
     def restart(self) -> None:
@@ -207,7 +204,7 @@ class FeedbackLoop(SensorLoop):
         self._state[[WANTED, SPENT]] = wanted, math.inf
         self.feedback.reset()
         self.inputs.restart()
-        self._arguments[7][0][:] = 0.0
+        self._data.rates[0][:] = 0.0
         self.odometry.restart()
         self._instant.scale[0], self._instant.trim[:] = 1.0, 0.0
 
@@ -248,7 +245,7 @@ class FeedbackLoop(SensorLoop):
     @property
     def target(self) -> np.ndarray:
         """The angles to send, rad, shape (joints,), overwritten at every tick."""
-        return super().target if self._finish is None else self._sent
+        return super().target if self._finish is None else self._data.sent[0]
 
     @property
     def fraction_array(self) -> np.ndarray:

@@ -356,6 +356,22 @@ def _domain() -> str:
             if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
 
 
+def _join_graph(name: str, arguments: list[str]) -> tuple[int, str]:
+    """Start the process of the log, and rclpy; return an exit code, 0 for none, and the reason."""
+    if reason := _domain():
+        return 2, reason
+    leave_shared_memory()
+    try:
+        never_wait(name, arguments)
+    except OSError as error:
+        return 1, f'no process that writes the log can be started: {error.strerror}'
+    try:
+        rclpy.init(args=[*arguments, *TO_STREAM], signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        return 2, f'ROS arguments: {_first(error)}'
+    return 0, ''
+
+
 def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[str, Spec],
         args: list[str] | None = None, executable: str = '') -> int:
     """Run a node until a signal ends it, or until it stops itself; return the exit code.
@@ -386,23 +402,10 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
         signal.signal(number, leave)
     # The publishing thread must not wait long for one that computes in Python.
     sys.setswitchinterval(2e-4)
-    if wrong := _domain():
-        print(f'{name}: {wrong}', file=sys.stderr)
-        return 2
-    leave_shared_memory()
-    arguments = sys.argv if args is None else args
-    try:
-        never_wait(name, arguments)
-    except OSError as error:
-        print(f'{name}: no process that writes the log can be started: {error.strerror}',
-              file=sys.stderr)
-        return 1
-    try:
-        rclpy.init(args=[*arguments, *TO_STREAM],
-                   signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:
-        print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
-        return 2
+    code, reason = _join_graph(name, sys.argv if args is None else args)
+    if code:
+        print(f'{name}: {reason}', file=sys.stderr)
+        return code
     try:
         node = make()
     except (CpgError, NameValidationException, ParameterException) as error:
