@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The balance of a biped, compiled: whether it balances, holds a pose, or goes on without it."""
+"""Modes of a balanced biped, compiled: it balances, holds a pose, or recovers from a fault."""
 
 import math
 from typing import NamedTuple
@@ -128,11 +128,11 @@ STATE = np.dtype([
 
 
 class Watch(NamedTuple):
-    """What a balanced pattern knows beside its feedback, as compiled code takes it.
+    """State of a balanced pattern beside its feedback, as arrays for compiled code.
 
     Attributes:
         measured: SensorData of one run, joints in the feedback's order.
-        filled: the same with the gaps filled.
+        filled: the same, with substitutes for missing measurements.
         stride: the last stride of a walk.
         joints: at the last tick, rad, how far they moved since, rad, and for how long they have
             not, s, shape (3, joints of all).
@@ -173,7 +173,7 @@ def _release(state):
 
 @jit
 def _fall(state):
-    """Note a fall, which contradicts everything: inputs are judged anew on the feet."""
+    """Record a fall; all inputs are checked again once the robot is on its feet."""
     _release(state)
     state.crouching, state.fallen, state.leant = False, True, False
     state.contrary, state.doubts[:] = 0.0, 0
@@ -182,13 +182,13 @@ def _fall(state):
 
 @jit
 def _doubted(state):
-    """Tell whether an input contradicts the others."""
+    """Return whether an input contradicts the others."""
     return state.doubts[IMU] > 0 or state.doubts[JOINTS] > 0 or state.doubts[FEET] > 0
 
 
 @jit
 def _passes(gait, laws):
-    """Tell whether the body is over the foot that stands."""
+    """Return whether the body is above the stance foot."""
     for leg in range(2):
         fraction = laws.phases[leg] / swing_fraction(gait)
         if laws.swinging[leg] and PASSING[0] < fraction < PASSING[1]:
@@ -198,7 +198,7 @@ def _passes(gait, laws):
 
 @jit
 def _leaps(joints, now, state, dt):
-    """Note how far joints have moved; return how many did further than they can, and the last."""
+    """Update how far joints moved; return how many jumped, and the last of these."""
     count, last = 0, -1
     for k in range(len(now)):
         joints[1, k], joints[0, k] = abs(now[k] - joints[0, k]), now[k]
@@ -209,7 +209,7 @@ def _leaps(joints, now, state, dt):
 
 @jit
 def _doubt_joints(rows, joints, state, walks, leaps, dt):
-    """Doubt a single joint that jumps, or that stays the same in a walk; leaps as of _leaps."""
+    """Doubt a joint that jumps alone, or that does not move in a walk; leaps as of _leaps."""
     (count, wrong), reason = leaps, JUMPED
     for k in range(joints.shape[1]):
         before = joints[2, k] if walks else 0.0
@@ -225,7 +225,7 @@ def _doubt_joints(rows, joints, state, walks, leaps, dt):
 
 @jit
 def _doubt_soles(links, measured, filled, state, mode, dt):
-    """Doubt joints or IMU by the soles while both feet stand.
+    """Doubt joints or IMU if the soles are not level while both feet stand.
 
     The soles of a robot that is pushed lean, too: it crouches, and as they are level there,
     the IMU counts again.
@@ -271,7 +271,7 @@ def _doubt_soles(links, measured, filled, state, mode, dt):
 
 @jit
 def _doubt_feet(gait, laws, loads, state, dt):
-    """Doubt contacts that do not go with a walk."""
+    """Doubt contacts that contradict the walk."""
     swung = stood = 0.0
     for leg in range(2):
         if laws.swinging[leg]:
@@ -287,7 +287,7 @@ def _doubt_feet(gait, laws, loads, state, dt):
 
 @jit
 def _discount(state):
-    """Count inputs that contradict the others as out."""
+    """Treat inputs that contradict the others as faulty."""
     if not _doubted(state):
         state.suspect = -1
     for k in range(3):
@@ -303,7 +303,7 @@ def _lean(rpy):
 
 @jit
 def _is_near(joints, rows, pose, indices):
-    """Tell whether the joints of the legs are near a pose, rad."""
+    """Return whether the joints of the legs are near a pose, rad."""
     off = 0.0
     for k in range(len(indices)):
         off = max(off, abs(joints[rows[k]] - pose[indices[k]]))
@@ -312,7 +312,7 @@ def _is_near(joints, rows, pose, indices):
 
 @jit
 def _ready_to_balance(state, lean, near, load, leaps, dt):
-    """Find out how the robot is; return whether it stands on its feet again.
+    """Update what is known of the robot; return whether it stands on its feet again.
 
     Args:
         state: STATE, changed in place.
@@ -348,7 +348,7 @@ def _ready_to_balance(state, lean, near, load, leaps, dt):
 
 @jit
 def _sense(biped, watch, dt):
-    """Judge the measurements, fill their gaps, and find out how the robot is."""
+    """Check the measurements, substitute missing ones, and update the state of the robot."""
     state, measured, filled, joints = watch.state[0], watch.measured, watch.filled, watch.joints
     laws, mode, gait = biped.memory.laws[0], biped.state[0].mode, biped.gaits[biped.state[0].gait]
     leaps = _leaps(joints, measured.joint_positions[0], state, dt)
@@ -374,7 +374,7 @@ def _sense(biped, watch, dt):
 
 @jit
 def _gives_up(gait, mode, laws, state, dt):
-    """Tell whether to crouch now instead of balancing any longer.
+    """Return whether to stop balancing and crouch now.
 
     A crouch that begins in a walk waits for the moment at which the body is over the foot
     that stands.
@@ -476,7 +476,7 @@ def _hold(poses, position, goal, state, dt):
 
 @jit_entry
 def balance(biped, watch, dt):
-    """Take a tick of dt in s; arguments BipedArrays and Watch, changed in place."""
+    """Advance by one tick of dt in s; BipedArrays and Watch are changed in place."""
     state, own, functions = watch.state[0], biped.state[0], watch.functions
     laws = biped.memory.laws[0]
     if not state.wanted:
@@ -510,7 +510,7 @@ def balance(biped, watch, dt):
 
 @jit
 def read_measurements(senses, sensors, legs, numbers, rows, watch):
-    """Check the messages that have come, and fill what a balanced pattern knows of its inputs.
+    """Check new messages, and update a balanced pattern's measurements and input state.
 
     Args:
         senses: Senses of the robot.

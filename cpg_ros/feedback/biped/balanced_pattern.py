@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pattern of a biped whose feedback bears it: joints go where balance wants them."""
+"""The pattern of a balanced biped: its feedback sets the joint targets."""
 
 import math
 
@@ -32,7 +32,7 @@ import numpy as np
 
 
 class BalancedPattern(Pattern):
-    """A pattern whose joints a biped's feedback moves.
+    """A pattern whose joint targets come from a biped's feedback.
 
     Without feedback it is the open-loop pattern. With it, it holds the stand's angles until the
     robot stands on its feet, then balances: it stands while disabled, and walks as commanded while
@@ -46,10 +46,10 @@ class BalancedPattern(Pattern):
 
     Attributes:
         balance: the feedback, None for the open-loop pattern.
-        watch: what compiled code takes and changes; it is there once a feedback is prepared.
+        watch: data for compiled code; available once a feedback is prepared.
         command: speeds forward and to the left, m/s, and rate of turning, rad/s.
         enabled: whether it is to walk.
-        balancing: whether the feedback bears the robot now.
+        balancing: whether the feedback balances the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
         falls: how often it fell.
         ages: of inertial unit, joints and feet, s, shape (3,): since the last valid values came.
@@ -116,7 +116,7 @@ class BalancedPattern(Pattern):
         return np.ndarray(1, kind, memoryview(self._struct).cast('B'), getattr(Core, name).offset)
 
     def _know(self, feedback: BipedFeedback) -> None:
-        """Keep the runners of a feedback, and no more that the core does not run."""
+        """Keep the runners of a feedback and of the core, and drop all others."""
         struct = self._struct
         used = {struct.waiting, *struct.track[:struct.tracks]}
         # A new dictionary, as other threads read the present one.
@@ -135,7 +135,7 @@ class BalancedPattern(Pattern):
 
     @property
     def doubts(self) -> dict[int, str]:
-        """How inputs contradict the others, until it is enabled in a crouch or the robot falls."""
+        """Reasons to doubt inputs, until the pattern is enabled in a crouch or the robot falls."""
         if self._feedback is None:
             return {}
         joint, apart = self._feedback.order[max(self._state.suspect, 0)], self._state.apart
@@ -154,7 +154,7 @@ class BalancedPattern(Pattern):
             super().apply(plan, transition)
 
     def enable(self, enabled: bool, ramp: float) -> None:
-        """Walk, or come to a stand; inputs that contradicted others are judged anew."""
+        """Walk, or come to a stand; doubted inputs are checked again."""
         self._state.anew = True
         super().enable(enabled, ramp)
 
@@ -175,7 +175,7 @@ class BalancedPattern(Pattern):
 
     @property
     def standing(self) -> bool:
-        """Tell whether it is disabled and has come to a stand."""
+        """Return whether it is disabled and has come to a stand."""
         if self.balance is None:
             return super().standing
         state = self._state
@@ -191,11 +191,11 @@ class BalancedPattern(Pattern):
 
     @property
     def in_transition(self) -> bool:
-        """Tell whether another gait is wanted than that in force."""
+        """Return whether a change to another gait is pending."""
         return self.balance.changing if self.balance is not None else super().in_transition
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
-        """Begin anew, from where the joints are."""
+        """Start again from the present joint angles."""
         super().restart(ramp, enabled)
         self.release()
         self.crouching = self._state.lowers = False

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The crouch of a biped: a pose in which servos alone hold it up, without any balance.
+"""The crouch of a biped: a pose that servos hold without balance.
 
 A stand on servos falls: the ankles would have to be stiffer than the weight topples. In the crouch
 the ankles are at the ends of their ranges, so they cannot give way forward, and the centre of mass
@@ -116,13 +116,13 @@ class _Ahead:
         return float(self._center[2] - self._pose.soles[:, 2].mean())
 
     def thighs_rise(self, angles: np.ndarray) -> bool:
-        """Tell whether the hips are above the knees."""
+        """Return whether the hips are above the knees."""
         self._place(angles)
         hip, knee = self._chain[:2]
         return bool(self._pose.origins[hip, 2] > self._pose.origins[knee, 2])
 
     def torques(self, angles: np.ndarray, pairs: Sequence[np.ndarray]) -> np.ndarray:
-        """Return what pairs of joints bear at rest on level soles, N m, (angles,), else 0."""
+        """Return the torques of pairs of joints at rest on level soles, N m, (angles,), else 0."""
         torques, weight = np.zeros_like(angles), GRAVITY * self._links.masses.sum()
         for pair in pairs:
             step = np.zeros_like(angles)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped that stands, walks, runs and hops by a network's clock: sensors in, positions out."""
+"""Feedback of a biped that stands, walks, runs and hops on the clock of a network."""
 
 from collections.abc import Callable
 import ctypes
@@ -67,11 +67,11 @@ class BipedFeedback:
 
     Attributes:
         robot: whose feedback it is.
-        biped: what compiled code takes and changes.
+        biped: data for compiled code, changed by it.
         state: modes.STATE: the mode, and how often the network left its orbit (faults).
-        memory: gains.LAWS: what the laws remember.
+        memory: gains.LAWS: state of the laws.
         pose: of the links.
-        arms: where the joints that are no leg's are to be driven.
+        arms: targets of the joints that belong to no leg.
         command: speeds forward and left, m/s, and yaw rate, rad/s, requested of the gait in force.
         order: names of the joints in the order of the sensors and links.
         runners: the network in each place among the gaits, None where there is none.
@@ -150,11 +150,11 @@ class BipedFeedback:
 
     @property
     def changing(self) -> bool:
-        """Whether another gait than that in force is wanted."""
+        """Whether a change to another gait is pending."""
         return bool(self.state.gait != self.state.requested)
 
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
-        """Go with this velocity, m/s, and rate of turning, rad/s, from now on."""
+        """Walk at this velocity, m/s, and yaw rate, rad/s."""
         self.biped.velocities[0] = forward, left, turn
         self.state.walks = True
 
@@ -195,7 +195,7 @@ class BipedFeedback:
                                   list(KINDS).index(plan.gait), track.address)
 
     def advance(self, sensors: SensorData, dt: float) -> np.ndarray:
-        """Return where the servos are to be driven, rad, shape (joints,), by ``robot.order``.
+        """Return the target angles of the joints, rad, shape (joints,), in ``robot.order``.
 
         Args:
             sensors: of one run, joints by ``order``.

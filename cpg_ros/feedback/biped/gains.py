@@ -62,7 +62,7 @@ LAWS = np.dtype([
 
 
 class BipedMemory(NamedTuple):
-    """What a tick changes.
+    """State and outputs of the laws.
 
     Attributes:
         pose: of the links.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Links of a biped: places, centre of mass, Jacobians and gravity torques, compiled.
+"""Kinematics of a biped, compiled: positions, centre of mass, Jacobians and gravity torques.
 
 All vectors have the axes of the world and start at the base. Joints turn what is beyond them about
 axes that are known with all joints at 0, so that products of rotations give everything; masses are
@@ -31,7 +31,7 @@ import numpy as np
 
 
 class Links(NamedTuple):
-    """Links as compiled code takes them: row 0 is the base, row k + 1 what joint k moves.
+    """Links as arrays for compiled code: row 0 is the base, row k + 1 the link of joint k.
 
     Attributes:
         parents: rows of the links before, shape (joints + 1,).
@@ -58,7 +58,7 @@ class Links(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """Places and rotations of the links; world's axes, from the base.
+    """Positions and rotations of the links, in world axes from the base.
 
     Attributes:
         rotations: of each link, shape (joints + 1, 3, 3).
@@ -184,7 +184,7 @@ def column(pose, row, point):
 
 @jit
 def gravity_torque(pose, row):
-    """Return the torque that a joint needs against the weight of all beyond it, N m."""
+    """Return the torque of a joint that holds the weight of all links beyond it, N m."""
     moment, mass, at = pose.moments[row], pose.carried[row], pose.origins[row]
     lever = (moment[0] - mass * at[0], moment[1] - mass * at[1], 0.0)
     return GRAVITY * cross(pose.axes[row], lever)[2]
@@ -229,7 +229,7 @@ def sole_velocity(links, pose, leg, turning, rates, out):
 
 @jit
 def add_torques(links, pose, leg, point, force, moment, torques):
-    """Add the joint torques that make a leg act on its surroundings: J' F.
+    """Add the joint torques J' F by which a leg exerts a force and a moment.
 
     Args:
         links: Links.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Modes and gaits of a biped, compiled: when it stands, shifts its weight, walks, and changes."""
+"""Modes of a biped, compiled: standing, shifting the weight, walking, changes of the gait."""
 
 import math
 from typing import NamedTuple
@@ -59,11 +59,11 @@ class ServoArrays(NamedTuple):
     """The servos of the legs, in ``robot.order``, shape (joints,) each.
 
     Attributes:
-        rows: place of each joint among the links'.
+        rows: index of each joint among the links'.
         indices: among the legs' torques, leg by leg.
         kp: N m/rad.
         effort: N m.
-        torques: wanted, N m, within what servos can; filled.
+        torques: requested, N m, within the effort; filled.
         positions: the same as targets, rad; filled.
 
     """
@@ -77,7 +77,7 @@ class ServoArrays(NamedTuple):
 
 
 class BipedArrays(NamedTuple):
-    """The feedback of a biped, as compiled code takes it.
+    """The feedback of a biped, as arrays for compiled code.
 
     Attributes:
         links: of the robot.
@@ -104,7 +104,7 @@ class BipedArrays(NamedTuple):
 
 @jit
 def stand_anew(laws, state, weight, crouch):
-    """Stand with an empty memory, as after a fall; the weight in N, crouch as of LAWS."""
+    """Reset the laws to a stand, as after a fall; the weight in N, crouch as of LAWS."""
     laws.velocity[:] = laws.turning[:] = laws.loads[:] = laws.wanted[:] = 0.0
     laws.phases[:] = laws.dcm_error[:] = laws.reaction[:] = laws.before[:] = 0.0
     laws.center[:] = laws.lift_off[:] = laws.target[:] = 0.0
@@ -118,7 +118,7 @@ def stand_anew(laws, state, weight, crouch):
 
 @jit
 def accept_request(gaits, functions, state):
-    """Want the gait requested last; another frequency of the same gait is taken at once."""
+    """Accept the gait requested last; a new frequency of the same gait applies at once."""
     requested, now = gaits[state.requested], gaits[state.gait]
     same = requested.name == now.name and state.gait == state.goal
     state.goal = state.requested
@@ -129,14 +129,14 @@ def accept_request(gaits, functions, state):
 
 @jit
 def _stops(gaits, state):
-    """Tell whether it has to come to a stand, at a request or to change the gait."""
+    """Return whether to come to a stand, on request or to change the gait."""
     return not state.walks or (state.gait != state.goal and (
         gaits[state.goal].kind == HOPS or gaits[state.gait].kind == HOPS))
 
 
 @jit
 def _read_clock(gait, laws):
-    """Fill the legs' phases from their lift-off on."""
+    """Fill the legs' phases, counted from lift-off."""
     legs = whole_at(gait.track + LEGS)
     for leg in range(2):
         laws.phases[leg] = (number_at(legs + 8 * leg) + 0.5 * (1.0 - gait.duty)) % 1.0
@@ -144,7 +144,7 @@ def _read_clock(gait, laws):
 
 @jit
 def _ends(gait, laws, half):
-    """Tell whether to stand now: in a walk once it is slow, in a hop at the bottom."""
+    """Return whether to stand now: in a walk once it is slow, in a hop at the lowest point."""
     if gait.kind == HOPS:
         return laws.before[0] < half + 0.5 <= laws.phases[0]
     wanted, center, error = laws.wanted, laws.center[1], laws.dcm_error
@@ -157,7 +157,7 @@ def _ends(gait, laws, half):
 
 @jit
 def _change(gaits, functions, laws, soles, state, half):
-    """Change between walk and run where a leg is in the middle of its swing."""
+    """Change between walk and run in the middle of a swing."""
     kind, slot = gaits[state.gait].kind, state.goal
     if _stops(gaits, state):
         slot = STOPPING if kind == RUNS else state.gait
@@ -185,7 +185,7 @@ def _change(gaits, functions, laws, soles, state, half):
 
 @jit
 def _go_on(gaits, functions, laws, soles, state):
-    """Read the clock of a gait under way, and end or change it when it is time."""
+    """Read the clock of the gait in force, and end or change the gait when due."""
     gait = gaits[state.gait]
     half = 0.5 * (1.0 - gait.duty)
     laws.before[:] = laws.phases
@@ -214,7 +214,7 @@ def _start(gaits, functions, laws, soles, state):
 
 @jit
 def _choose(gaits, functions, laws, soles, state, dt):
-    """Change mode and gait when it is time, and read the clock."""
+    """Change mode and gait when due, and read the clock."""
     if state.mode == WALK:
         _go_on(gaits, functions, laws, soles, state)
         return
@@ -233,7 +233,7 @@ def _choose(gaits, functions, laws, soles, state, dt):
 
 @jit
 def _limit(gaits, velocities, state):
-    """Fill the velocity requested of the gait in force, which may be changing to another."""
+    """Limit the commanded velocity to the speeds of the gait in force and of the next one."""
     velocities[1] = 0.0
     if not _stops(gaits, state):
         now, goal = gaits[state.gait], gaits[state.goal]
@@ -243,7 +243,7 @@ def _limit(gaits, velocities, state):
 
 @jit_entry
 def advance(biped, sensors, dt):
-    """Fill where the servos are to be driven.
+    """Advance by one tick, and fill torques and targets of the servos.
 
     Args:
         biped: BipedArrays, changed in place.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Placement of the feet by the capture point, on the network's clock, and the clock's speed-up.
+"""Foot placement by the capture point, timed by the network, and the speed-up of the clock.
 
 The capture point xi = c + v / w (c centre of mass, w = sqrt(g / h)) moves away from the foot that
 stands as exp(w t). The clock knows how long it is until the other foot lands, so that foot is put
@@ -44,7 +44,7 @@ LANDED, SWUNG = 0.2, 0.2
 
 @jit
 def path(fraction, duration, lift_off, target, gains, out):
-    """Fill place, velocity and acceleration of a foot on its path, m and s, rows of out.
+    """Fill position, velocity and acceleration of a foot on its path, in m and s, rows of out.
 
     Args:
         fraction: of the swing that is over, 0 to 1.
@@ -84,7 +84,7 @@ def foot_force(target, position, velocity, gains):
 
 @jit
 def level_moment(rotation, heading, turning, gains):
-    """Return the moment that brings a sole level and to the heading, N m.
+    """Return the moment that levels a sole and turns it to the heading, N m.
 
     Args:
         rotation: of the sole, shape (3, 3).
@@ -124,7 +124,7 @@ def swing_fraction(gains):
 
 @jit
 def time_in_step(phase, gains):
-    """Return how long ago the other foot took over, s, by the phase of the leg that swings."""
+    """Return the time since the stance foot took over, s, by the phase of the swinging leg."""
     swing = swing_fraction(gains)
     if phase >= swing and phase > 0.5 + 0.5 * swing:
         phase -= 1.0
@@ -281,7 +281,7 @@ def offsets(speed, sideways, rate, gains):
 
 @jit
 def dcm_error(xi, side, time, rate, target, gains):
-    """Return the DCM error: how far the capture point is off, forward and left, m.
+    """Return the DCM error, the offset of the capture point from its target, forward and left, m.
 
     Args:
         xi: capture point from the foot that stands, heading's axes, m, a pair.
@@ -299,7 +299,7 @@ def dcm_error(xi, side, time, rate, target, gains):
 
 @jit
 def step(dcm_error, side, remaining, rate, target, gains):
-    """Return the foothold relative to the foot that stands, forward and left, m.
+    """Return the foothold relative to the stance foot, forward and left, m.
 
     Args:
         dcm_error: forward and left, m.
@@ -334,5 +334,5 @@ def integrate(integral, missing, dt):
 
 @jit
 def time_to_touchdown(phase, gains):
-    """Return when a leg that swings will bear half of the weight, s; phase from lift-off."""
+    """Return the time until a swinging leg bears half of the weight, s; phase from lift-off."""
     return ((swing_fraction(gains) - phase) + 0.5 * (gains.duty - 0.5)) / gains.frequency

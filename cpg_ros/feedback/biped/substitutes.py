@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Substitutes for measurements of a biped that do not arrive, for as long as it needs to stop.
+"""Substitutes for missing measurements of a biped, for the time that it needs to stop.
 
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
 the inertial unit: it is level and still, so the joints say how the base leans and turns. The force
@@ -66,7 +66,7 @@ KEPT, SAME = 512, 0.02
 
 
 class LastStride(NamedTuple):
-    """The commands of the last stride of a walk, which are repeated where nothing is measured.
+    """Commands of the last stride of a walk, repeated when no measurement arrives.
 
     A steady walk is periodic: its own last commands hold the torques that legs and body need of
     each other, which no prediction of a moment later does.
@@ -91,7 +91,7 @@ class LastStride(NamedTuple):
 
 @jit
 def record(stride, mode, kind, phase, position, indices):
-    """Keep the command of a tick of a walk.
+    """Store the command of one tick of a walk.
 
     Args:
         stride: LastStride, changed in place.
@@ -114,7 +114,7 @@ def record(stride, mode, kind, phase, position, indices):
 
 @jit
 def replay(stride, phase, command):
-    """Replace a command, rad, shape (joints,), by the kept one nearest in phase, cycles."""
+    """Replace a command, rad, shape (joints,), by the stored one nearest in phase, cycles."""
     nearest, row = SAME, -1
     for k in range(KEPT):
         if math.isfinite(stride.phases[k]):
@@ -126,7 +126,7 @@ def replay(stride, phase, command):
 
 
 class Substitutes(NamedTuple):
-    """Fills the gaps in the measurements of one biped.
+    """Measurements of one biped, with substitutes for missing ones, and scratch memory.
 
     Attributes:
         sensors: measurements with the gaps filled.
@@ -159,7 +159,7 @@ class Substitutes(NamedTuple):
 
 @jit
 def fill(links, measured, known, memory, own, dt):
-    """Fill the present measurements, with substitutes for those that are late.
+    """Fill the present measurements, with substitutes for late ones.
 
     Args:
         links: Links of the robot.
@@ -217,7 +217,7 @@ def sole_tilts(links, sensors, own, tilts):
 
 @jit
 def _take_joints(links, latency, memory, suspect, measured, own, dt):
-    """Take the joints as measured a latency in s ago, but for the suspect."""
+    """Use the joints as measured a latency in s ago, except the suspect."""
     angles, rates = own.sensors.joint_positions[0], own.sensors.joint_velocities[0]
     ahead = min(latency, EXTRAPOLATED) if latency > PROMPT else 0.0
     predicted, rate = 0.0, 0.0
@@ -248,7 +248,7 @@ def _solve(system):
 
 @jit
 def _move(links, memory, own, dt):
-    """Predict the joints of the legs dt in s later."""
+    """Predict the leg joints dt in s ahead."""
     laws = memory.laws[0]
     pose, rates, columns, system = (memory.pose, own.sensors.joint_velocities[0], own.columns,
                                     own.system)
@@ -293,7 +293,7 @@ def _turn(measured, rpy, time):
 
 @jit
 def _lean_on_sole(links, memory, own, fraction, dt, pushed):
-    """Set lean and rates of the base from the joints of the leg that bears more."""
+    """Set lean and rates of the base from the joints of the more loaded leg."""
     laws = memory.laws[0]
     sensors, pose, still = own.sensors, own.pose, own.rpy
     joints, rates, rpy = sensors.joint_positions[0], sensors.joint_velocities[0], sensors.rpy[0]

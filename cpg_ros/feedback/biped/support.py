@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Velocity of a biped's base, its arms, and the force of the legs that stand.
+"""Velocity of a biped's base, its arms, and the forces of the stance legs.
 
-One force and one moment are wanted of the ground. Its horizontal part points from the centre of
-pressure to the centre of mass, which turns nothing; what is to turn the body is added. The legs
-share it, and each leg's joints get J' F.
+The laws request one force and one moment of the ground. The horizontal force points from the
+centre of pressure to the centre of mass, so that it does not turn the body; the moment is added.
+The legs share both, and each leg's joints get the torques J' F.
 """
 
 import math
@@ -138,7 +138,7 @@ class Arms(NamedTuple):
                    np.zeros(rest.size), np.zeros(1), rest.copy())
 
     def learn(self, slot: int, plan: GaitPlan) -> None:
-        """Read the cells of a gait, in a place among the gaits, from its own orbit."""
+        """Read the range of the cells from a gait's orbit, and store it in the gait's slot."""
         orbit = plan.orbit
         network = orbit.network
         indices = self.cells + network.cells * (len(network.states) - 1)
@@ -231,7 +231,7 @@ def upward_force(target, height, rise, mass, gains):
 
 @jit
 def ground_force(center, cop, up, moment, gains):
-    """Return the force that the ground is to exert, N.
+    """Return the requested force of the ground, N.
 
     Args:
         center: of mass, m.
@@ -252,7 +252,7 @@ def ground_force(center, cop, up, moment, gains):
 
 @jit
 def attitude_moment(rpy, turning, heading_error, reaction, gains):
-    """Return the moment about the world's axes that is to right the body, N m.
+    """Return the righting moment of the body, world axes, N m.
 
     Args:
         rpy: of the base, rad.

@@ -55,7 +55,7 @@ def _sense(links, gains, memory, sensors, dt):
 
 @jit
 def _approach(gains, memory, command, dt):
-    """Approach the wanted velocity and heading; command as of tick."""
+    """Ramp the target velocity and heading; command as of tick."""
     laws = memory.laws[0]
     target, most = laws.wanted, gains.acceleration * dt
     for k in range(2):
@@ -65,7 +65,7 @@ def _approach(gains, memory, command, dt):
 
 @jit
 def _follow_clock(gains, memory, kind):
-    """Let legs lift off and land by their phases, and early by the load on them."""
+    """Switch legs between swing and stance by their phases, or earlier by their load."""
     laws = memory.laws[0]
     soles, swing_fraction = memory.pose.soles, stepping.swing_fraction(gains)
     laws.clock[1] = 0.0
@@ -88,7 +88,7 @@ def _follow_clock(gains, memory, kind):
 
 @jit
 def _step(links, gains, memory, xi, axes, rate):
-    """Fill the DCM error, the clock's factor and the target of a swinging foot."""
+    """Fill the DCM error, the clock's factor and the foothold of a swinging foot."""
     laws = memory.laws[0]
     soles, phases, (c, s) = memory.pose.soles, laws.phases, axes
     stands = 0 if laws.fractions[0] > laws.fractions[1] else 1
@@ -131,7 +131,7 @@ def _stand(links, gains, memory, xi, axes, rate, shifted):
 
 @jit
 def _fly(links, gains, memory, axes, kind, dt):
-    """Fill load fractions, ground and targets of feet that swing, in a gait with flight."""
+    """Fill load fractions, ground and footholds of swinging feet, in a gait with flight."""
     laws = memory.laws[0]
     soles, base, phases, (c, s) = memory.pose.soles, laws.velocity, laws.phases, axes
     center, velocity, fractions = laws.center[0], laws.center[1], laws.fractions
@@ -180,7 +180,7 @@ def _upward(gains, memory, mass, mode, kind, level):
 
 @jit
 def _bear(links, gains, memory, sensors, shift, mode, kind):
-    """Fill the torques of the legs that stand; shift is the centre of pressure's, m."""
+    """Fill the torques of the stance legs; shift is that of the centre of pressure, m."""
     laws = memory.laws[0]
     pose, fractions = memory.pose, laws.fractions
     first, second = pose.soles[0], pose.soles[1]
@@ -217,7 +217,7 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
 
 @jit
 def _swing(links, gains, memory, leg, kind):
-    """Add the torques of a leg that swings, and its reaction moment on the body, N m."""
+    """Add the torques of a swinging leg, and its reaction moment on the body, N m."""
     laws = memory.laws[0]
     pose, other, way = memory.pose, 1 - leg, laws.path
     duration = stepping.swing_fraction(gains) / gains.frequency

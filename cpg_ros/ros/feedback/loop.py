@@ -49,15 +49,15 @@ Motion = Callable[[], tuple[float, float, float]]
 
 
 class SensorLoop:
-    """Feeds the robot's sensors back to a pattern at every tick.
+    """Feedback from the robot's sensors to a pattern at every tick.
 
-    Its methods are for any thread; ``tick.c`` does the ticks, see ``compiled``.
+    Any thread may call its methods; ``tick.c`` runs the ticks, see ``compiled``.
 
     Attributes:
         inputs: the robot's sensors.
         feedback: its laws, whose gains may be replaced.
         wanted: whether the feedback is enabled.
-        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; '' while it is active.
+        faults: reasons that interrupt it, such as 'imu: no messages for 3.2 s'; else ''.
         waiting: whether an input has never arrived.
         fraction: of all corrections, 0 to 1.
 
@@ -89,7 +89,7 @@ class SensorLoop:
         return 'waiting' if self.waiting else 'out'
 
     def _corrects(self, numbers: np.ndarray, **others: Any) -> native.Correction:
-        """Return how ``tick.c`` corrects by the inputs; numbers begin with dt and time, s."""
+        """Return the struct by which ``tick.c`` corrects; numbers begin with dt and time, s."""
         inputs = self.inputs.structs
         return native.Correction(
             take=native.address('rcl_take_serialized_message'),
@@ -100,7 +100,7 @@ class SensorLoop:
         """Tabulate a gait before the pattern changes to it."""
 
     def renew(self) -> None:
-        """Take over the wanted motion."""
+        """Update the commanded motion."""
 
     def compiled(self) -> native.Correction:
         """Read messages of new layouts; return how ``tick.c`` corrects the pattern."""
@@ -114,7 +114,7 @@ class SensorLoop:
         return self._pattern.position
 
     def news(self) -> str:
-        """Return what has happened to the robot since the last call, or ''."""
+        """Return a message about the robot since the last call, or ''."""
         return ''
 
 
@@ -233,11 +233,11 @@ class FeedbackLoop(SensorLoop):
         return '; '.join(reasons)
 
     def renew(self) -> None:
-        """Take over the wanted motion."""
+        """Update the commanded motion."""
         self._instant.command[:] = self._motion()
 
     def compiled(self) -> native.Correction:
-        """Do as the base class does, with strides that the laws change."""
+        """As in the base class; the laws also change the strides."""
         if self._pattern.strides is not None:
             self._pattern.strides.trim = self._instant.trim
         return super().compiled()
@@ -341,7 +341,7 @@ class BalanceLoop(SensorLoop):
                 super()._faulty_state)
 
     def news(self) -> str:
-        """Return how the robot has lost its balance since the last call, or ''."""
+        """Return why the robot lost its balance since the last call, or ''."""
         pattern, before = self._pattern, self._balanced
         self._balanced = bool(pattern.balancing)
         if not before or pattern.balancing:
@@ -355,5 +355,5 @@ class BalanceLoop(SensorLoop):
         return 'the robot was moved by hand; standing up again'
 
     def renew(self) -> None:
-        """Take over the wanted motion."""
+        """Update the commanded motion."""
         self._pattern.command = self._motion()
