@@ -102,6 +102,7 @@ class GaitTables(NamedTuple):
         steered: whether strides can be changed, shape (SLOTS,).
         at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
         turn: yaw rate, rad/s, for each unit by which right strides exceed left ones, the same.
+        length: stride at these speeds, 1 for a full one, the same.
         sides: -1/2 for left legs and 1/2 for right ones, shape (legs,); 0 until a gait with
             steering is known.
         copied: whether the robot file has an efference copy of the gait, shape (SLOTS,).
@@ -119,6 +120,7 @@ class GaitTables(NamedTuple):
     steered: np.ndarray
     at: np.ndarray
     turn: np.ndarray
+    length: np.ndarray
     sides: np.ndarray
     copied: np.ndarray
     keys: np.ndarray
@@ -130,7 +132,8 @@ class GaitTables(NamedTuple):
                    np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
                    np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
-                   np.ones((SLOTS, ROWS)), np.zeros(legs), np.zeros(SLOTS, dtype=bool),
+                   np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.zeros(legs),
+                   np.zeros(SLOTS, dtype=bool),
                    np.zeros(SLOTS, dtype=np.int64))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
@@ -154,6 +157,7 @@ class GaitTables(NamedTuple):
         if steering is not None:
             self.at[slot] = _filled(np.array(steering.speed), ROWS, 'a steering table')
             self.turn[slot] = _filled(np.array(steering.turn), ROWS, 'a steering table')
+            self.length[slot] = _filled(np.array(steering.stride), ROWS, 'a steering table')
             self.sides[:] = np.where(plan.robot.left, -0.5, 0.5)
 
 

@@ -37,7 +37,7 @@ from cpg_ros.feedback.laws import (
     touchdown,
     virtual_stiffness,
 )
-from cpg_ros.feedback.laws.law import low_passed
+from cpg_ros.feedback.laws.law import limited, low_passed
 import numpy as np
 
 #: LEAD: phase by which corrections lead the pattern, cycles, as joints lag behind their commands.
@@ -161,6 +161,10 @@ def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
         rate = heading.response(tables.at[slot], tables.turn[slot],
                                 memory.wanted_velocity[run, 0, 0])
         uneven = fraction * heading.yaw_rate(headings[0], headings[1], gains) / rate
+        length = heading.response(tables.at[slot], tables.length[slot],
+                                  memory.wanted_velocity[run, 0, 0])
+        # No stride is longer than 1: turning back comes before speed.
+        longer = limited(length + longer, max(1.0 - 0.5 * abs(uneven), 0.0)) - length
     for leg in range(stride.shape[0]):
         stride[leg] = longer + uneven * tables.sides[leg]
 
@@ -191,8 +195,8 @@ def _intend(tables, gains, memory, planned, run, off, step):
     memory.commanded_turn[run] = low_passed(
         memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
     memory.sidestep_correction[run] = sidestep.correct_speed(
-        memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
-        fraction * dt)
+        memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run],
+        math.hypot(ground[0], ground[1]), gains, fraction * dt)
     strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
     memory.last_phase[run] = phase
     return slot, Intent(alternates, off.roll - ground[0], off.pitch - ground[1],

@@ -335,6 +335,13 @@ def test_the_closed_trot_climbs_where_the_open_one_falls(loop, expected):
     assert loop.run(trials, 10.0, gains=GAINS, expected=expected).upright.all()
 
 
+def test_the_closed_walk_climbs_straight():
+    loop = ClosedLoopBatch('go2', program('walk'))
+    ran = loop.run([Scenario(0.8, terrain=Terrain('ramp', 15.0), phase=phase)
+                    for phase in (0.2, 0.7)], 25.0, gains=GAINS, goal=2.5)
+    assert np.isfinite(ran.arrived).all() and np.abs(ran.place[:, :, 1]).max() < 0.5
+
+
 @pytest.mark.parametrize('kind', ['height_field', 'boxes'])
 def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
     ground = heights(Terrain(kind, 0.08, seed=3))

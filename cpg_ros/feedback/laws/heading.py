@@ -33,14 +33,15 @@ def yaw_rate(target, yaw, gains):
 
 
 @jit
-def response(speeds, yaw_rates, speed):
-    """Return the yaw rate for each unit by which right strides exceed left ones, rad/s.
+def response(speeds, values, speed):
+    """Return the value of a column of the steering table at a speed.
 
     Args:
-        speeds: of the steering table, m/s, ascending, shape (rows,).
-        yaw_rates: at these speeds, rad/s, shape (rows,).
+        speeds: of the table, m/s, ascending, shape (rows,).
+        values: at these speeds, shape (rows,): the stride, or the yaw rate for each unit by which
+            right strides exceed left ones, rad/s.
         speed: forward, m/s.
 
     """
     low, high, up = between_speeds(speeds, speed)
-    return yaw_rates[low] + up * (yaw_rates[high] - yaw_rates[low])
+    return values[low] + up * (values[high] - values[low])

@@ -15,11 +15,14 @@
 """Sidestep: feet carry the body sideways in stance, and step back in swing.
 
 The resulting speed depends on how the gait rocks the body, so an integral corrects it. A gait also
-drifts sideways when it turns; the same integral acts while a turn is commanded.
+drifts sideways when it turns, and on a slope; the same integral acts then.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, limited, low_passed, StateVariable
+
+#: LEVEL: largest angle of ground that counts as level, rad.
+LEVEL = 0.05
 
 LAW = Law(
     'sidestep', 'follow the sideways speed of cmd_vel', True,
@@ -35,6 +38,9 @@ LAW = Law(
                               'speed'),
         'sidestep_turning': Gain(0.5, 5.0, 'm',
                                  'and, while a turn is commanded, this times its rad/s'),
+        'sidestep_slope': Gain(1.0, 10.0, 'm/s',
+                               'and, on a slope, this times the angle of the ground above '
+                               f'{LEVEL:g} rad'),
         'sidestep_filter': Gain(0.5, 5.0, 's', 'time constant of the filter on that turn')},
     memory={
         'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
@@ -82,19 +88,21 @@ def advance(displacement, swinging, target, stance, gains, dt):
 
 
 @jit
-def correct_speed(correction, missing, target, turn, gains, dt):
+def correct_speed(correction, missing, target, turn, slope, gains, dt):
     """Return the correction of the commanded speed to the left, m/s, dt in s later.
 
-    It is 0 where neither a speed to the left nor a turn is commanded.
+    It is 0 on level ground where neither a speed to the left nor a turn is commanded.
 
     Args:
         correction: present one, m/s.
         missing: speed to the left, m/s.
         target: commanded speed to the left, m/s.
         turn: commanded yaw rate, low-passed, rad/s.
+        slope: angle of the ground, rad.
         gains: of the law.
         dt: s.
 
     """
-    most = gains.sidestep_more * abs(target) + gains.sidestep_turning * abs(turn)
+    most = (gains.sidestep_more * abs(target) + gains.sidestep_turning * abs(turn)
+            + gains.sidestep_slope * max(slope - LEVEL, 0.0))
     return limited(correction + dt * gains.sidestep_rate * missing, most)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.common.errors import CpgError, ShortRepr
+from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.fitting.gaits.leg_names import CODES
@@ -34,8 +34,9 @@ import numpy as np
 
 # Measurement of a gait's efference copy: the body's motion on flat ground without feedback.
 
-#: DURATION: of a run, s; BEGINNING: first part of it that is ignored, s.
-DURATION, BEGINNING = 10.0, 3.0
+#: DURATION: of a run, s; BEGINNING: first part of it that is ignored, s; FRICTIONS: of the grounds
+#: over which the motion is averaged.
+DURATION, BEGINNING, FRICTIONS = 10.0, 3.0, (0.6, 0.8, 1.0)
 
 
 def measure_efference(loop: ClosedLoopBatch,
@@ -45,23 +46,33 @@ def measure_efference(loop: ClosedLoopBatch,
     Args:
         loop: bodies that walk their first gait.
         speeds: commanded, m/s; by default as many as a table takes, from the slowest, which may be
-            backward, to the fastest. A gait without steering only has its own.
+            backward, to the fastest. A gait without steering only has its own. Those at which a
+            body falls are left out.
+
+    Raises:
+        InputError: a body falls at each speed.
 
     """
     commanded: Sequence[float] | np.ndarray = [0.0]
     if loop.plan.motion.steering is not None:
         commanded = np.linspace(*loop.plan.speeds, SPEEDS) if speeds is None else speeds
-    ran = loop.run([Scenario(speed=speed) for speed in commanded], DURATION)
+    ran = loop.run([Scenario(friction, speed=speed)
+                    for speed in commanded for friction in FRICTIONS], DURATION)
+    upright = ran.upright.reshape(-1, len(FRICTIONS)).all(axis=1)
+    if not upright.any():
+        raise InputError(f"'{loop.plan.name}' has no efference copy: without feedback the robot "
+                         'falls at each of its speeds')
     first = round(BEGINNING / loop.timestep)
     # The velocity is the robot's own estimate: an error that it makes at every stride is no
     # disturbance.
     signals = np.concatenate([ran.estimated[:, :, :2], ran.angular_velocity[:, :, :2],
                               ran.rpy[:, :, :2]], axis=2)
-    tables = [fold(phase[first:], signal[first:])
-              for phase, signal in zip(ran.phase, signals, strict=True)]
-    mean_speed = ran.velocity[:, first:, 0].mean(axis=1)
+    tables = np.array([np.mean([fold(ran.phase[k, first:], signals[k, first:])
+                                for k in range(row, row + len(FRICTIONS))], axis=0)
+                       for row in len(FRICTIONS) * np.flatnonzero(upright)])
+    mean_speed = ran.velocity[:, first:, 0].reshape(upright.size, -1).mean(axis=1)[upright]
     rising = np.argsort(mean_speed)
-    return EfferenceCopy(mean_speed[rising], np.array(tables)[rising])
+    return EfferenceCopy(mean_speed[rising], tables[rising])
 
 
 def calibrated(robot: Robot, model: str, gaits: Sequence[str],

@@ -37,8 +37,10 @@ from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.ros.bridges.unitree.messages import JOINTS as MOTORS
 from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.robot_setup import calibrate
 from cpg_ros.simulation.robot_setup.calibrate import main
+from cpg_ros.simulation.robot_setup.walk_recording import measure_efference
 from pattern_follower import Proprioception
 
 CONTACTS, IMU = 'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/Imu'
@@ -190,3 +192,12 @@ def test_a_gait_that_cannot_be_has_its_own_code_whatever_the_error_is_called(
     monkeypatch.setattr(calibrate, 'read_walk', fail)
     assert calibrate.main(['a.bag', '--robot', 'unitree_go2', '--out', 'none.yaml']) == code
     assert capsys.readouterr().err == 'calibrate: for a reason\n'
+
+
+def test_a_run_that_falls_does_not_enter_a_copy():
+    # Servos without damping: this trot steps in place, and falls at 0.4 m/s and faster.
+    loop = ClosedLoopBatch('go2', program('trot'), kp=200.0, kd=0.1)
+    measured = measure_efference(loop, (0.0, 0.4))
+    assert measured.speeds == pytest.approx([0.0], abs=0.05)
+    with pytest.raises(InputError, match=r"'trot' has no efference copy.*falls at each"):
+        measure_efference(loop, (0.4, 0.9))
