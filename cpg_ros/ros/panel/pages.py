@@ -79,7 +79,7 @@ def _setting(value: Any) -> bool | int | float | str:
     raise RequestError('must be true or false, text or a finite number')
 
 
-#: Action -> its values, and the check of each. A direction is in degrees to the left.
+#: Action -> its values, and the check of each. A direction is in degrees from x to y.
 ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'choose': {'node': _text}, 'set': {'name': _text, 'value': _setting},
     'steer': {'speed': _number(-1.0, 1.0), 'turn': _number(-1.0, 1.0)},

@@ -441,7 +441,8 @@ class Panel(StartedNode):
         """Send each page the state of its robot's lease, if that has changed."""
         for page in self._pages.everyone:
             if (view := self._views.get(page.node)) and page.lease(
-                    message := view.teleop.state(page)):
+                    message := {**view.teleop.state(page),
+                                'pages': len(self._pages.everyone)}):
                 self._pages.send([page], message)
 
     def _view(self, name: str) -> RobotView:

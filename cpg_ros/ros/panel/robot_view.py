@@ -423,7 +423,7 @@ class RobotView:
         return simulation
 
     def push(self, force: float, direction: float) -> None:
-        """Push the robot with a force, N, in a direction, degrees from ahead to the left.
+        """Push the robot with a force, N, in a direction, degrees from the world's x to its y.
 
         Raises:
             CallError: it is not simulated.

@@ -14,7 +14,7 @@
 
 """The shape that the panel draws of a robot: the best that the graph, the user and files tell.
 
-A shape is links that turn about joints, each with its own triangles.
+A shape is links that turn about joints, each with its own meshes and solids.
 """
 
 import base64
@@ -45,17 +45,66 @@ from cpg_ros.ros.panel.pages import LONGEST
 from cpg_ros.simulation.robot_model import engine, load
 import numpy as np
 
-#: Number of corners of a circle.
-ROUND = 16
-#: Colour of triangles without one.
+#: Colour of what has none.
 GREY = (0.62, 0.65, 0.70)
-#: Vertices closer than this are merged, m: a page draws a robot, not its screws.
-GRAIN = 0.008
+#: GRAINS: vertices closer than this are merged, m, tried one after another until a mesh has at
+#: most MOST triangles: a page draws a robot, not its screws.
+GRAINS, MOST = (1e-5, 0.002, 0.004, 0.008), 30_000
+#: STEPS: number of steps of a coordinate within a mesh.
+STEPS = 65535
+
+
+@dataclass
+class Part:
+    """A piece of a link in one colour: a mesh, or a solid with sizes as a geom of MuJoCo has them.
+
+    Attributes:
+        kind: mesh, or box, sphere, ellipsoid, capsule or cylinder.
+        size: of a solid, m: half lengths, or radius and half length.
+        mesh: of a mesh, else None; m.
+        colour: red, green and blue, 0 to 1.
+        position, pose: in the link: m, and a rotation matrix.
+
+    """
+
+    kind: str
+    size: np.ndarray
+    mesh: Mesh | None = None
+    colour: tuple[float, ...] = GREY
+    position: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    pose: np.ndarray = field(default_factory=lambda: np.eye(3))
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Points that enclose it, in the link, m, shape (n, 3)."""
+        if self.mesh is not None:
+            points = self.mesh.points
+        else:
+            radius, long = self.size[0], self.size[-1] + (self.kind == 'capsule') * self.size[0]
+            half = (self.size if self.kind in ('box', 'ellipsoid') else
+                    np.array([radius, radius, radius if self.kind == 'sphere' else long]))
+            points = half * (2.0 * np.indices((2, 2, 2)).reshape(3, 8).T - 1.0)
+        return points @ self.pose.T + self.position
+
+    def message(self) -> dict[str, Any]:
+        """Return the part for a page; a mesh's points are in steps above the lowest ones."""
+        message = {'kind': self.kind, 'size': np.round(self.size, 5).tolist(),
+                   'colour': np.round(self.colour[:3], 3).tolist(),
+                   'place': np.round(self.position, 6).tolist(),
+                   'pose': np.round(self.pose.ravel(), 6).tolist()}
+        if self.mesh is None:
+            return message
+        points = self.mesh.points
+        low = points.min(axis=0)
+        step = max(float(np.ptp(points, axis=0).max()) / STEPS, 1e-9)
+        return {**message, 'low': low.tolist(), 'step': step,
+                'points': _base64(np.round((points - low) / step).astype('<u2')),
+                'triangles': _base64(self.mesh.triangles.astype('<u4'))}
 
 
 @dataclass
 class Link:
-    """A rigid part, and its joint to its parent.
+    """A rigid body, and its joint to its parent.
 
     Attributes:
         name: of it.
@@ -65,7 +114,7 @@ class Link:
         axis: of the joint, in the link's own frame.
         position, pose: of the link in its parent at angle 0: m, and a rotation matrix.
         zero: angle of the joint at which the link is where ``pose`` has it, rad.
-        vertices, colours: its triangles, shape (n, 3, 3), m, and their colours, (n, 3), 0 to 1.
+        parts: what is drawn of it.
 
     """
 
@@ -77,15 +126,12 @@ class Link:
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     pose: np.ndarray = field(default_factory=lambda: np.eye(3))
     zero: float = 0.0
-    vertices: list[np.ndarray] = field(default_factory=list)
-    colours: list[np.ndarray] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
 
-    def add(self, triangles: np.ndarray, colour: tuple[float, ...] = GREY,
-            offset: np.ndarray | None = None, pose: np.ndarray | None = None) -> None:
-        """Add triangles, shape (n, 3, 3), m, in a frame within the link, in a colour."""
-        rotated = triangles if pose is None else triangles @ pose.T
-        self.vertices.append(rotated if offset is None else rotated + offset)
-        self.colours.append(np.broadcast_to(np.asarray(colour[:3]), (len(triangles), 3)))
+    @property
+    def corners(self) -> np.ndarray:
+        """Points that enclose it, and its origin, m, shape (n, 3)."""
+        return np.concatenate([np.zeros((1, 3)), *(part.corners for part in self.parts)])
 
 
 @dataclass
@@ -106,19 +152,13 @@ class Shape:
     feet: dict[str, tuple[int, np.ndarray]] = field(default_factory=dict)
 
     def message(self) -> dict[str, Any]:
-        """Return the message for a page: base64 of float32 triangles and uint8 colours."""
-        links = []
-        for link in self.links:
-            corners = np.concatenate([np.zeros((0, 3, 3)), *link.vertices])
-            colours = np.concatenate([np.zeros((0, 3)), *link.colours])
-            links.append({
-                'name': link.name, 'parent': link.parent, 'joint': link.joint,
-                'slides': link.slides, 'zero': link.zero,
-                'axis': np.round(link.axis, 6).tolist(),
-                'place': np.round(link.position, 6).tolist(),
-                'pose': np.round(link.pose.ravel(), 6).tolist(),
-                'vertices': _base64(corners.reshape(-1, 3).astype('<f4')),
-                'colours': _base64((255 * np.clip(np.repeat(colours, 3, 0), 0, 1)).astype('u1'))})
+        """Return the message for a page."""
+        links = [{'name': link.name, 'parent': link.parent, 'joint': link.joint,
+                  'slides': link.slides, 'zero': link.zero,
+                  'axis': np.round(link.axis, 6).tolist(),
+                  'place': np.round(link.position, 6).tolist(),
+                  'pose': np.round(link.pose.ravel(), 6).tolist(),
+                  'parts': [part.message() for part in link.parts]} for link in self.links]
         limits = {joint: [value if math.isfinite(value) else None for value in span]
                   for joint, span in self.limits.items()}
         return {'type': 'shape', 'source': self.source, 'links': links, 'limits': limits,
@@ -130,76 +170,26 @@ def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode('ascii')
 
 
-def coarse(triangles: np.ndarray, grain: float = GRAIN) -> np.ndarray:
-    """Return the triangles that remain when vertices closer than ``grain``, m, are merged."""
-    mesh = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
-                  grain)
-    # Two that came to lie on one another are one, whichever way round.
-    _, indices = np.unique(np.sort(mesh.triangles, axis=1), axis=0, return_index=True)
-    return mesh.points[mesh.triangles[np.sort(indices)]]
+def drawable(mesh: Mesh) -> Mesh:
+    """Return a mesh with shared vertices, coarser where it has more triangles than are drawn."""
+    for grain in GRAINS:
+        coarse = merged(mesh, grain)
+        if len(coarse.triangles) <= MOST:
+            break
+    return coarse
 
 
-def box(half: np.ndarray) -> np.ndarray:
-    """Return the triangles of a box of three half lengths, shape (12, 3, 3)."""
-    faces = []
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            across, other = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
-            middle = side * np.eye(3)[axis]
-            a, b, c, d = (middle + s * across + t * other
-                          for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
-            faces += [(a, b, c), (a, c, d)]
-    return np.array(faces) * np.asarray(half)
-
-
-def revolved(profile: np.ndarray) -> np.ndarray:
-    """Return the triangles of a profile of radius and height, (n, 2), turned about z."""
-    angles = np.linspace(0.0, 2.0 * math.pi, ROUND + 1)
-    ring = np.stack([profile[:, :1] * np.cos(angles), profile[:, :1] * np.sin(angles),
-                     np.broadcast_to(profile[:, 1:], (len(profile), ROUND + 1))], -1)
-    a, b, c, d = ring[:-1, :-1], ring[:-1, 1:], ring[1:, 1:], ring[1:, :-1]
-    triangles = np.concatenate([np.stack([a, b, c], -2).reshape(-1, 3, 3),
-                                np.stack([a, c, d], -2).reshape(-1, 3, 3)])
-    area = np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0],
-                                   triangles[:, 2] - triangles[:, 0]), axis=1)
-    return triangles[area > 1e-12]
-
-
-def cylinder(radius: float, half: float) -> np.ndarray:
-    """Return the triangles of a cylinder along z of a radius and half a length, m."""
-    return revolved(np.array([[0.0, -half], [radius, -half], [radius, half], [0.0, half]]))
-
-
-def capsule(radius: float, half: float) -> np.ndarray:
-    """Return the triangles of a cylinder along z with a half sphere at each end, m."""
-    bend = np.linspace(0.0, 0.5 * math.pi, ROUND // 4 + 1)
-    low = np.stack([radius * np.sin(bend), -half - radius * np.cos(bend)], -1)
-    return revolved(np.concatenate([low, low[::-1] * (1.0, -1.0)]))
-
-
-def sphere(radius: float) -> np.ndarray:
-    """Return the triangles of a sphere, m."""
-    return capsule(radius, 0.0)
-
-
-#: SOLIDS: kind -> its triangles, from sizes as a geom of MuJoCo has them, m.
-SOLIDS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    'box': box, 'sphere': lambda size: sphere(size[0]), 'ellipsoid': lambda size:
-    sphere(1.0) * size, 'capsule': lambda size: capsule(*size[:2]),
-    'cylinder': lambda size: cylinder(*size[:2])}
-
-
-def along(start: np.ndarray, end: np.ndarray, radius: float) -> np.ndarray:
-    """Return the triangles of a capsule between two points, m."""
+def along(start: np.ndarray, end: np.ndarray, radius: float, colour: tuple[float, ...]) -> Part:
+    """Return a capsule between two points, m."""
     way = np.asarray(end, float) - start
-    length = float(np.linalg.norm(way))
-    triangles = capsule(radius, 0.5 * length)
+    length, pose = float(np.linalg.norm(way)), np.eye(3)
     if length > 0.0:
         z = way / length
         x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
         x /= np.linalg.norm(x)
-        triangles = triangles @ np.array([x, np.cross(z, x), z])
-    return triangles + 0.5 * (np.asarray(start) + end)
+        pose = np.array([x, np.cross(z, x), z]).T
+    return Part('capsule', np.array([radius, 0.5 * length]), None, colour,
+                0.5 * (np.asarray(start) + end), pose)
 
 
 # A stick figure for a robot of which only legs and joints are known.
@@ -226,11 +216,12 @@ def draw(name: str, legs: Mapping[str, Sequence[str]],
     base = Link('base', -1)
     ends = [np.array([LONG * ahead, WIDE * left, 0.0]) for ahead, left in quarters.values()]
     long = max((abs(end[0]) for end in ends), default=0.0)
-    base.add(box(np.array([long + 0.06, 0.7 * WIDE, 0.05])), BODY)
-    base.add(box(np.array([0.02, 0.04, 0.02])), STICK, np.array([long + 0.08, 0.0, 0.02]))
+    base.parts += [Part('box', np.array([long + 0.06, 0.7 * WIDE, 0.05]), None, BODY),
+                   Part('box', np.array([0.02, 0.04, 0.02]), None, STICK,
+                        np.array([long + 0.08, 0.0, 0.02]))]
     shape = Shape(f"stick figure of '{name}'", [base], dict(limits or {}))
     for (leg, joints), end in zip(legs.items(), ends, strict=True):
-        base.add(along(np.array([end[0], 0.0, 0.0]), end, 0.025), BODY)
+        base.parts.append(along(np.array([end[0], 0.0, 0.0]), end, 0.025, BODY))
         parent, position = 0, end
         down = [k for k in range(len(joints)) if not (len(joints) >= 3 and k == 0)]
         length = LEG / max(len(down), 1)
@@ -239,20 +230,22 @@ def draw(name: str, legs: Mapping[str, Sequence[str]],
                         axis=np.eye(3)[1 if k in down else 0])
             if k in down:
                 tip = np.array([0.0, 0.0, -length])
-                link.add(along(np.zeros(3), tip, 0.018), STICK)
-                link.add(sphere(0.028), BODY)
+                link.parts += [along(np.zeros(3), tip, 0.018, STICK),
+                               Part('sphere', np.array([0.028]), None, BODY)]
             else:
                 tip = np.array([0.0, 0.3 * np.sign(end[1]) * WIDE, 0.0])
-                link.add(along(np.zeros(3), tip, 0.025), BODY)
+                link.parts.append(along(np.zeros(3), tip, 0.025, BODY))
             shape.links.append(link)
             parent, position = len(shape.links) - 1, tip
-        shape.links[parent].add(sphere(0.026), FOOT, position)
+        shape.links[parent].parts.append(Part('sphere', np.array([0.026]), None, FOOT, position))
         shape.feet[leg] = parent, position
     return shape
 
 
 # The shape of a robot from its MuJoCo model, as robot_sim uses it.
 
+#: Kinds of geoms that are drawn.
+KINDS = 'mesh', 'box', 'sphere', 'ellipsoid', 'capsule', 'cylinder'
 #: Geoms of these groups and above are for collisions, by the custom of the models.
 COLLISION_GROUP = 3
 
@@ -311,24 +304,21 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
             and not (model.geom_contype[k] and model.geom_type[k] != mujoco.mjtGeom.mjGEOM_MESH
                      and any(model.geom_type[j] == mujoco.mjtGeom.mjGEOM_MESH for j in geoms))]
     for k in seen or geoms:
-        triangles = _triangles(mujoco, model, k)
         material = model.geom_matid[k]
         colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
-        if triangles is not None and colour[3] > 0.05:
-            link.add(triangles, tuple(colour[:3]), model.geom_pos[k],
-                     _matrix(mujoco, model.geom_quat[k]))
+        kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix('mjGEOM_').lower()
+        if colour[3] > 0.05 and kind in KINDS:
+            link.parts.append(Part(
+                kind, model.geom_size[k].copy(), _mesh(model, k) if kind == 'mesh' else None,
+                tuple(colour[:3]), model.geom_pos[k].copy(), _matrix(mujoco, model.geom_quat[k])))
 
 
-def _triangles(mujoco: Any, model: Any, k: int) -> np.ndarray | None:
-    kind = mujoco.mjtGeom(model.geom_type[k])
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = model.geom_dataid[k]
-        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-        start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-        vertices = model.mesh_vert[first:first + count].astype(float)
-        return coarse(vertices[model.mesh_face[start:start + faces]])
-    solid = SOLIDS.get(kind.name.removeprefix('mjGEOM_').lower())
-    return solid(model.geom_size[k]) if solid else None
+def _mesh(model: Any, k: int) -> Mesh:
+    mesh = model.geom_dataid[k]
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    return drawable(Mesh(model.mesh_vert[first:first + count].astype(float),
+                         model.mesh_face[start:start + faces].astype(int)))
 
 
 def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
@@ -393,13 +383,14 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[
             shape.links.append(_held(joint, index))
         part = parts.get(link.name, Xml.Element('link'))
         failed = drawing.add_all(link, part.findall('visual'))
-        if failed and not link.vertices:
+        if failed and not link.parts:
             replaced.append(link.name)
             drawing.add_all(link, part.findall('collision'))
-            if not link.vertices:
+            if not link.parts:
                 ends = np.array([np.zeros(3), *(one.xyz for one in below.get(link.name, ()))])
                 half = np.maximum(0.5 * np.ptp(ends, axis=0), THIN)
-                link.add(box(half), GREY, 0.5 * (ends.min(axis=0) + ends.max(axis=0)))
+                link.parts.append(Part('box', half, None, GREY,
+                                       0.5 * (ends.min(axis=0) + ends.max(axis=0))))
         errors += failed
     if errors:
         more = f' (and {len(errors) - 1} more like it)' if len(errors) > 1 else ''
@@ -432,7 +423,7 @@ class _Drawing:
         self._path, self._folder = path, mesh_folder(tree)
         self._colours = {material.get('name', ''): material
                          for material in tree.findall('material')}
-        self._meshes: dict[Path, np.ndarray] = {}
+        self._meshes: dict[Path, Mesh] = {}
         self._bytes, self._remaining = 0, TRIANGLES
 
     def add_all(self, link: Link, visuals: Sequence[Xml.Element]) -> list[str]:
@@ -451,11 +442,13 @@ class _Drawing:
         pose = rotation(tuple(_numbers(None if origin is None else origin.get('rpy'), '0 0 0')))
         colour = GREY if material is None else self._colour(material)
         for solid in visual.iterfind('geometry/*'):
-            triangles = self._solid(solid)
-            if len(triangles) > self._remaining:
+            part = self._part(solid)
+            part.colour, part.position, part.pose = colour, position, pose
+            count = 0 if part.mesh is None else len(part.mesh.triangles)
+            if count > self._remaining:
                 raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
-            self._remaining -= len(triangles)
-            link.add(triangles, colour, position, pose)
+            self._remaining -= count
+            link.parts.append(part)
 
     def _colour(self, material: Xml.Element) -> tuple[float, ...]:
         for element in (material, self._colours.get(material.get('name', ''))):
@@ -463,32 +456,32 @@ class _Drawing:
                 return tuple(_numbers(colour.get('rgba'), '0.6 0.6 0.6 1'))
         return GREY
 
-    def _solid(self, solid: Xml.Element) -> np.ndarray:
+    def _part(self, solid: Xml.Element) -> Part:
         if solid.tag == 'box':
-            return box(0.5 * _numbers(solid.get('size'), '0.1 0.1 0.1'))
+            return Part('box', 0.5 * _numbers(solid.get('size'), '0.1 0.1 0.1'))
         radius, length = (float(_numbers(solid.get(key), '0.1')[0])
                           for key in ('radius', 'length'))
         if solid.tag in ('cylinder', 'sphere', 'capsule'):
-            return SOLIDS[solid.tag](np.array([radius, 0.5 * length]))
+            return Part(solid.tag, np.array([radius, 0.5 * length]))
         if solid.tag != 'mesh':
             raise MeshError(f'<{solid.tag}> is not a URDF shape')
         name = solid.get('filename', '')
-        triangles = self._mesh(name) * _numbers(solid.get('scale'), '1 1 1')
-        if not (np.abs(triangles) < FURTHEST).all():
+        points, triangles = self._mesh(name)
+        points = points * _numbers(solid.get('scale'), '1 1 1')
+        if not (np.abs(points) < FURTHEST).all():
             raise MeshError(f'{name}: a vertex is further than {FURTHEST:g} m away')
-        return coarse(triangles)
+        return Part('mesh', np.zeros(0), drawable(Mesh(points, triangles)))
 
-    def _mesh(self, name: str) -> np.ndarray:
+    def _mesh(self, name: str) -> Mesh:
         path = find_mesh(name, self._path, self._folder)
         if path not in self._meshes:
             mesh = read_mesh(path)
             if not len(mesh.triangles):
                 raise MeshError(f'{path}: it has no triangles')
-            triangles = mesh.points[mesh.triangles]
-            self._bytes += triangles.nbytes
+            self._bytes += 9 * 8 * len(mesh.triangles)
             if self._bytes > MESHES:
                 raise MeshError(f'{name}: the meshes have more than {MESHES / 1e6:g} MB')
-            self._meshes[path] = triangles
+            self._meshes[path] = mesh
         return self._meshes[path]
 
 
@@ -597,7 +590,7 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
         # A link that is fixed to the last joint's link is the foot; else it is what is farthest
         # from the joint.
         tips = [link for link in shape.links if link.parent == end and not link.joint]
-        corners = np.concatenate([np.zeros((1, 3, 3)), *shape.links[end].vertices]).reshape(-1, 3)
+        corners = shape.links[end].corners
         away = np.linalg.norm(corners, axis=1)
         shape.feet[leg] = end, (tips[-1].position if tips else
                                 corners[away >= 0.95 * away.max()].mean(axis=0))

@@ -142,7 +142,7 @@ def test_meshes_of_a_description_are_those_of_installed_packages(shown, tmp_path
             'encoded': f'package://cpg_ros/{"%2e%2e/" * 12}{tmp_path}/own.stl'}[kind]
     panel, page, shape = shown('/no/robot.yaml', URDF.format(mesh=mesh))
     assert shape['source'] == 'robot_description' and len(shape['links']) == 2
-    assert shape['links'][0]['vertices'], 'the box is drawn all the same'
+    assert shape['links'][0]['parts'], 'the box is drawn all the same'
     (doubt,) = shape['doubts']
     assert 'installed packages only' in doubt
     before = page.frames

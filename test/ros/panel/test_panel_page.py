@@ -58,7 +58,7 @@ def open_page(rig, browser):
         page.on('console', lambda message: message.type == 'error' and wrong.append(message.text))
         page.goto(rig[1] + more)
         opened.append(context)
-        until(lambda: page.evaluate('panel.frames > 0 && !!panel.body') and
+        until(lambda: page.evaluate('panel.frames > 0 && !!panel.scene.shape') and
               page.locator('#gaits button').count(), 'a page with a robot')
         return page
 
@@ -96,7 +96,7 @@ def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
     assert {'rate', 'amplitude', 'delayed.tau'} <= set(sliders.evaluate_all(
         'all => all.map(one => one.dataset.parameter)'))
     # Feet of a robot of which nobody says where it is stand on the floor.
-    heights = page.evaluate('Object.keys(panel.body.shape.feet).map(k => panel.body.foot(k)[2])')
+    heights = page.evaluate('Object.keys(panel.scene.shape.feet).map(k => panel.scene.foot(k).z)')
     assert min(heights) == pytest.approx(0.02, abs=1e-3)
 
 
@@ -294,13 +294,13 @@ def test_the_pad_steers_with_a_finger(rig, open_page):
 
 def test_the_address_carries_the_view(open_page):
     page = open_page()
-    page.evaluate('panel.scene.camera.azimuth = 120')
+    page.evaluate('panel.scene.look(120, 20, 2.5)')
     page.locator('#theme').click()
     page.locator('#portrait').select_option('cell 3')
     address = page.evaluate('location.hash')
     other = open_page(address)
     until(lambda: other.locator('#portrait').input_value() == 'cell 3', 'the portrait')
-    assert other.evaluate('panel.scene.camera.azimuth') == 120
+    assert other.evaluate('panel.scene.view') == pytest.approx([120, 20, 2.5], abs=0.1)
     assert other.evaluate('document.documentElement.dataset.theme') == 'dark'
 
 
@@ -345,13 +345,43 @@ def test_parameters_are_closed_groups_that_a_search_opens(open_page):
     assert shown.count() == 0
 
 
-def test_a_wide_page_is_short_and_keeps_the_robot_in_sight(open_page):
+@pytest.mark.parametrize('width', [390, 1366, 1920])
+def test_stop_and_robot_stay_in_sight(open_page, width):
+    """And a wide page does not scroll: footfalls and a plot are in its first view."""
     page = open_page()
-    page.set_viewport_size({'width': 1280, 'height': 800})
-    assert page.evaluate('document.documentElement.scrollHeight') <= 2000
-    page.evaluate('scrollTo(0, 1e5)')
-    box = page.locator('#stage').bounding_box()
-    assert box['y'] >= 0 and box['y'] + box['height'] <= 800
+    page.set_viewport_size({'width': width, 'height': 800})
+    page.evaluate('scrollTo(0, 1e5); document.querySelector("aside").scrollTo(0, 1e5)')
+    for name in ('#stop', '#stage', *(['#footfalls', '#chosen'] if width > 860 else [])):
+        box = page.locator(name).bounding_box()
+        assert box['y'] >= 0 and box['y'] + box['height'] <= 800, name
+        assert box['x'] >= 0 and box['x'] + box['width'] <= width, name
+
+
+def test_a_held_key_drives_again_after_the_page_stood_still(rig, open_page):
+    page = open_page()
+    steered(rig, page)
+    page.evaluate('() => { window.end = Date.now() + 1500; while (Date.now() < end); }')
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+    page.keyboard.down('ArrowUp')  # again without a release: it repeats
+    until(lambda: rig[3][-1] == (0.5, 0.0), 'steering again')
+    page.keyboard.up('ArrowUp')
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+
+
+def test_control_is_shown_to_those_who_share_it(open_page):
+    page = open_page()
+    until(lambda: page.evaluate('panel.lease?.pages') == 1, 'a page alone')
+    assert not page.locator('#control').is_visible()
+    other = open_page()
+    for one in (page, other):
+        until(one.locator('#control').is_visible, 'who has control')
+
+
+def test_views_of_the_camera(open_page):
+    page = open_page()
+    for name, azimuth, elevation in (('side', 90, 8), ('front', 0, 10)):
+        page.locator(f'#views button[data-view={name}]').click()
+        assert page.evaluate('panel.scene.view')[:2] == pytest.approx([azimuth, elevation], abs=1)
 
 
 @pytest.mark.parametrize('width', [390, 1280])
@@ -408,11 +438,8 @@ def test_missed_frames_leave_a_gap_and_speeds_are_averaged_over_a_stride(open_pa
         for (let k = 0; k < 60; k++) if (k < 20 || k > 40)
           plots.take({ time: 1000 + 0.025 * k, cells: [k, k],
             speed: [0.3 + Math.cos(2 * Math.PI * k / 20), 0, 1] });
-        const lines = [], chart = { begin() {}, dot() {}, say() {},
-          line: (xs) => lines.push(xs) };
-        plots.phase(chart, plots.frames);
-        return [lines[0], plots.speed()]; }""")
-    assert lines.index(None) == 20 and lines.count(None) == 1 and lines[21] == 41
+        return [plots.path(plots.frames, 0), plots.speed()]; }""")
+    assert lines.index(None) == 20 and lines.count(None) == 1 and lines[21] == [41, 41]
     assert mean == [pytest.approx(0.3, abs=0.1), 0, 1]
 
 

@@ -14,6 +14,7 @@
 
 """The shapes that the panel draws: where their links are, and what they are made of."""
 
+import base64
 import struct
 
 import numpy as np
@@ -22,7 +23,7 @@ import pytest
 pytest.importorskip('websockets')
 
 from cpg_ros.common.files import resource_folder  # noqa: E402, I100
-from cpg_ros.motion.meshes import MeshError, read_mesh  # noqa: E402
+from cpg_ros.motion.meshes import Mesh, MeshError, read_mesh  # noqa: E402
 from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.ros.panel import shape as shapes  # noqa: E402
 
@@ -75,17 +76,44 @@ def volume(triangles):
                          np.cross(triangles[:, 1], triangles[:, 2])).sum()) / 6.0
 
 
-def test_solids():
-    for made, low, high in ((shapes.cylinder(0.5, 1.0), [-0.5, -0.5, -1], [0.5, 0.5, 1]),
-                            (shapes.capsule(0.5, 1.0), [-0.5, -0.5, -1.5], [0.5, 0.5, 1.5]),
-                            (shapes.box(np.array([1.0, 2.0, 3.0])), [-1, -2, -3], [1, 2, 3])):
-        np.testing.assert_allclose(made.min((0, 1)), low, atol=1e-9)
-        np.testing.assert_allclose(made.max((0, 1)), high, atol=1e-9)
-    # A 16-sided prism: its area is n/2 sin(2 pi / n) r^2.
-    assert volume(shapes.cylinder(1.0, 0.5)) == pytest.approx(8 * np.sin(np.pi / 8), rel=1e-9)
-    stick = shapes.along(np.array([1.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.0]), 0.1)
-    np.testing.assert_allclose(stick.min((0, 1)), [0.9, -0.1, -0.1], atol=0.01)
-    np.testing.assert_allclose(stick.max((0, 1)), [1.1, 2.1, 0.1], atol=0.01)
+def drawn_mesh(part):
+    """Triangles of a part's mesh in its link, shape (n, 3, 3)."""
+    return part.corners[part.mesh.triangles]
+
+
+@pytest.mark.parametrize(('kind', 'size', 'half'), [
+    ('cylinder', [0.5, 1.0], [0.5, 0.5, 1.0]), ('capsule', [0.5, 1.0], [0.5, 0.5, 1.5]),
+    ('sphere', [0.5], [0.5] * 3), ('ellipsoid', [1.0, 2.0, 3.0], [1.0, 2.0, 3.0]),
+    ('box', [1.0, 2.0, 3.0], [1.0, 2.0, 3.0])])
+def test_corners_enclose_solids(kind, size, half):
+    corners = shapes.Part(kind, np.array(size)).corners
+    np.testing.assert_allclose(corners.max(axis=0), half)
+    np.testing.assert_allclose(corners.min(axis=0), -np.array(half))
+
+
+def test_a_stick_lies_between_its_ends():
+    stick = shapes.along(np.array([1.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.0]), 0.1, (1, 1, 1))
+    np.testing.assert_allclose(stick.corners.min(axis=0), [0.9, -0.1, -0.1], atol=1e-9)
+    np.testing.assert_allclose(stick.corners.max(axis=0), [1.1, 2.1, 0.1], atol=1e-9)
+
+
+def test_a_page_gets_a_mesh_with_shared_vertices_to_a_65535th_of_its_size():
+    """And a mesh of more triangles than a page draws becomes coarser."""
+    mesh = shapes.drawable(Mesh(TETRAHEDRON.reshape(-1, 3), np.arange(12).reshape(-1, 3)))
+    assert len(mesh.points) == 4
+    message = shapes.Part('mesh', np.zeros(0), mesh).message()
+    steps = np.frombuffer(base64.b64decode(message['points']), '<u2').reshape(-1, 3)
+    corners = np.frombuffer(base64.b64decode(message['triangles']), '<u4').reshape(-1, 3)
+    found = (message['low'] + message['step'] * steps)[corners]
+    np.testing.assert_allclose(found, TETRAHEDRON, atol=1.0 / 65535)
+    side = np.arange(200) / 1000.0  # a sheet of 0.2 m with 79,202 triangles, 1 mm wide
+    x, y = np.meshgrid(side, side, indexing='ij')
+    k = (200 * np.arange(199)[:, None] + np.arange(199)).reshape(-1)
+    sheet = Mesh(np.stack([x, y, 0.0 * x], -1).reshape(-1, 3), np.concatenate([
+        np.stack([k, k + 1, k + 200], -1), np.stack([k + 1, k + 201, k + 200], -1)]))
+    drawn = shapes.drawable(sheet)
+    assert 10_000 < len(drawn.triangles) <= shapes.MOST
+    np.testing.assert_allclose(np.ptp(drawn.points, axis=0), [0.199, 0.199, 0.0], atol=0.004)
 
 
 TETRAHEDRON = np.array([[[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [0, 0, 1]],
@@ -128,12 +156,6 @@ def test_meshes_that_cannot_be_read(tmp_path, name, data, said):
         read_mesh(tmp_path / name)
 
 
-def test_vertices_that_lie_close_together_become_one():
-    fine = np.concatenate([TETRAHEDRON, TETRAHEDRON * 1e-3])
-    left = shapes.coarse(fine, 0.01)
-    assert len(left) == 4 and volume(left) == pytest.approx(1 / 6, rel=0.02)
-
-
 URDF = """<robot name="one"><link name="base"><visual><geometry><mesh filename="{mesh}"
   scale="0.5 0.5 0.5"/></geometry></visual><visual><geometry><mesh filename="package://no/x.stl"/>
   </geometry></visual></link><link name="arm"/><joint name="shoulder" type="revolute"><parent
@@ -147,8 +169,8 @@ def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):
     said = []
     shape = shapes.from_file(path, said.append)
     assert len(said) == 1 and 'neither an installed package nor a folder above' in said[0]
-    (drawn,) = shape.links[0].vertices
-    assert volume(drawn) == pytest.approx(1 / 48)
+    (drawn,) = shape.links[0].parts
+    assert volume(drawn_mesh(drawn)) == pytest.approx(1 / 48)
     assert shape.limits == {'shoulder': (-1.0, 2.0)}
 
 
@@ -177,7 +199,7 @@ def test_collada_is_drawn(tmp_path, text):
     path = tmp_path / 'one.urdf'
     path.write_text(URDF.format(mesh='part.dae'))
     shape = shapes.from_file(path, str)
-    (drawn,) = shape.links[0].vertices
+    drawn = drawn_mesh(shape.links[0].parts[0])
     np.testing.assert_allclose(drawn.min((0, 1)), [0, 0, 0.015])
     if 'polygons' not in text:
         assert len(drawn) == 4
@@ -211,7 +233,8 @@ def test_the_panel_and_robot_sim_find_the_same_meshes(tmp_path, monkeypatch, pla
     model = load(str(path), ROBOT, visual=True, say=said.append)
     assert model.nmesh == 1 and not said
     shape = shapes.from_file(path, said.append)
-    assert not said and any(len(part) == 4 for link in shape.links for part in link.vertices)
+    assert not said and any(
+        part.mesh and len(part.mesh.triangles) == 4 for link in shape.links for part in link.parts)
     # Anybody on the graph may name files of installed packages only.
     shapes.from_text(path.read_text(), 'robot_description', said.append)
     assert len(said) == 1 and 'installed packages only' in said[0]
@@ -249,7 +272,7 @@ def test_a_description_draws_meshes_of_installed_packages_only(installed, name, 
     text = URDF.format(mesh=name.format(shared=installed))
     shape = shapes.from_text(text, 'robot_description', said.append)
     assert len(said) == 1 and ('1 more like it' in said[0]) is not drawn
-    assert any(len(part) == len(TETRAHEDRON) for part in shape.links[0].vertices) is drawn
+    assert any(part.mesh for part in shape.links[0].parts) is drawn
 
 
 def test_links_without_their_meshes_are_drawn_by_collision_shapes_or_as_boxes():
@@ -262,12 +285,12 @@ def test_links_without_their_meshes_are_drawn_by_collision_shapes_or_as_boxes():
             'link="arm"/><child link="hand"/><origin xyz="0.4 0 0"/></joint>'))
     said = []
     base, arm, hand = shapes.from_text(text, 'robot_description', said.append).links
-    corners = np.concatenate(base.vertices)
-    assert np.ptp(corners, axis=(0, 1)) == pytest.approx([1.0, 2.0, 3.0])
-    assert corners.mean((0, 1)) == pytest.approx([0.0, 0.0, 1.0])
+    corners = base.parts[0].corners
+    assert np.ptp(corners, axis=0) == pytest.approx([1.0, 2.0, 3.0])
+    assert corners.mean(axis=0) == pytest.approx([0.0, 0.0, 1.0])
     # Over the joints below.
-    assert np.concatenate(arm.vertices)[..., 0].max() == pytest.approx(0.4)
-    assert not hand.vertices and len(said) == 1
+    assert arm.corners[:, 0].max() == pytest.approx(0.4)
+    assert not hand.parts and len(said) == 1
     assert said[0].endswith('; drawn by their collision shapes or as boxes: base, arm')
 
 

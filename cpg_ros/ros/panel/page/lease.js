@@ -53,6 +53,9 @@ export class Lease {
   take(message) {
     this.now = message;
     const others = message.others.length > 0 && !message.confirmed;
+    // Whoever is alone has nobody to share control with.
+    at('control').hidden = message.pages < 2 && !message.stop_only && !message.others.length
+      && message.round_trip === null;
     at('control').className = message.yours ? 'yours' : this.watches ? 'other' : '';
     at('control').classList.toggle('warn', others || message.round_trip !== null);
     at('this-page').textContent = `this is ${message.page}`;

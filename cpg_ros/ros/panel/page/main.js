@@ -1,5 +1,4 @@
 // The page: messages from the node go to its parts, and user actions go to the node.
-import { Body } from './body.js';
 import { Bridges } from './bridges.js';
 import { Lease } from './lease.js';
 import { Parameters } from './parameters.js';
@@ -14,29 +13,28 @@ const token = new URLSearchParams(location.search).get('token');
 // -- the view, which the address carries ------------------------------------------------------
 
 const given = new URLSearchParams(location.hash.slice(1));
-const [azimuth, elevation, distance] = (given.get('camera') || '').split(',').map(Number);
-const camera = { azimuth: azimuth || 50, elevation: elevation || 18, distance: distance || 1.7 };
-const view = { node: given.get('node') || '', leg: given.get('leg') || '',
-  portrait: given.get('portrait') || '', theme: given.get('theme') || '' };
+const usual = [50, 18, 2];
+const camera = (given.get('camera') || '').split(',').map((text, k) => Number(text) || usual[k]);
+const view = Object.fromEntries(['node', 'plot', 'leg', 'portrait', 'theme'].map((key) =>
+  [key, given.get(key) || '']));
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 function paint() {
   document.documentElement.dataset.theme = view.theme || (dark.matches ? 'dark' : 'light');
+  scene?.paint();
+  fresh = true;
 }
 
 function remember() {
-  const words = new URLSearchParams({ camera: [camera.azimuth, camera.elevation, camera.distance]
-    .map((value) => +value.toFixed(2)).join(',') });
+  const words = new URLSearchParams();
+  if (scene.renderer) words.set('camera', scene.view.map((value) => +value.toFixed(2)).join(','));
   for (const [key, value] of Object.entries(view)) if (value) words.set(key, value);
   history.replaceState(null, '', `#${words}`);
 }
 
-paint();
-dark.addEventListener('change', paint);
-
 // -- its parts --------------------------------------------------------------------------------
 
-let opened = false, state = {}, body = null, frames = 0, counted = 0, fresh = true;
+let opened = false, state = {}, frames = 0, counted = 0, fresh = true, scene = null;
 const last = {};
 const link = new Worker('link.js');
 const send = (request) => link.postMessage({ send: request });
@@ -48,17 +46,21 @@ const parameters = new Parameters((name, value) => {
 const lease = new Lease(send);
 const bridges = new Bridges(send);
 const steering = new Steering((held) => link.postMessage({ held }));
-const scene = new Scene(at('scene'), camera, () => {
+paint();
+dark.addEventListener('change', paint);
+const push = (force, direction) => send({ do: 'push', force, direction });
+scene = new Scene(at('scene'), [...camera, ...usual.slice(camera.length)], () => {
   fresh = true;
   remember();
-});
+}, push);
 const plots = new Plots(view, remember);
 const tour = new Tour(steering, set, at('tour'));
 // What tests look at.
 window.panel = { get frames() { return frames; }, last, get state() { return state; },
-  get body() { return body; }, get lease() { return lease.now; }, plots, scene, steering, tour };
+  get lease() { return lease.now; }, plots, scene, steering, tour };
 
 function say(text, kind) {
+  for (const same of [...at('said').children]) if (same.textContent === text) same.remove();
   const line = Object.assign(document.createElement('p'), { textContent: text, className: kind });
   at('said').append(line);
   while (at('said').children.length > 4) at('said').firstChild.remove();
@@ -74,11 +76,15 @@ function beside() {
   const { simulation, inversion } = state.beside?.[view.node] || {};
   at('reset').disabled = !simulation;
   at('pushing').hidden = !simulation;
+  scene.pushable = !!simulation;
   at('fit').disabled = !inversion;
   const there = state.generators?.includes(view.node);
+  const [text, bar] = at('starting').children, done = /(\d+) of about (\d+) s/.exec(state.starting);
   at('starting').hidden = there;
-  at('starting').textContent = state.starting || (takes.wanted ? `${view.node} is gone`
+  text.textContent = state.starting || (takes.wanted ? `${view.node} is gone`
     : state.generators?.length ? 'choose a generator' : 'waiting for a generator');
+  bar.hidden = !done;
+  if (done) [bar.value, bar.max] = done.slice(1).map(Number);
   const steered = there && parameters.known.cmd_vel?.value === true;
   steering.enable(steered && lease.steers);
   tour.enable(steering.able, parameters.gaitNames);
@@ -92,6 +98,7 @@ const takes = {
     state = message;
     at('generators').replaceChildren(...message.generators.map((name) => new Option(name)));
     at('generators').value = view.node;
+    at('generators').hidden = message.generators.length < 2;
     at('record').textContent = message.recording ? 'Stop recording' : 'Record';
     at('record').classList.toggle('on', message.recording);
     at('download').hidden = message.recording || !message.bag;
@@ -114,7 +121,7 @@ const takes = {
     view.node = message.node;
     at('generators').value = message.node;
     for (const key of Object.keys(last)) delete last[key];
-    body = null;
+    rate = [];
     plots.clear();
     parameters.show([]);
     at('health').replaceChildren();
@@ -134,8 +141,7 @@ const takes = {
     parameters.take(message.values);
   },
   shape(message) {
-    body = new Body(message);
-    scene.show(body);
+    scene.show(message);
     plots.shaped(message);
     at('source').textContent = [`shape: ${message.source}`, ...message.doubts.slice(0, 1)].join('; ');
     at('source').title = message.doubts.join('\n');
@@ -175,7 +181,7 @@ const takes = {
   },
   let_go() {
     steering.release();
-    say('steering stopped: this page stood still', 'refused');
+    say('the robot stopped because this page stood still; it goes on while the key is held', 'refused');
   },
   said(message) {
     say(message.text, message.kind);
@@ -186,12 +192,23 @@ const takes = {
       frames++;
       Object.assign(last, frame);
       plots.take(frame);
-      if (frame.time !== undefined) tour.take(frame.time);
+      if (frame.time === undefined) continue;
+      tour.take(frame.time);
+      paced(frame.time);
     }
     fresh = true;
     link.postMessage({ drawn: true });
   },
 };
+
+// The robot's time and the page's, s, of the last seconds: how fast a simulation runs.
+let rate = [];
+function paced(time) {
+  const now = performance.now() / 1000;
+  if (rate.length && (time < rate.at(-1)[0] || now > rate.at(-1)[1] + 1)) rate = [];
+  rate.push([time, now]);
+  while (rate[0][1] < now - PACED) rate.shift();
+}
 
 function connect() {
   const where = new URL('socket', location.href);
@@ -220,7 +237,9 @@ setInterval(() => link.postMessage({}), 50);
 
 // Where a picture takes so long, ms, none is drawn while the robot is steered.
 const SLOW = 150;
-let slowest = 0;
+// A simulation that takes longer than this much of real time is said to be slow; measured over s.
+const REAL = 0.9, PACED = 4;
+let slowest = 0, ended = 0;
 const pauses = () => !!steering.held && slowest > SLOW;
 
 // Draw, and take note of how long that takes.
@@ -228,25 +247,31 @@ function timed(drawing) {
   const began = performance.now();
   drawing();
   link.postMessage({});
-  slowest = Math.max(performance.now() - began, 0.95 * slowest);
+  ended = performance.now();
+  slowest = Math.max(ended - began, 0.95 * slowest);
 }
 
 function draw() {
   requestAnimationFrame(draw);
   scene.beat(performance.now());
-  if (!fresh || pauses()) return;
+  // Half of the time is for all else.
+  if (!fresh || pauses() || performance.now() - ended < slowest) return;
   fresh = false;
   timed(picture);
+}
+
+// How much of the picture the panels at the right and at the bottom cover, px.
+function covered() {
+  const [aside, below] = [document.querySelector('aside'), at('plots')].map((one) =>
+    getComputedStyle(one).position === 'fixed' ? one.getBoundingClientRect() : null);
+  return [aside ? innerWidth - aside.left : 0, below ? innerHeight - below.top : 0];
 }
 
 function picture() {
   const named = (key) => Object.fromEntries((plots.names[key] || []).map((name, k) =>
     [name, last[key === 'joints' ? 'angles' : key]?.[k]]).filter(([, value]) => value != null));
-  if (body) {
-    body.take(named('joints'), last.base);
-    body.place();
-  }
-  scene.draw(named('forces'));
+  scene.pose(named('joints'), last.base);
+  scene.draw(named('forces'), covered());
 }
 
 setInterval(() => {
@@ -264,6 +289,12 @@ setInterval(() => {
 setInterval(() => {
   at('updates').textContent = `${((frames - counted) / 2).toFixed(0)} per second`;
   counted = frames;
+  const [first, end] = [rate[0], rate.at(-1)];
+  const factor = rate.length > 1 && end[1] - first[1] > PACED / 2
+    ? (end[0] - first[0]) / (end[1] - first[1]) : 1;
+  at('slow').hidden = !scene.pushable || factor >= REAL;
+  at('slow').textContent = `${factor.toFixed(2)} of real time`;
+  at('slow').title = 'the simulation is slower than real time';
 }, 2000);
 
 // -- what people do ---------------------------------------------------------------------------
@@ -280,12 +311,19 @@ at('stand').onclick = () => send({ do: 'seat', on: false });
 at('reset').onclick = at('stand-up').onclick = () => send({ do: 'reset' });
 at('fit').onclick = () => send({ do: 'fit' });
 at('record').onclick = () => send({ do: 'record', on: !state.recording });
-at('push').onclick = () => send({ do: 'push', force: +at('force').value,
-  direction: +at('direction').value });
+// The controls count from ahead of the robot, the command from the world's x.
+const aimed = () => [+at('force').value, +at('direction').value + scene.heading];
+at('push').onclick = () => push(...aimed());
+for (const [kind, shown] of [['pointerenter', true], ['input', true], ['pointerleave', false]])
+  at('pushing').addEventListener(kind, () => {
+    scene.point(...shown ? aimed() : [0, 0]);
+    fresh = true;
+  });
+for (const button of at('views').children)
+  button.onclick = () => scene.preset(button.dataset.view);
 at('theme').onclick = () => {
   view.theme = document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark';
   paint();
-  fresh = true;
   remember();
 };
 at('copy').onclick = () => {
@@ -301,6 +339,7 @@ for (const [id, text] of [['force', (value) => `${value} N`], ['direction', (val
   show();
 }
 
+const FRESH = 200;  // largest age of a key's repetition, ms
 window.addEventListener('keydown', (event) => {
   const typing = event.target.matches('input, select, textarea');
   if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -311,7 +350,9 @@ window.addEventListener('keydown', (event) => {
     // Its own keys.
   } else if (event.key.startsWith('Arrow')) {
     event.preventDefault();
-    if (!event.repeat) steering.key(event.key, true);
+    // A key that repeats is still down: after the page stood still the robot goes on.
+    if (!event.repeat || (!steering.held && performance.now() - event.timeStamp < FRESH))
+      steering.key(event.key, true);
   } else if (/^[1-9]$/.test(event.key) && !event.repeat) {
     at('gaits').children[event.key - 1]?.click();
   }

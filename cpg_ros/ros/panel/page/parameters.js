@@ -8,7 +8,11 @@ const make = (kind, properties = {}, ...children) => {
   return made;
 };
 
-export const short = (value) => typeof value === 'number' ? String(+value.toPrecision(6)) : value;
+// A preset's name for people: goat_walk is goat walk, liu2024_walk is walk (Liu 2024).
+const titled = (name) => name.replace(/^([a-z])([a-z]*)(\d{4})_(.*)$/, (_, first, rest, year, gait) =>
+  `${gait} (${first.toUpperCase()}${rest} ${year})`).replaceAll('_', ' ');
+
+const short = (value) => typeof value === 'number' ? String(+value.toPrecision(6)) : value;
 
 export class Parameters {
   constructor(set) {
@@ -38,16 +42,14 @@ export class Parameters {
       ...Object.entries(groups).map(([name, members]) => this.group(name, members,
         (one) => this.control(one))),
       this.group('read-only while the node runs', fixed, (one) => make('div',
-        { className: 'parameter' }, make('div', { className: 'name' },
-          make('span', { textContent: one.name }),
-          make('output', { textContent: String(one.value) || '–' })),
-        make('p', { textContent: one.text }))));
+        { className: 'parameter' }, make('span', { textContent: one.name }),
+        make('output', { className: 'all', textContent: String(one.value) || '–' }), make('p', { textContent: one.text }))));
     this.find(this.field.value);
     const words = this.known.gait?.choices || [];
     const presets = this.known.gait?.presets || [];
     this.gaitNames = words.filter((word) => !presets.includes(word));
     const button = (gait, k) => {
-      const made = make('button', { textContent: gait, onclick: () => this.set('gait', gait) });
+      const made = make('button', { textContent: titled(gait), onclick: () => this.set('gait', gait) });
       made.dataset.gait = gait;
       if (k < 9) made.append(make('kbd', { textContent: k + 1 }));
       return made;
@@ -85,61 +87,63 @@ export class Parameters {
   }
 
   control(one) {
-    const named = (input) => {
+    const named = (kind, properties, ...children) => {
+      const input = make(kind, properties, ...children);
       input.setAttribute('aria-label', one.name);
       input.dataset.parameter = one.name;
       return input;
     };
-    const parts = [], about = make('p', { textContent: one.text });
-    let input;
+    const number = (text) => one.kind === 'integer' ? Math.round(text) : Number(text);
+    let input, slider = null, show = (value) => { input.value = value; };
     if (one.kind === 'bool') {
-      input = named(make('input', { type: 'checkbox', checked: one.value }));
-      input.onchange = () => this.set(one.name, input.checked);
-      parts.push((value) => { input.checked = value; });
+      input = named('input', { type: 'checkbox', className: 'all',
+        onchange: () => this.set(one.name, input.checked) });
+      show = (value) => { input.checked = value; };
     } else if (one.kind === 'text') {
-      const listed = one.choices.length > 0;
-      input = named(listed ? make('select', {}, ...one.choices.map((word) => new Option(word)))
-        : make('input', { type: 'text' }));
+      input = named(...one.choices.length ? ['select', {}, ...one.choices.map((word) => new Option(word))]
+        : ['input', { type: 'text' }]);
+      input.className = 'all';
       input.onchange = () => this.set(one.name, input.value);
-      parts.push((value) => { input.value = value; });
     } else {
-      const number = (text) => one.kind === 'integer' ? Math.round(text) : Number(text);
-      input = named(make('input', { type: 'number', step: 'any' }));
-      input.onchange = () => this.set(one.name, number(input.value));
-      parts.push((value) => { input.value = short(value); });
-      if (one.low !== null && one.high !== null) {
-        const slider = named(make('input', { type: 'range', min: one.low, max: one.high,
-          step: one.kind === 'integer' ? 1 : (one.high - one.low) / 2000 }));
-        let sent = 0, timer = 0;
-        const send = () => {
-          clearTimeout(timer);
-          sent = performance.now();
-          this.set(one.name, number(slider.value));
-        };
-        slider.oninput = () => {
-          input.value = short(number(slider.value));
-          slider.dataset.held = 'yes';
-          clearTimeout(timer);
-          timer = setTimeout(send, Math.max(0, EVERY - (performance.now() - sent)));
-        };
-        slider.onchange = () => {
-          delete slider.dataset.held;
-          send();
-        };
-        parts.push((value) => {
-          if (!slider.dataset.held) slider.value = value;
-        });
-        about.append(make('span', { className: 'span' },
-          make('span', { textContent: `${short(one.low)} ${one.unit}` }),
-          make('span', { textContent: `${short(one.high)} ${one.unit}` })));
-        about.prepend(slider);
-      }
+      input = named('input', { type: 'number', step: 'any',
+        onchange: () => this.set(one.name, number(input.value)) });
+      if (one.low !== null && one.high !== null) slider = this.slider(one, named, number, input);
+      else input.className = 'all';
+      show = (value) => {
+        input.value = short(value);
+        if (slider && !slider.dataset.held) slider.value = value;
+      };
     }
-    this.shown[one.name] = (value) => parts.forEach((part) => part(value));
-    this.shown[one.name](one.value);
+    this.shown[one.name] = show;
+    show(one.value);
     const label = one.name.includes('.') ? one.name.slice(one.name.indexOf('.') + 1) : one.name;
-    return make('div', { className: 'parameter' }, make('label', { className: 'name' },
-      make('span', { textContent: label + (one.unit ? ` [${one.unit}]` : '') }), input), about);
+    const range = slider ? ` (${short(one.low)} to ${short(one.high)}${one.unit && ` ${one.unit}`})` : '';
+    return make('label', { className: 'parameter' },
+      make('span', { textContent: label + (one.unit ? ` [${one.unit}]` : '') }),
+      ...slider ? [slider] : [], input, make('p', { textContent: one.text + range }));
+  }
+
+  // A slider beside the field of a number: while it is dragged, a value every EVERY ms.
+  slider(one, named, number, input) {
+    let sent = 0, timer = 0;
+    const slider = named('input', { type: 'range', min: one.low, max: one.high,
+      step: one.kind === 'integer' ? 1 : (one.high - one.low) / 2000 });
+    const send = () => {
+      clearTimeout(timer);
+      sent = performance.now();
+      this.set(one.name, number(slider.value));
+    };
+    slider.oninput = () => {
+      input.value = short(number(slider.value));
+      slider.dataset.held = 'yes';
+      clearTimeout(timer);
+      timer = setTimeout(send, Math.max(0, EVERY - (performance.now() - sent)));
+    };
+    slider.onchange = () => {
+      delete slider.dataset.held;
+      send();
+    };
+    return slider;
   }
 
   take(values) {

@@ -1,5 +1,5 @@
-// The plots: footfalls, portrait, cells, angles, limits, speed; of the last seconds.
-import { Chart, colour, ink } from './chart.js';
+// The plots of the last seconds, by uPlot: footfalls, and beside them the one that is chosen.
+import uPlot from './uplot.min.js';
 
 const SPAN = 5;      // s shown
 const STANDS = 5;    // a foot stands from this force on, N
@@ -7,27 +7,87 @@ const KEPT = 400;    // frames
 const USUAL = 1.7;   // times the usual time between two frames; after more, some were missed
 const CHORD = 0.1;   // fraction of a stride that a straight line may stand for
 const STRIDE = 1;    // s; what speeds are averaged over where the stride rate is not known
+const BAR = 12;      // width of a footfall, px
+
+const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const colour = (k) => ink(['--a', '--b', '--c', '--d', '--e', '--f'][k % 6]);
+const short = (joint) => joint.replace(/_?joint$/, '');
+const known = (values) => values.filter((value) => value != null);
+const padded = (values, share, least) => {
+  const low = Math.min(...values), high = Math.max(...values), rim = share * (high - low) + least;
+  return [low - rim, high + rim];
+};
+
+// A figure with one plot, which is made anew when what it shows changes.
+class Figure {
+  constructor(id) {
+    this.place = document.getElementById(id);
+    new ResizeObserver(() => this.plot?.setSize(this.size)).observe(this.place);
+  }
+
+  get size() {
+    const legend = this.place.querySelector('.u-legend')?.offsetHeight || 0;
+    return { width: this.place.clientWidth, height: Math.max(80, this.place.clientHeight - legend) };
+  }
+
+  // Lines: [label, values, more of uPlot's series]; rows: names of the values 0, -1, ... of y.
+  show({ times, lines, x = 'time from now [s]', y = '', rows, across, up, draw, say }) {
+    const key = JSON.stringify([x, y, rows, say, lines?.map(([label]) => label)]);
+    if (key !== this.key) {
+      this.key = key;
+      this.plot?.destroy();
+      this.plot = null;
+      this.place.textContent = say || '';
+      this.place.classList.toggle('empty', !!say);
+      if (!say) this.make(lines, x, y, rows);
+    }
+    if (say) return;
+    this.drawn = draw;
+    this.plot.batch(() => {
+      this.plot.setData([times, ...lines.map(([, values]) => values)], false);
+      for (const [scale, [min, max]] of [['x', across || [-SPAN, 0]], ['y', up]])
+        this.plot.setScale(scale, { min, max });
+    });
+  }
+
+  make(lines, x, y, rows) {
+    const axis = { stroke: () => ink('--soft'), font: '11px system-ui, sans-serif', labelGap: 0,
+      labelFont: '11px system-ui, sans-serif', labelSize: 14, ticks: { show: false } };
+    const grid = { stroke: () => ink('--line'), width: 1 };
+    const longest = Math.max(0, ...(rows || []).map((row) => row.length));
+    this.plot = new uPlot({ ...this.size, padding: [8, 8, 0, 0], cursor: { drag: { x: false, y: false } },
+      legend: { show: lines.length > 0 && !rows },
+      scales: { x: { time: false, auto: false }, y: { auto: false } },
+      axes: [{ ...axis, grid, label: x, size: 22, space: 60 },
+        { ...axis, grid, label: y || null, size: rows ? 12 + 6.5 * longest : 40, space: 24,
+          ...rows && { splits: () => rows.map((_, k) => -k), values: () => rows } }],
+      series: [{ label: x }, ...lines.map(([label, , more], k) => ({ label, width: 1.5,
+        stroke: () => colour(k), points: { show: false },
+        value: (_, value) => value == null ? '' : value.toFixed(2), ...more }))],
+      hooks: { draw: [(plot) => this.drawn?.(plot)] } },
+    [[0], ...lines.map(() => [null])], this.place);
+    this.plot.setSize(this.size);
+  }
+}
 
 export class Plots {
   constructor(view, changed) {
-    this.view = view;
-    this.charts = Object.fromEntries(['footfalls', 'phase', 'cells', 'angles', 'limits', 'speeds']
-      .map((id) => [id, new Chart(id)]));
-    this.leg = document.getElementById('leg');
-    this.portrait = document.getElementById('portrait');
-    for (const [select, key] of [[this.leg, 'leg'], [this.portrait, 'portrait']])
+    Object.assign(this, { view, feet: new Figure('footfalls'), other: new Figure('chosen') });
+    this.selects = Object.fromEntries(['plot', 'leg', 'portrait'].map((key) => {
+      const select = document.getElementById(key);
       select.addEventListener('change', () => {
         view[key] = select.value;
         changed();
+        this.draw();
       });
+      return [key, select];
+    }));
+    if (view.plot) this.selects.plot.value = view.plot;
     this.clear();
   }
 
   clear() {
-    this.frames = [];
-    this.stride = STRIDE;
-    this.names = {};
-    this.shape = null;
+    Object.assign(this, { frames: [], stride: STRIDE, names: {}, shape: null, states: [], cellCount: 0 });
   }
 
   // The stride rate, Hz, of the gait.
@@ -40,20 +100,18 @@ export class Plots {
     const [states, cells] = (names.cells || ['', '']).map((text) => text.split(':'));
     this.cellCount = +cells[1] || 0;
     this.states = states[0].split(',');
-    // A cell's second variable against its first; of cells that have but one, its rate.
-    this.cellNames = Array.from({ length: this.cellCount }, (_, k) => `cell ${k + 1}`);
-    this.fill(this.portrait, this.cellNames, 'portrait');
-    this.fill(this.leg, [...new Set(this.legs())], 'leg');
+    this.fill('portrait', Array.from({ length: this.cellCount }, (_, k) => `cell ${k + 1}`));
+    this.fill('leg', [...new Set(this.legs())]);
   }
 
   shaped(shape) {
     this.shape = shape;
-    this.fill(this.leg, [...new Set(this.legs())], 'leg');
+    this.fill('leg', [...new Set(this.legs())]);
   }
 
-  fill(select, words, key) {
-    select.replaceChildren(...words.map((word) => new Option(word, word)));
-    if (words.includes(this.view[key])) select.value = this.view[key];
+  fill(key, words) {
+    this.selects[key].replaceChildren(...words.map((word) => new Option(word, word)));
+    if (words.includes(this.view[key])) this.selects[key].value = this.view[key];
   }
 
   // Leg of each joint: the foot whose chain of links it is in.
@@ -65,8 +123,7 @@ export class Plots {
   }
 
   take(frame) {
-    const last = this.frames.at(-1);
-    const now = { ...last, ...frame };
+    const last = this.frames.at(-1), now = { ...last, ...frame };
     if (last && now.time < last.time) this.frames = [];
     now.fresh = frame.cells !== undefined;
     if (now.time === undefined) now.time = performance.now() / 1000;
@@ -100,126 +157,113 @@ export class Plots {
   }
 
   draw() {
-    const end = this.frames.at(-1)?.time;
+    const end = this.frames.at(-1)?.time, { plot } = this.selects;
+    for (const key of ['leg', 'portrait']) this.selects[key].hidden = {
+      leg: plot.value !== 'angles', portrait: plot.value !== 'phase' }[key];
     if (end === undefined) return;
     const shown = this.frames.filter((frame) => frame.time > end - SPAN);
-    const times = shown.map((frame) => frame.time - end), axis = [-SPAN, 0, 'time from now [s]'];
-    for (const [name, chart] of Object.entries(this.charts))
-      if (chart.visible) this[name](chart, shown, times, axis);
+    const times = shown.map((frame) => frame.time - end);
+    this.feet.show({ times, ...this.footfalls(shown) });
+    this.other.show({ times, ...this[plot.value](shown) });
   }
 
-  footfalls(chart, shown, times, axis) {
-    const felt = shown.at(-1).forces, legs = felt ? this.names.forces : this.names.phases;
-    if (!legs) return chart.say('neither foot_contacts nor phases are published');
+  footfalls(shown) {
+    const felt = shown.at(-1).forces, rows = felt ? this.names.forces : this.names.phases;
+    if (!rows) return { say: 'neither foot_contacts nor phases are published' };
     const down = (frame, k) => felt ? frame.forces?.[k] > STANDS : frame.phases?.[k] < 0.5;
-    const rows = legs.length;
-    chart.begin(axis, [-0.5, rows - 0.5, ''], legs.map((leg, k) => [rows - 1 - k, leg]));
-    legs.forEach((_, k) => {
-      let from = null;
-      shown.forEach((frame, j) => {
-        if (down(frame, k)) from ??= j ? times[j - 1] : times[0];
-        else if (from !== null) {
-          chart.box(from, rows - 1.35 - k, times[j - 1], rows - 0.65 - k, colour(k));
-          from = null;
-        }
-      });
-      if (from !== null) chart.box(from, rows - 1.35 - k, 0, rows - 0.65 - k, colour(k));
-    });
-    if (!felt) chart.legend([['first half of each leg\'s cycle', ink('--soft')]]);
+    return { rows, up: [0.5 - rows.length, 0.5], y: felt ? '' : 'first half of each cycle',
+      lines: rows.map((leg, k) => [leg, shown.map((frame) => down(frame, k) ? -k : null),
+        { width: BAR }]) };
   }
 
-  phase(chart, shown) {
-    const cell = this.cellNames?.indexOf(this.portrait.value) ?? -1;
-    if (cell < 0 || !shown.at(-1).cells) return chart.say('the generator does not publish ~/cells');
-    const [x, y] = this.states;
+  // A cell's second variable against its first, with a gap where frames were missed.
+  path(shown, cell) {
     const own = shown.filter((frame) => frame.fresh);
-    // Where frames were missed the line is broken: it would be a chord.
     const gaps = own.map((frame, j) => j ? frame.time - own[j - 1].time : 0);
     const most = Math.min(USUAL * [...gaps].sort((a, b) => a - b)[own.length >> 1],
       CHORD * this.stride);
-    const points = own.flatMap(({ cells }, j) => gaps[j] > most ? [null, cells] : [cells]);
-    const [xs, ys] = [cell, this.cellCount + cell].map((k) => points.map((row) => row?.[k]));
-    const span = (values) => {
-      const known = values.filter((value) => value != null);
-      const low = Math.min(...known), high = Math.max(...known), rim = 0.08 * (high - low) + 1e-3;
-      return [low - rim, high + rim];
-    };
-    const unit = y.startsWith('d') ? '1/model time' : '1';
-    chart.begin([...span(xs), `${x} [1]`], [...span(ys), `${y} [${unit}]`]);
-    chart.line(xs, ys, colour(0), 1);
-    xs.forEach((x0, j) => x0 != null && chart.dot(x0, ys[j], colour(0), 1));
-    chart.dot(xs.at(-1), ys.at(-1), colour(1));
-  }
-
-  cells(chart, shown, times, axis) {
-    if (!shown.at(-1).cells) return chart.say('the generator does not publish ~/cells');
-    const count = this.cellCount, values = shown.map((frame) => frame.cells || []);
-    let largest = 1e-6;
-    for (const row of values)
-      for (let k = 0; k < count; k++) largest = Math.max(largest, Math.abs(row[k] || 0));
-    chart.begin(axis, [-0.7, count - 0.3, 'cell'], Array.from({ length: count }, (_, k) =>
-      [count - 1 - k, `${k + 1}`]));
-    for (let k = 0; k < count; k++)
-      chart.line(times, values.map((row) => row[k] == null ? null
-        : count - 1 - k + 0.48 * row[k] / largest), colour(k));
-  }
-
-  angles(chart, shown, times, axis) {
-    const legs = this.legs(), { joints } = this.names;
-    const chosen = legs.map((leg, k) => leg === (this.leg.value || 'all') ? k : -1)
-      .filter((k) => k >= 0);
-    if (!chosen.length || !shown.at(-1).angles) return chart.say('no joint states received');
-    const rows = chosen.map((k) => shown.map((frame) => frame.angles?.[k]));
-    const known = rows.flat().filter((value) => value != null);
-    const low = Math.min(...known), high = Math.max(...known), rim = 0.12 * (high - low) + 0.02;
-    chart.begin(axis, [low - rim, high + 2.5 * rim, 'angle [rad]']);
-    rows.forEach((row, k) => {
-      chart.line(times, row, colour(k));
-      for (const limit of this.shape?.limits[joints[chosen[k]]] || [])
-        if (limit != null && limit > low - rim && limit < high + rim) {
-          chart.context.setLineDash([4, 4]);
-          chart.line([-SPAN, 0], [limit, limit], ink('--danger'), 1);
-          chart.context.setLineDash([]);
-        }
+    return own.flatMap(({ cells }, j) => {
+      const at = [cells[cell], cells[this.cellCount + cell]];
+      return gaps[j] > most ? [null, at] : [at];
     });
-    chart.legend([...chosen.map((j, k) => [joints[j].replace(/_?joint$/, ''), colour(k)]),
-      ['limits', ink('--danger')]]);
-    return undefined;
   }
 
-  limits(chart, shown) {
-    const { joints } = this.names, angles = shown.at(-1).angles;
-    if (!joints || !angles) return chart.say('no joint states received');
-    chart.rows(joints.length);
-    const rows = joints.length, of = this.legs(), legs = Object.keys(this.shape?.feet || {});
+  phase(shown) {
+    const points = this.path(shown, this.selects.portrait.selectedIndex), all = known(points);
+    if (!all.length || !shown.at(-1).cells) return { say: 'the generator does not publish ~/cells' };
+    const [x, y] = this.states, unit = y.startsWith('d') ? '1/model time' : '1';
+    return { x: `${x} [1]`, y: `${y} [${unit}]`, lines: [], times: [0],
+      across: padded(all.map(([a]) => a), 0.08, 1e-3), up: padded(all.map(([, b]) => b), 0.08, 1e-3),
+      draw: ({ ctx, valToPos }) => {
+        const at = ([a, b]) => [valToPos(a, 'x', true), valToPos(b, 'y', true)];
+        ctx.save();
+        ctx.strokeStyle = colour(0);
+        ctx.lineWidth = 1.5 * devicePixelRatio;
+        ctx.beginPath();
+        points.forEach((point, k) => point && (points[k - 1] ? ctx.lineTo(...at(point))
+          : ctx.moveTo(...at(point))));
+        ctx.stroke();
+        ctx.fillStyle = colour(1);
+        ctx.beginPath();
+        ctx.arc(...at(all.at(-1)), 4 * devicePixelRatio, 0, 2 * Math.PI);
+        ctx.fill();
+        ctx.restore();
+      } };
+  }
+
+  cells(shown) {
+    const count = this.cellCount;
+    if (!shown.at(-1).cells) return { say: 'the generator does not publish ~/cells' };
+    const rows = Array.from({ length: count }, (_, k) => `${k + 1}`);
+    const of = (k) => shown.map((frame) => frame.cells?.[k]);
+    const largest = Math.max(1e-6, ...known(rows.flatMap((_, k) => of(k))).map(Math.abs));
+    return { rows, y: 'cell', up: [0.3 - count, 0.7], lines: rows.map((row, k) => [row,
+      of(k).map((value) => value == null ? null : 0.48 * value / largest - k)]) };
+  }
+
+  angles(shown) {
+    const legs = this.legs(), { joints } = this.names, leg = this.selects.leg.value || 'all';
+    const chosen = Object.keys(legs).filter((k) => legs[k] === leg);
+    if (!chosen.length || !shown.at(-1).angles) return { say: 'no joint states received' };
+    const lines = chosen.map((k) => [short(joints[k]), shown.map((frame) => frame.angles?.[k])]);
+    const up = padded(known(lines.flatMap(([, row]) => row)), 0.12, 0.02);
+    const limits = chosen.flatMap((k) => this.shape?.limits[joints[k]] || []);
+    return { y: 'angle [rad]', up, lines: [...lines, ...known(limits)
+      .filter((limit) => limit > up[0] && limit < up[1]).map((limit) => [`limit ${limit.toFixed(2)}`,
+        shown.map(() => limit), { stroke: () => ink('--danger'), dash: [4, 4], width: 1 }])] };
+  }
+
+  // The range of each joint in the last seconds within its limits, and where it is.
+  limits(shown) {
+    const { joints } = this.names, { angles } = shown.at(-1);
+    if (!joints || !angles) return { say: 'no joint states received' };
+    const legs = Object.keys(this.shape?.feet || {}), of = this.legs();
     const spans = joints.map((joint) => this.shape?.limits[joint] || [null, null]);
-    const ends = [...spans.flat(), ...angles].filter((value) => value != null);
-    chart.begin([Math.min(...ends) - 0.1, Math.max(...ends) + 0.1, 'angle [rad]'],
-      [-0.6, rows - 0.4, ''], joints.map((joint, k) => [rows - 1 - k, joint.replace(/_?joint$/, '')]));
-    joints.forEach((_, k) => {
-      const [low, high] = spans[k], y = rows - 1 - k;
-      chart.box(low ?? chart.left, y - 0.12, high ?? chart.right, y + 0.12, ink('--line'));
-      let [least, most] = [Infinity, -Infinity];
-      for (const { angles: one } of shown) {
-        if (one?.[k] == null) continue;
-        least = Math.min(least, one[k]);
-        most = Math.max(most, one[k]);
-      }
-      const shade = colour(Math.max(legs.indexOf(of[k]), 0));
-      if (most >= least) chart.box(least, y - 0.22, most, y + 0.22, shade);
-      const tight = (low != null && angles[k] < low + 0.02) || (high != null && angles[k] > high - 0.02);
-      if (angles[k] != null) chart.dot(angles[k], y, tight ? ink('--danger') : ink('--ink'), 3);
-    });
-    return undefined;
+    const across = padded(known([...spans.flat(), ...angles]), 0, 0.1);
+    return { rows: joints.map(short), x: 'angle [rad]', lines: [], times: [0], across,
+      up: [0.4 - joints.length, 0.6], draw: ({ ctx, valToPos }) => joints.forEach((_, k) => {
+        const [low, high] = spans[k], y = valToPos(-k, 'y', true), at = angles[k];
+        const bar = (from, to, half, shade) => {
+          const left = valToPos(from, 'x', true);
+          ctx.save();
+          ctx.fillStyle = shade;
+          ctx.fillRect(left, y - half * devicePixelRatio, Math.max(1, valToPos(to, 'x', true) - left),
+            2 * half * devicePixelRatio);
+          ctx.restore();
+        };
+        const seen = known(shown.map((frame) => frame.angles?.[k]));
+        const tight = (low != null && at < low + 0.02) || (high != null && at > high - 0.02);
+        bar(low ?? across[0], high ?? across[1], 1.5, ink('--line'));
+        if (!seen.length) return;
+        bar(Math.min(...seen), Math.max(...seen), 3, colour(Math.max(legs.indexOf(of[k]), 0)));
+        bar(at - 0.01, at + 0.01, 5, tight ? ink('--danger') : ink('--ink'));
+      }) };
   }
 
-  speeds(chart, shown, times, axis) {
-    if (!shown.at(-1).speed) return chart.say('no node publishes odom');
-    const rows = [0, 1].map((k) => this.averages(shown, k));
-    const known = rows.flat().filter((value) => value != null);
-    chart.begin(axis, [Math.min(-0.2, ...known), 0.1 + Math.max(1, ...known), 'speed [m/s]']);
-    rows.forEach((row, k) => chart.line(times, row, colour(k)));
-    chart.legend([['forward', colour(0)], ['to the left', colour(1)]]);
-    return undefined;
+  speeds(shown) {
+    if (!shown.at(-1).speed) return { say: 'no node publishes odom' };
+    const lines = ['forward', 'to the left'].map((label, k) => [label, this.averages(shown, k)]);
+    const values = known(lines.flatMap(([, row]) => row));
+    return { lines, y: 'speed [m/s]', up: [Math.min(-0.2, ...values), 0.1 + Math.max(1, ...values)] };
   }
 }

@@ -1,169 +1,252 @@
-// The robot in WebGL: links, their shadow on the floor, and the forces on its feet.
-import { identity, lookAt, multiply, perspective } from './matrices.js';
+// The robot in three.js: its links, their shadow, the forces on its feet, and pushes.
+import { BasicShadowMap, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color,
+  CylinderGeometry, DirectionalLight, DoubleSide, Fog, GridHelper, Group, HemisphereLight, Matrix4,
+  Mesh, MeshLambertMaterial, MeshStandardMaterial, OrbitControls, PCFShadowMap, PerspectiveCamera,
+  Plane, PlaneGeometry, Quaternion, Raycaster, Scene as World, SphereGeometry, SRGBColorSpace,
+  toCreasedNormals, Vector2, Vector3, WebGLRenderer } from './three.min.js';
 
-const LIGHT = [0.35, 0.25, -1];
-const LEAST = 0.7;      // fraction of the screen's pixels that are drawn at least, each way
-const NEWTON = 0.0022;  // length of an arrow for each newton, m
+const UP = new Vector3(0, 0, 1);
+const LEAST = 0.5;         // fraction of the screen's pixels that are drawn at least, each way
+const NEWTON = 0.0022;     // length of an arrow for each newton on a foot, m
+const HARDEST = 300;       // hardest push, N
+const REACH = 0.6;         // length of the arrow of the hardest push, m
+const CREASE = 0.7;        // edges that bend by more stay sharp, rad
+const COARSE = 0.008;      // vertices closer than this are one where software draws, m
+const RADIANS = Math.PI / 180;
+// Presets of the camera: azimuth and elevation, degrees.
+const VIEWS = { quarter: [50, 18], front: [0, 10], side: [90, 8], top: [0.01, 89] };
 
-const SOLID = [`#version 300 es
-in vec3 place; in vec3 colour; uniform mat4 model, view, shadow; uniform vec4 flat_colour;
-out vec3 at; out vec3 tint;
-void main() { vec4 p = shadow * model * vec4(place, 1.0); at = p.xyz; tint = colour;
-  gl_Position = view * p; }`, `#version 300 es
-precision highp float; in vec3 at; in vec3 tint; uniform vec4 flat_colour; out vec4 seen;
-void main() { vec3 n = normalize(cross(dFdx(at), dFdy(at)));
-  float lit = 0.42 + 0.5 * max(dot(n, normalize(vec3(-0.35, -0.25, 1.0))), 0.0)
-    + 0.12 * max(dot(n, normalize(vec3(0.8, 0.5, 0.3))), 0.0);
-  seen = flat_colour.a > 0.0 ? flat_colour : vec4(tint * lit + 0.06, 1.0); }`];
+const PIXEL = new Uint8Array(4);
+const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
-const FLOOR = [`#version 300 es
-in vec3 place; uniform mat4 view; uniform vec2 middle; out vec2 at;
-void main() { at = place.xy + middle; gl_Position = view * vec4(at, 0.0, 1.0); }`,
-`#version 300 es
-precision highp float; in vec2 at; uniform vec3 floor_colour, line_colour, sky;
-uniform vec2 middle; out vec4 seen;
-void main() { vec2 w = fwidth(at) + 1e-5, cell = abs(fract(at * 2.0 - 0.5) - 0.5) / (2.0 * w);
-  vec2 metre = abs(fract(at - 0.5) - 0.5) / w;
-  float line = max(0.45 * (1.0 - min(min(cell.x, cell.y), 1.0)),
-    1.0 - min(min(metre.x, metre.y) * 0.7, 1.0));
-  float far = smoothstep(2.0, 7.5, distance(at, middle));
-  seen = vec4(mix(mix(floor_colour, line_colour, line), sky, far), 1.0); }`];
-
-const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-
-function arrow() {
-  const out = [];
-  const ring = (k, radius, z) => [radius * Math.cos(k * Math.PI / 5),
-    radius * Math.sin(k * Math.PI / 5), z];
-  for (let k = 0; k < 10; k++) {
-    out.push(ring(k, 0.008, 0), ring(k + 1, 0.008, 0), ring(k + 1, 0.008, 0.8));
-    out.push(ring(k, 0.008, 0), ring(k + 1, 0.008, 0.8), ring(k, 0.008, 0.8));
-    out.push(ring(k, 0.022, 0.8), ring(k + 1, 0.022, 0.8), [0, 0, 1]);
+// Vertices in the same cell of a grid become their mean; triangles without area go.
+function coarse(points, triangles) {
+  const cells = new Map(), sums = [], merged = [];
+  const cell = (k) => {
+    const at = [0, 1, 2].map((axis) => points[3 * k + axis]);
+    const key = at.map((value) => Math.round(value / COARSE)).join();
+    if (!cells.has(key)) cells.set(key, sums.push([0, 0, 0, 0]) - 1);
+    const sum = sums[cells.get(key)];
+    [...at, 1].forEach((value, axis) => { sum[axis] += value; });
+    return cells.get(key);
+  };
+  const of = Array.from({ length: points.length / 3 }, (_, k) => cell(k));
+  for (let k = 0; k < triangles.length; k += 3) {
+    const [a, b, c] = [0, 1, 2].map((corner) => of[triangles[k + corner]]);
+    if (a !== b && b !== c && c !== a) merged.push(a, b, c);
   }
-  return new Float32Array(out.flat());
+  return [sums.flatMap(([x, y, z, n]) => [x / n, y / n, z / n]), merged];
+}
+
+// Sizes are those of a geom of MuJoCo; its cylinders and capsules are along z.
+const SOLIDS = { box: ([x, y, z]) => new BoxGeometry(2 * x, 2 * y, 2 * z),
+  sphere: ([r]) => new SphereGeometry(r, 24, 16),
+  ellipsoid: (size) => new SphereGeometry(1, 24, 16).scale(...size),
+  cylinder: ([r, half]) => new CylinderGeometry(r, r, 2 * half, 24).rotateX(Math.PI / 2),
+  capsule: ([r, half]) => new CapsuleGeometry(r, 2 * half, 8, 24).rotateX(Math.PI / 2) };
+
+function frame(object, place, [a, b, c, d, e, f, g, h, i]) {
+  object.position.set(...place);
+  object.quaternion.setFromRotationMatrix(
+    new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1));
+  return object;
+}
+
+// An arrow along z, 1 m long.
+function arrow() {
+  const material = new MeshLambertMaterial(), made = new Group();
+  made.add(new Mesh(new CylinderGeometry(0.008, 0.008, 0.85).translate(0, 0.425, 0), material),
+    new Mesh(new CylinderGeometry(0, 0.022, 0.15).translate(0, 0.925, 0), material));
+  made.children.forEach((one) => one.geometry.rotateX(Math.PI / 2));
+  made.tint = material.color;
+  return made;
 }
 
 export class Scene {
-  constructor(canvas, camera, moved) {
-    this.canvas = canvas;
-    this.camera = camera;  // azimuth and elevation in degrees, distance in m
-    this.moved = moved;
-    this.target = [0, 0, 0.25];
-    this.meshes = [];
-    this.resolution = 1;
-    this.gl = canvas.getContext('webgl2', { stencil: true, antialias: true });
-    this.drag();
-    if (!this.gl) return;
-    this.solid = this.program(SOLID);
-    this.ground = this.program(FLOOR);
-    this.plane = this.mesh(new Float32Array([-9, -9, 0, 9, -9, 0, 9, 9, 0, -9, -9, 0, 9, 9, 0,
-      -9, 9, 0]));
-    this.arrow = this.mesh(arrow());
+  // Camera as azimuth and elevation in degrees and distance in m; moved is called when it moves,
+  // push with a force in N and a direction in degrees from the world's x to its y.
+  constructor(canvas, [azimuth, elevation, distance], moved, push) {
+    Object.assign(this, { canvas, push, share: 1, links: [], arrows: {}, pushable: false });
+    this.camera = new PerspectiveCamera(40, 1, 0.1, 60);
+    this.camera.up = UP;
+    this.robot = new Group();
+    try {
+      this.renderer = new WebGLRenderer({ canvas, antialias: true });
+    } catch {
+      return;  // no WebGL: everything else on the page works
+    }
+    this.gl = this.renderer.getContext();
+    const named = this.gl.getExtension('WEBGL_debug_renderer_info');
+    this.software = /swiftshader|llvmpipe|software/i.test(
+      named ? this.gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : '');
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = this.software ? BasicShadowMap : PCFShadowMap;
+    this.controls = new OrbitControls(this.camera, canvas);
+    Object.assign(this.controls, { minDistance: 0.4, maxDistance: 12, maxPolarAngle: 1.54 });
+    this.controls.target.set(0, 0, 0.22);
+    this.build();
+    this.look(azimuth, elevation, distance);
+    this.controls.addEventListener('change', moved);
+    this.listen();
   }
 
-  program(sources) {
-    const gl = this.gl, made = gl.createProgram();
-    [gl.VERTEX_SHADER, gl.FRAGMENT_SHADER].forEach((kind, k) => {
-      const shader = gl.createShader(kind);
-      gl.shaderSource(shader, sources[k]);
-      gl.compileShader(shader);
-      if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS))
-        throw new Error(gl.getShaderInfoLog(shader));
-      gl.attachShader(made, shader);
+  build() {
+    this.world = new World();
+    this.world.fog = new Fog(0, 4, 14);
+    this.sun = new DirectionalLight(0xffffff, 2.2);
+    this.sun.castShadow = true;
+    this.sun.shadow.mapSize.setScalar(this.software ? 512 : 2048);
+    this.sun.shadow.radius = 5;
+    this.sun.shadow.normalBias = 0.01;
+    Object.assign(this.sun.shadow.camera, { left: -1.2, right: 1.2, top: 1.2, bottom: -1.2, far: 8 });
+    this.floor = new Mesh(new PlaneGeometry(60, 60), new MeshLambertMaterial({
+      polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }));  // below its grid
+    this.floor.receiveShadow = true;
+    this.aim = arrow();
+    this.aim.visible = false;
+    this.world.add(new HemisphereLight(0xffffff, 0x8899aa, 1.6), this.sun, this.sun.target,
+      this.floor, this.robot, this.aim);
+    this.paint();
+  }
+
+  // Colours of the page's theme.
+  paint() {
+    if (!this.renderer) return;
+    const style = getComputedStyle(document.documentElement);
+    const colour = (name) => new Color(style.getPropertyValue(name).trim());
+    this.world.background = this.world.fog.color = colour('--sky');
+    this.floor.material.color = colour('--floor');
+    this.grid?.removeFromParent();
+    this.grid = new GridHelper(60, 60, colour('--floor-line'), colour('--floor-line'));
+    this.grid.rotateX(Math.PI / 2);
+    this.world.add(this.grid);
+    this.good = colour('--good');
+    this.aim.tint.copy(colour('--b'));
+  }
+
+  // Turn the camera around its target; a distance of 0 keeps that.
+  look(azimuth, elevation, distance = 0) {
+    const away = distance || this.camera.position.distanceTo(this.controls.target);
+    const [a, e] = [azimuth * RADIANS, elevation * RADIANS];
+    this.camera.position.set(Math.cos(e) * Math.cos(a), Math.cos(e) * Math.sin(a), Math.sin(e))
+      .multiplyScalar(away).add(this.controls.target);
+    this.controls.update();
+  }
+
+  // From where the robot is seen: a preset turns with it.
+  preset(name) {
+    const [azimuth, elevation] = VIEWS[name];
+    this.look(azimuth + this.heading, elevation);
+  }
+
+  // The robot's yaw, degrees.
+  get heading() {
+    const ahead = new Vector3(1, 0, 0).applyQuaternion(this.robot.quaternion);
+    return Math.atan2(ahead.y, ahead.x) / RADIANS;
+  }
+
+  get view() {
+    const way = this.camera.position.clone().sub(this.controls.target), distance = way.length();
+    return [Math.atan2(way.y, way.x) / RADIANS, Math.asin(way.z / distance) / RADIANS, distance];
+  }
+
+  show(shape) {
+    for (const old of Object.values(this.arrows)) old.removeFromParent();
+    this.robot.traverse((old) => old.geometry?.dispose());
+    this.robot.clear();
+    Object.assign(this, { shape, links: [], arrows: {} });
+    for (const link of shape.links) {
+      const group = frame(new Group(), link.place, link.pose);
+      group.userData = { rest: group.quaternion.clone(), place: group.position.clone(),
+        axis: new Vector3(...link.axis) };
+      for (const part of link.parts) group.add(this.part(part));
+      (link.parent < 0 ? this.robot : this.links[link.parent]).add(group);
+      this.links.push(group);
+    }
+  }
+
+  part({ kind, size, colour, place, pose, low, step, points, triangles }) {
+    let geometry = SOLIDS[kind]?.(size);
+    if (!geometry) {
+      let corners = Array.from(new Uint16Array(bytes(points)), (n, k) => low[k % 3] + step * n);
+      let faces = new Uint32Array(bytes(triangles));
+      if (this.software) [corners, faces] = coarse(corners, faces);
+      geometry = new BufferGeometry();
+      geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
+      geometry.setIndex(new BufferAttribute(new Uint32Array(faces), 1));
+      // With sharp edges no vertex is shared: three times as many, for a graphics card.
+      if (this.software) geometry.computeVertexNormals();
+      else geometry = toCreasedNormals(geometry, CREASE);
+    }
+    const shade = { side: DoubleSide, color: new Color().setRGB(...colour, SRGBColorSpace) };
+    const material = this.software ? new MeshLambertMaterial(shade)
+      : new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1, ...shade });
+    const mesh = frame(new Mesh(geometry, material), place, pose);
+    mesh.castShadow = mesh.receiveShadow = true;
+    return mesh;
+  }
+
+  // Angles by joint, rad or m; the base as x y z and a quaternion w x y z, null if unknown.
+  pose(angles, base) {
+    this.shape?.links.forEach((link, k) => {
+      if (!link.joint) return;
+      const { rest, place, axis } = this.links[k].userData;
+      const angle = (angles[link.joint] ?? link.zero) - link.zero;
+      if (link.slides) this.links[k].position.copy(
+        axis.clone().multiplyScalar(angle).applyQuaternion(rest).add(place));
+      else this.links[k].quaternion.setFromAxisAngle(axis, angle).premultiply(rest);
     });
-    gl.bindAttribLocation(made, 0, 'place');
-    gl.bindAttribLocation(made, 1, 'colour');
-    gl.linkProgram(made);
-    const at = {}, count = gl.getProgramParameter(made, gl.ACTIVE_UNIFORMS);
-    for (let k = 0; k < count; k++) {
-      const { name } = gl.getActiveUniform(made, k);
-      at[name] = gl.getUniformLocation(made, name);
+    const [x, y, z, w, i, j, k] = base || [0, 0, 0, 1, 0, 0, 0];
+    this.robot.position.set(x, y, z);
+    this.robot.quaternion.copy(new Quaternion(i, j, k, w));
+    this.robot.updateMatrixWorld(true);
+    if (base || !this.shape) return;
+    // Its place is unknown: it stands on its lowest foot.
+    const heights = Object.keys(this.shape.feet).map((leg) => this.foot(leg).z);
+    this.robot.position.z = heights.length ? 0.02 - Math.min(...heights) : 0.4;
+    this.robot.updateMatrixWorld(true);
+  }
+
+  foot(leg) {
+    const [link, ...place] = this.shape.feet[leg];
+    return new Vector3(...place).applyMatrix4(this.links[link].matrixWorld);
+  }
+
+  // Forces on the feet by leg, N; inset is what panels cover of the canvas at right and bottom, px.
+  draw(forces, inset = [0, 0]) {
+    const { renderer, canvas, camera, controls } = this;
+    if (!renderer || !canvas.clientHeight) return;
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
+    renderer.setPixelRatio(this.share * Math.min(window.devicePixelRatio || 1, 2));
+    renderer.setSize(wide, high, false);
+    camera.aspect = wide / high;
+    camera.setViewOffset(wide, high, inset[0] / 2, inset[1] / 2, wide, high);
+    this.follow();
+    for (const leg of Object.keys(this.shape?.feet || {})) {
+      if (!this.arrows[leg]) this.world.add(this.arrows[leg] = arrow());
+      const made = this.arrows[leg];
+      made.visible = forces[leg] > 1;
+      made.position.copy(this.foot(leg));
+      made.scale.z = NEWTON * (forces[leg] || 1);
+      made.tint.copy(this.good);
     }
-    return { made, at };
+    renderer.render(this.world, camera);
+    // Software draws later, unless what it has drawn is asked for: what that takes would go unseen.
+    if (this.software) this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, PIXEL);
   }
 
-  mesh(vertices, colours) {
-    const gl = this.gl, array = gl.createVertexArray();
-    gl.bindVertexArray(array);
-    const fill = (k, data, kind, normalised) => {
-      gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-      gl.bufferData(gl.ARRAY_BUFFER, data, gl.STATIC_DRAW);
-      gl.enableVertexAttribArray(k);
-      gl.vertexAttribPointer(k, 3, kind, normalised, 0, 0);
-    };
-    fill(0, vertices, gl.FLOAT, false);
-    if (colours) fill(1, colours, gl.UNSIGNED_BYTE, true);
-    gl.bindVertexArray(null);
-    return { array, count: vertices.length / 3 };
-  }
-
-  show(body) {
-    this.body = body;
-    if (!this.gl) return;
-    for (const { array } of this.meshes) this.gl.deleteVertexArray(array);
-    this.meshes = body.shape.links.map((link) => this.mesh(
-      new Float32Array(bytes(link.vertices).buffer), bytes(link.colours)));
-  }
-
-  colour(name) {
-    const text = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-    return [1, 3, 5].map((k) => parseInt(text.slice(k, k + 2), 16) / 255);
-  }
-
-  draw(forces) {
-    const { gl, canvas, camera } = this;
-    if (!gl) return;
-    // One pixel for each of the screen's; the edges are smoothed by the context's antialiasing.
-    const scale = this.resolution * Math.min(window.devicePixelRatio || 1, 3);
-    const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((one) => one * scale | 0);
-    if (canvas.width !== wide || canvas.height !== high)
-      [canvas.width, canvas.height] = [wide, high];
-    gl.viewport(0, 0, wide, high);
-    const sky = this.colour('--sky');
-    gl.clearColor(...sky, 1);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
-    if (this.body) {
-      const [x, y] = this.body.middle;
-      // The camera goes along; a jump of the robot is one of the camera.
-      const now = performance.now(), passed = now - (this.drawn || 0);
-      const step = Math.hypot(x - this.target[0], y - this.target[1]) > 1 ? 1
-        : 1 - Math.exp(-passed / 150);
-      this.drawn = now;
-      this.target = [this.target[0] + step * (x - this.target[0]),
-        this.target[1] + step * (y - this.target[1]), 0.22];
-    }
-    const [azimuth, elevation] = [camera.azimuth, camera.elevation].map((a) => a * Math.PI / 180);
-    const away = camera.distance;
-    const eye = [this.target[0] + away * Math.cos(elevation) * Math.cos(azimuth),
-      this.target[1] + away * Math.cos(elevation) * Math.sin(azimuth),
-      this.target[2] + away * Math.sin(elevation)];
-    const view = multiply(perspective(0.7, wide / high, 0.05, 40), lookAt(eye, this.target));
-    gl.enable(gl.DEPTH_TEST);
-    gl.useProgram(this.ground.made);
-    gl.uniformMatrix4fv(this.ground.at.view, false, view);
-    gl.uniform2f(this.ground.at.middle, this.target[0], this.target[1]);
-    gl.uniform3fv(this.ground.at.floor_colour, this.colour('--floor'));
-    gl.uniform3fv(this.ground.at.line_colour, this.colour('--floor-line'));
-    gl.uniform3fv(this.ground.at.sky, sky);
-    gl.bindVertexArray(this.plane.array);
-    gl.drawArrays(gl.TRIANGLES, 0, 6);
-    if (!this.body) return;
-    gl.useProgram(this.solid.made);
-    gl.uniformMatrix4fv(this.solid.at.view, false, view);
-    this.shade();
-    gl.uniformMatrix4fv(this.solid.at.shadow, false, identity());
-    gl.uniform4f(this.solid.at.flat_colour, 0, 0, 0, 0);
-    this.links();
-    gl.uniform4f(this.solid.at.flat_colour, ...this.colour('--good'), 1);
-    for (const [leg, force] of Object.entries(forces || {})) {
-      if (!(force > 1) || !this.body.shape.feet[leg]) continue;
-      const [x, y, z] = this.body.foot(leg), model = identity();
-      model[10] = force * NEWTON;
-      [model[12], model[13], model[14]] = [x, y, z];
-      gl.uniformMatrix4fv(this.solid.at.model, false, model);
-      gl.bindVertexArray(this.arrow.array);
-      gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
-    }
+  // The camera goes along with the robot, smoothly, and jumps with it.
+  follow() {
+    const now = performance.now(), { x, y } = this.robot.position, { target } = this.controls;
+    const from = this.followed ||= new Vector3(target.x, target.y, 0);
+    const way = new Vector3(x - from.x, y - from.y, 0);
+    way.multiplyScalar(way.length() > 1 ? 1 : 1 - Math.exp(((this.drawn || 0) - now) / 150));
+    this.drawn = now;
+    for (const moved of [from, target, this.camera.position]) moved.add(way);
+    this.sun.target.position.set(x, y, 0);
+    this.sun.position.set(x + 1.2, y + 0.9, 3.5);
+    this.grid.position.set(Math.round(x), Math.round(y), 0.002);
+    this.floor.position.set(x, y, 0);
   }
 
   // Fewer pixels where drawing them holds up the browser, as without a graphics card. Called at each
@@ -172,68 +255,51 @@ export class Scene {
     const passed = now - (this.before ?? now);
     this.before = now;
     if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.resolution = Math.max(LEAST, 0.9 * this.resolution);
-    else if (this.pace < 40) this.resolution = Math.min(1, 1.01 * this.resolution);
+    if (this.pace > 70) this.share = Math.max(LEAST, 0.9 * this.share);
+    else if (this.pace < 40) this.share = Math.min(1, 1.01 * this.share);
   }
 
-  // Every pixel of the floor is darkened once, however many links are above it.
-  shade() {
-    const { gl } = this, [x, y, z] = LIGHT;
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
-    gl.enable(gl.STENCIL_TEST);
-    gl.stencilFunc(gl.EQUAL, 0, 255);
-    gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
-    gl.uniformMatrix4fv(this.solid.at.shadow, false, new Float32Array([1, 0, 0, 0, 0, 1, 0, 0,
-      -x / z, -y / z, 0, 0, 0, 0, 0.002, 1]));
-    gl.uniform4f(this.solid.at.flat_colour, 0, 0, 0, 0.3);
-    this.links();
-    gl.disable(gl.STENCIL_TEST);
-    gl.disable(gl.BLEND);
+  // The arrow of a push, N and degrees from the world's x to its y; none without a force.
+  point(force, direction) {
+    if (!this.renderer) return;
+    this.aim.visible = force > 0;
+    this.aim.position.copy(this.robot.position);
+    this.aim.quaternion.setFromUnitVectors(
+      UP, new Vector3(Math.cos(direction * RADIANS), Math.sin(direction * RADIANS), 0));
+    this.aim.scale.z = 0.15 + REACH * force / HARDEST;
   }
 
-  links() {
-    const { gl } = this;
-    this.meshes.forEach((mesh, k) => {
-      if (!mesh.count) return;
-      gl.uniformMatrix4fv(this.solid.at.model, false, this.body.worlds[k]);
-      gl.bindVertexArray(mesh.array);
-      gl.drawArrays(gl.TRIANGLES, 0, mesh.count);
-    });
-  }
-
-  drag() {
-    const { canvas, camera } = this, fingers = new Map();
-    let apart = 0;
-    const zoom = (factor) => {
-      camera.distance = Math.min(8, Math.max(0.5, camera.distance * factor));
-      this.moved();
+  // Shift and a drag on the robot push it, by the way that the pointer goes on the level.
+  listen() {
+    const { canvas, controls, camera } = this, ray = new Raycaster();
+    const at = (event) => {
+      const box = canvas.getBoundingClientRect();
+      ray.setFromCamera(new Vector2(2 * (event.clientX - box.left) / box.width - 1,
+        1 - 2 * (event.clientY - box.top) / box.height), camera);
+      return ray;
     };
+    let level = null, from = null, way = null;
     canvas.addEventListener('pointerdown', (event) => {
+      const [hit] = event.shiftKey && this.pushable ? at(event).intersectObject(this.robot) : [];
+      if (!hit) return;
+      [from, way, level] = [hit.point, null, new Plane(UP, -hit.point.z)];
+      controls.enabled = false;
       canvas.setPointerCapture(event.pointerId);
-      fingers.set(event.pointerId, [event.clientX, event.clientY]);
-      apart = 0;
-    });
+    }, { capture: true });
     canvas.addEventListener('pointermove', (event) => {
-      const before = fingers.get(event.pointerId);
-      if (!before) return;
-      fingers.set(event.pointerId, [event.clientX, event.clientY]);
-      if (fingers.size === 2) {
-        const [a, b] = [...fingers.values()], now = Math.hypot(a[0] - b[0], a[1] - b[1]);
-        if (apart) zoom(apart / now);
-        apart = now;
-        return;
-      }
-      camera.azimuth = (camera.azimuth - 0.4 * (event.clientX - before[0])) % 360;
-      camera.elevation = Math.min(85, Math.max(3, camera.elevation
-        + 0.4 * (event.clientY - before[1])));
-      this.moved();
+      const to = level && at(event).ray.intersectPlane(level, new Vector3());
+      if (!to) return;
+      to.sub(from);
+      way = [Math.min(HARDEST, HARDEST * to.length() / REACH), Math.atan2(to.y, to.x) / RADIANS];
+      this.point(...way);
     });
     for (const kind of ['pointerup', 'pointercancel'])
-      canvas.addEventListener(kind, (event) => fingers.delete(event.pointerId));
-    canvas.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      zoom(Math.exp(0.001 * event.deltaY));
-    }, { passive: false });
+      canvas.addEventListener(kind, () => {
+        if (!level) return;
+        level = null;
+        controls.enabled = true;
+        this.point(0, 0);
+        if (way && kind === 'pointerup') this.push(...way);
+      });
   }
 }

@@ -1,6 +1,6 @@
 // The pad and the arrow keys: the robot is steered only while one of them is held.
 
-const REACH = 3.9;  // rem from the middle of the pad to the outermost place of the knob
+const REACH = 3.5;  // rem from the middle of the pad to the outermost place of the knob
 
 export class Steering {
   // What is held goes to the link, which repeats it: [speed, turn], or null.
