@@ -27,9 +27,10 @@ pip = $(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -c .
 # Containers often forbid it, and every process that starts would compile all sources again.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Where the build has put the package, for every command that uses it.
-ENTER := set -e; source install/setup.bash; \
-	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
+# Where the build has put the package, for every command that uses it: as install/setup.bash, which
+# fails in a folder whose path has a space.
+ENTER := set -e; export AMENT_PREFIX_PATH='$(CURDIR)/install/cpg_ros:$(PREFIXES)' \
+	PYTHONPATH="$$(echo '$(CURDIR)'/install/cpg_ros/lib/python3*/*-packages)$${PYTHONPATH:+:$$PYTHONPATH}"
 
 # Live tests wait for half of their time: three run at once on two cores.
 LIVE ?= $(shell echo $$((($$(nproc) * 3 + 1) / 2)))
@@ -61,9 +62,9 @@ demo: install/.built
 
 # Whatever the last command in it returned, leaving it is no error of make.
 shell: install/.built
-	@$(ENTER); export PATH=$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin:$$PATH; \
-		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
-		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i || :
+	@$(ENTER); export PATH='$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin':"$$PATH"; \
+		echo 'generator, cpg, analyze, inversion ... are on the path (--help); for export type cpg export; exit leaves this shell'; \
+		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH='$$PATH'"; cpg completion) -i || :
 
 # The tables of topics are read from running nodes, the bridge among them. What the pages let a
 # reader type is run.
@@ -153,7 +154,7 @@ install/.built: $(INSTALLED) $(SOURCES)
 		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
 	@touch $@
 
-# Once for each installation, at most 90 s: later changes are compiled where they are first used.
+# Once for each installation: later changes are compiled where they are first used.
 # -P: of the installed copy, which is what nodes run.
 install/.compiled: | install/.built
 	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.ros.cli.precompile || \

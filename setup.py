@@ -46,6 +46,10 @@ class Scripts(install_scripts):
         super().run()
         for path in map(Path, self.outfiles):
             shebang, _, _ = path.read_text().partition('\n')
+            python = shebang.removeprefix('#!').strip('"')
+            if ' ' in python and Path(python).exists():
+                # No #! can name it: the shell starts it, and Python reads that as a text.
+                shebang = f"#!/bin/sh\n'''exec' '{python}' \"$0\" \"$@\"\n' '''"
             path.write_text(SCRIPT.format(shebang=shebang, name=path.name))
 
 

@@ -31,7 +31,7 @@ from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.ros.bag_recorder import BagRecorder, EVERY
 from cpg_ros.ros.node.client import NodeClient, SILENCE
 from cpg_ros.ros.node.message_block import message_class
-from cpg_ros.ros.node.polled import best_effort, PolledSubscription
+from cpg_ros.ros.node.polled import best_effort, latched, PolledSubscription
 import numpy as np
 import rclpy
 from rclpy.node import Node
@@ -221,8 +221,12 @@ class Topic:
             if time.monotonic() > self._end:
                 raise SilentTopic(f'nobody publishes on {topic}')
             self._pause()
+        # What was published before is kept for those that ask as its publisher offers it.
+        kept = {publisher.qos_profile.durability
+                for publisher in node.get_publishers_info_by_topic(topic)}
+        quality = latched if kept == {DurabilityPolicy.TRANSIENT_LOCAL} else best_effort
         self._subscription = PolledSubscription(node, message_class(kinds[0]), name,
-                                                best_effort(DEPTH), overridable=False)
+                                                quality(DEPTH), overridable=False)
 
     def messages(self) -> Iterator[Any]:
         """Yield messages as they arrive.

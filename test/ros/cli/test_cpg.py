@@ -89,6 +89,9 @@ def test_parameters_and_topics_of_a_running_generator(unhurried):
     message = yaml.safe_load(told.removesuffix('---'))
     assert 'lf_calf_joint' in message['name'] and len(message['velocity']) == 12
     assert list(message['header']) == ['stamp', 'frame_id']
+    # Latched: it was published before anybody asked.
+    assert ask(domain, 'topic', 'echo', '--once', 'cpg_generator/gait')[:2] == (
+        0, 'data: walk\n---')
     assert ask(domain, 'disable')[:2] == (0, 'ramping down over 1 s')
     # As the generator answers: this robot's file has no geometry.
     for action in ('sit', 'stand'):
