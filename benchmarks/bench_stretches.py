@@ -14,11 +14,12 @@
 
 """Public recordings of bodies that nothing was tuned for: what their steady stretches are called.
 
-Below the folder that RECORDINGS names are clones of public repositories (docs/benchmarks.md lists
-them); what is not there is left out. Each recording is cut into its steady stretches, and each of
-these is named and fitted. What it truly is comes from feet, and not from the joints' phases: from
-their heights by forward kinematics and the recorded pose of the base, or from the recording's name
-where there is no pose. Nobody is right who names a stretch wrongly and is 95 % sure.
+Below the folder that RECORDINGS names are clones of public repositories, which
+docs/benchmarks_inversion.md lists; what is not there is left out. Each recording is cut into its
+steady stretches, and each of these is named and fitted. What it truly is comes from feet, and not
+from the joints' phases: from their heights by forward kinematics and the recorded pose of the
+base, or from the recording's name where there is no pose. Nobody is right who names a stretch
+wrongly and is 95 % sure.
 """
 
 import argparse

@@ -35,7 +35,10 @@ smartquotes = False
 html_theme = 'furo'
 html_static_path = ['static']
 html_css_files = ['site.css']
+html_js_files = [('copy.js', {'defer': 'defer'})]
 html_search_scorer = str(HERE / 'static' / 'scorer.js')
+# A list of every name would be the longest page, and the search finds them.
+html_use_index = False
 html_title = f'cpg_ros {release}'
 exclude_patterns = ['_build', 'playground']
 

@@ -16,7 +16,7 @@
 
 A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (for a
 Morris-Lecar cell its first harmonics), from -1 to 1, y the derivative of x by phase (in radians),
-psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout), and weights are in rad. A
+psi = x, y, x^2, x y, x^3, x^2 y (docs/theory_orbits.md, section Readout), weights in rad. A
 gait's motion can replace offsets and weights. Strides from -1 to 1 make the weights ``in_place +
 stride (w - in_place)``.
 """

@@ -222,23 +222,56 @@ def door(_: str) -> str:
     """Return what `import cpg_ros` gives."""
     kinds = {name: 'autoclass' if isinstance(thing := getattr(cpg_ros, name), type) else
              'autofunction' if callable(thing) else 'autodata' for name in cpg_ros.__all__}
-    return rst(f'.. {kind}:: cpg_ros.{name}\n' + ('   :no-value:\n' if kind == 'autodata' else
-                                                  '   :members:\n' * (kind == 'autoclass'))
+    # Attributes and methods stand in the module's page.
+    return rst(f'.. {kind}:: cpg_ros.{name}\n' + '   :no-value:\n' * (kind == 'autodata')
                for name, kind in kinds.items())
 
 
-def room(name: str) -> str:
+#: Where the pages of modules are written, one each: together they would be endless.
+MODULES = Path(__file__).parents[1] / 'reference' / 'python' / 'generated'
+
+
+def modules(name: str) -> list[str]:
     """Return the modules of a room, those of its subpackages after its own."""
     place = importlib.import_module(f'cpg_ros.{name}')
     # What only ROS brings cannot be imported here.
     listed = [one for one in place.__all__ if one not in ('launch_arguments', 'rosbag2_library')]
-    folders = {one for one in listed if (Path(place.__path__[0]) / one).is_dir()}
-    return (place.__doc__ or '') + '\n\n' + '\n\n'.join(
-        f'## `{name}.{one}`\n\n' + rst([
-            f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'
-            f'   :exclude-members: {", ".join(reexported(name, one))}\n'])
-        for one in listed if one not in folders) + '\n\n' + '\n\n'.join(
-        room(f'{name}.{one}') for one in listed if one in folders)
+    folders = [one for one in listed if (Path(place.__path__[0]) / one).is_dir()]
+    return [*(f'{name}.{one}' for one in listed if one not in folders),
+            *(one for folder in folders for one in modules(f'{name}.{folder}'))]
+
+
+def room(name: str) -> str:
+    """Return a table of the modules of a room, with their pages."""
+    place, found = importlib.import_module(f'cpg_ros.{name}'), modules(name)
+    rows = [[f'[`{one}`](generated/{one}.md)',
+             (importlib.import_module(f'cpg_ros.{one}').__doc__ or '').split('\n\n')[0]
+             .replace('\n', ' ')] for one in found]
+    return '\n\n'.join([place.__doc__ or '', table(('module', 'what'), rows),
+                        '\n'.join(['```{toctree}', ':hidden:', '',
+                                   *(f'generated/{one}' for one in found), '```'])])
+
+
+def write_modules(app: Sphinx) -> None:
+    """Write a page for each module; one that is as it was keeps its time."""
+    MODULES.mkdir(exist_ok=True)
+    rooms = [path.stem for path in MODULES.parent.glob('*.md')]
+    pages = {f'{one}.md': f'# `{one}`\n\n' + rst([
+        f'.. automodule:: cpg_ros.{one}\n   :members:\n   :exclude-members: '
+        f'{", ".join(reexported(*one.rpartition(".")[::2]))}\n'])
+        for name in rooms for one in modules(name)}
+    for path in MODULES.iterdir():
+        if path.name not in pages:
+            path.unlink()
+    for name, text in pages.items():
+        if not (MODULES / name).is_file() or (MODULES / name).read_text() != text:
+            (MODULES / name).write_text(text)
+
+
+def private(app: Sphinx, what: str, name: str, thing: Any, skip: bool, options: Any
+            ) -> bool | None:
+    """Leave out constants of a module, except those that `import cpg_ros` gives."""
+    return True if what == 'module' and name.isupper() and name not in cpg_ros.__all__ else None
 
 
 def reexported(room: str, module: str) -> list[str]:
@@ -297,6 +330,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
                             'errata': made_by(errata), 'topics': Topics,
                             'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
+    app.connect('builder-inited', write_modules)
+    app.connect('autodoc-skip-member', private)
     app.connect('autodoc-process-docstring', escaped, priority=400)
     app.connect('autodoc-process-docstring', restored, priority=600)
     return {'parallel_read_safe': False}

@@ -22,7 +22,8 @@ import re
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = [*sorted(ROOT.glob('*.md')), *sorted((ROOT / 'docs').rglob('*.md'))]
+PAGES = [*sorted(ROOT.glob('*.md')), *sorted(
+    path for path in (ROOT / 'docs').rglob('*.md') if path.parent.name != 'generated')]
 SOURCES = [path for folder in ('cpg_ros', 'test', 'benchmarks')
            for path in sorted((ROOT / folder).rglob('*.py')) if path != Path(__file__)]
 CITATION = re.compile(r'docs/(\w+\.md), section (.{60})')

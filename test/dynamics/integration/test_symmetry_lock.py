@@ -98,7 +98,7 @@ def test_the_lock_changes_neither_waveform_nor_period(gait):
 
 @pytest.mark.parametrize('gait', GAITS)
 def test_noise_with_and_without_the_lock(gait):
-    # docs/theory.md, section Why the published gaits freeze.
+    # docs/theory_orbits.md, section Why the published gaits freeze.
     network = PRESETS[gait].network
     orbit = solve_orbit(network, gait)
     locked, free = (simulate(network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=7,
