@@ -66,7 +66,7 @@ export class Scene {
   // Camera as azimuth and elevation in degrees and distance in m; moved is called when it moves,
   // push with a force in N and a direction in degrees from the world's x to its y.
   constructor(canvas, [azimuth, elevation, distance], moved, push) {
-    Object.assign(this, { canvas, push, share: 1, links: [], arrows: {}, pushable: false });
+    Object.assign(this, { canvas, push, resolution: 1, links: [], arrows: {}, pushable: false });
     this.camera = new PerspectiveCamera(40, 1, 0.1, 60);
     this.camera.up = UP;
     this.robot = new Group();
@@ -217,7 +217,7 @@ export class Scene {
     const { renderer, canvas, camera, controls } = this;
     if (!renderer || !canvas.clientHeight) return;
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
-    renderer.setPixelRatio(this.share * Math.min(window.devicePixelRatio || 1, 2));
+    renderer.setPixelRatio(this.resolution * Math.min(window.devicePixelRatio || 1, 2));
     renderer.setSize(wide, high, false);
     camera.aspect = wide / high;
     camera.setViewOffset(wide, high, inset[0] / 2, inset[1] / 2, wide, high);
@@ -255,8 +255,8 @@ export class Scene {
     const passed = now - (this.before ?? now);
     this.before = now;
     if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.share = Math.max(LEAST, 0.9 * this.share);
-    else if (this.pace < 40) this.share = Math.min(1, 1.01 * this.share);
+    if (this.pace > 70) this.resolution = Math.max(LEAST, 0.9 * this.resolution);
+    else if (this.pace < 40) this.resolution = Math.min(1, 1.01 * this.resolution);
   }
 
   // The arrow of a push, N and degrees from the world's x to its y; none without a force.
