@@ -230,13 +230,6 @@ class HopfPoint(ShortRepr):
                 for name in self.network.parameters() if name not in self.line.names}
 
     @property
-    def drifts(self) -> bool:
-        """Whether the gait's own class has a real root with positive real part as well."""
-        close = ON_AXIS * max(1.0, self.omega)
-        roots = self.block.right_of(close)
-        return bool((np.abs(roots.imag) <= close).any())
-
-    @property
     def direction(self) -> int:
         """1 where the critical pair moves to the right as the value grows, -1 to the left."""
         return 1 if self.normal_form.k1.real > 0.0 else -1

@@ -314,17 +314,17 @@ def close(loop):
     planned, instant, state, out = loop.planned, loop.instant, loop.state, loop.corrected
     numbers, trim = instant.numbers, instant.trim
     dt, level = numbers[DT], numbers[LEVEL]
-    wanted, wrong = state[WANTED] > 0.0, False
-    if wanted or state[SPENT] <= DIES_OUT:
+    enabled, wrong = state[WANTED] > 0.0, False
+    if enabled or state[SPENT] <= DIES_OUT:
         check_inputs(senses, sensors, legs, numbers[NOW], level > 0.0)
         old, new = _slot(tables, instant.gaits[0]), _slot(tables, instant.gaits[1])
         new = max(new, 0)
         old = new if old < 0 else old
         wrong = _compare_contacts(loop, new)
-        state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], wanted and not wrong, dt)
+        state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], enabled and not wrong, dt)
         state[FRACTION] = state[WAY]**2 * (3.0 - 2.0 * state[WAY])
         state[SPENT] = 0.0 if state[FRACTION] > 0.0 else state[SPENT] + dt
-    if state[SPENT] > DIES_OUT and (wrong or not wanted):
+    if state[SPENT] > DIES_OUT and (wrong or not enabled):
         # Nothing is fed back: measurements from before the gap mean nothing after it.
         closed, state[CLOSED], memory.stiff[0] = state[CLOSED] > 0.0, 0.0, False
         memory.kp_scale[0], instant.scale[0], trim[:], out[0] = 1.0, 1.0, 0.0, planned.angles[0]
@@ -335,7 +335,7 @@ def close(loop):
     planned.lean[0] = numbers[ROLL:]
     planned.turn[0], yaw = turn, sensors.rpy[0, 2] - planned.lean[0, 2]
     if state[FRACTION] > 0.0 and level > 0.0:
-        # Without a wanted turn the heading is kept; with one it advances.
+        # Without a commanded turn the heading is kept; with one it advances.
         ahead = (heading[0] + turn * dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
         heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
     else:

@@ -231,17 +231,17 @@ class RobotDescription:
     def shapes(self, last: str) -> np.ndarray:
         """Return points of the shapes below a joint with all joints at 0, m, shape (n, 3)."""
         return np.concatenate([np.empty((0, 3)), *(
-            place + shape.points() @ turned.T for place, turned, link in self._below(last)
+            origin + shape.points() @ turned.T for origin, turned, link in self._below(last)
             for shape in link.shapes)])
 
     def _below(self, last: str) -> list[tuple[np.ndarray, np.ndarray, LinkDescription]]:
         """Return position, axes and link of everything below a joint, all joints at 0."""
         frames = [(*self.frame(last), self.joints[last].child)]
-        for place, turned, link in frames:
-            frames += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
+        for origin, turned, link in frames:
+            frames += [(origin + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
                       for joint in self.joints.values() if joint.parent == link]
-        return [(place, turned, self.links.get(link, LinkDescription()))
-                for place, turned, link in frames]
+        return [(origin, turned, self.links.get(link, LinkDescription()))
+                for origin, turned, link in frames]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

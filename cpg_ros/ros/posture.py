@@ -130,17 +130,17 @@ class Posture:
 
     def _receive(self, message: Pose) -> None:
         """Accept a pose in champ's convention: z above the stand's height, and an orientation."""
-        place, q = message.position, message.orientation
+        position, q = message.position, message.orientation
         numbers = np.array([q.w, q.x, q.y, q.z])
         length, log = float(np.linalg.norm(numbers)), self._node.get_logger()
-        if not (math.isfinite(length + place.z) and abs(length - 1.0) < 0.01):
-            log.warning(f'body_pose ignored: z {place.z} m, orientation {numbers[1:]} {q.w} is '
+        if not (math.isfinite(length + position.z) and abs(length - 1.0) < 0.01):
+            log.warning(f'body_pose ignored: z {position.z} m, orientation {numbers[1:]} {q.w} is '
                         'not finite or has not the length 1', throttle_duration_sec=QUIET)
             return
-        if place.x or place.y:
+        if position.x or position.y:
             log.warning('body_pose asks for a way forward or to the left: x and y are ignored',
                         once=True)
-        pose = tuple(np.round([place.z, *rpy_of(numbers)], 5).tolist())
+        pose = tuple(np.round([position.z, *rpy_of(numbers)], 5).tolist())
         if pose == self._pose:
             return
         if reason := self._reason(pose, self._plan()):

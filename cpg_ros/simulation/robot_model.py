@@ -340,8 +340,8 @@ def _give_feet(path: Path, robot: Robot, joints: dict[str, Any], say: Callable[[
     urdf = load_urdf(path)
     for leg in bare:
         chain, name = urdf.leg(joint.name for joint in robot.legs[leg]), last[leg].name
-        place, axes = urdf.frame(name)
-        foot, radius = (chain.foot - place) @ axes, chain.radius
+        origin, axes = urdf.frame(name)
+        foot, radius = (chain.foot - origin) @ axes, chain.radius
         if not radius:
             # The ball ends where the leg does.
             radius = BALL * float(sum(chain.lengths))

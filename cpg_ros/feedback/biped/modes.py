@@ -147,10 +147,10 @@ def _ends(gait, laws, half):
     """Return whether to stand now: in a walk once it is slow, in a hop at the lowest point."""
     if gait.kind == HOPS:
         return laws.before[0] < half + 0.5 <= laws.phases[0]
-    wanted, center, error = laws.wanted, laws.center[1], laws.dcm_error
+    target, center, error = laws.wanted, laws.center[1], laws.dcm_error
     both = (not (laws.swinging[0] or laws.swinging[1])
             and laws.fractions[0] > 0.0 and laws.fractions[1] > 0.0)
-    return (gait.kind == WALKS and both and max(abs(wanted[0]), abs(wanted[1])) < 1e-6
+    return (gait.kind == WALKS and both and max(abs(target[0]), abs(target[1])) < 1e-6
             and max(abs(center[0]), abs(center[1])) < 2.0 * STILL
             and max(abs(error[0]), abs(error[1])) < CAUGHT)
 

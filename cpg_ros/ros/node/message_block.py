@@ -255,10 +255,10 @@ class MessageBlock:
         """
         self._period, self._gate = period, while_not_0
         self._kept = arrays
-        self._fixed = np.array([place.ctypes.data if isinstance(place, np.ndarray) else 0
-                                for place in arrays], dtype=np.uint64)
-        self._from = np.array([self._fixed[k:].ctypes.data if isinstance(place, np.ndarray) else
-                               place for k, place in enumerate(arrays)], dtype=np.uint64)
+        self._fixed = np.array([array.ctypes.data if isinstance(array, np.ndarray) else 0
+                                for array in arrays], dtype=np.uint64)
+        self._from = np.array([self._fixed[k:].ctypes.data if isinstance(array, np.ndarray) else
+                               array for k, array in enumerate(arrays)], dtype=np.uint64)
         self._output = native.Output(
             ctypes.addressof(self._native), self._from.ctypes.data, self._sizes.ctypes.data,
             len(arrays), 1, self._output.since, quiet,
