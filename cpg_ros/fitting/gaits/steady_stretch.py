@@ -100,6 +100,7 @@ class Stretch:
         begin, end: s.
         period: lag, s, to about 2 %.
         difference: mean square difference after one lag over twice the variance.
+        typical: the same, the median along the stretch: a single slip of the phase leaves it.
         size: RMS of the signals about their means, rad.
 
     """
@@ -108,6 +109,7 @@ class Stretch:
     end: float
     period: float
     difference: float
+    typical: float
     size: float
 
     @property
@@ -202,8 +204,8 @@ def longest_run(mask: np.ndarray) -> tuple[int, int] | None:
 
 
 def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
-              ) -> tuple[float, float] | None:
-    """Return the lag among the near ones with the smallest mean difference, and that difference.
+              ) -> tuple[float, float, float] | None:
+    """Return the lag among the near ones with the smallest mean difference, that and its median.
 
     A parabola interpolates between lags; None if a lag that is not near has a smaller one.
     """
@@ -211,16 +213,17 @@ def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
     means = np.where(finite, differences, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
     means[~finite.any(axis=1)] = np.inf
     k = near[np.argmin(means[near])]
+    median = float(np.median(differences[k, finite[k]])) if finite[k].any() else np.inf
     if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
-        return float(lags[k]), float(means[k])
+        return float(lags[k]), float(means[k]), median
     both = finite[k - 1:k + 2].all(axis=0)
     before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
         k - 1:k + 2]
     if min(before, after) < here:
         return None
     bend = max(before - 2.0 * here + after, 1e-300)
-    return (lags[k] + 0.5 * (before - after) / bend,
-            max(here - 0.125 * (before - after)**2 / bend, 0.0))
+    least = max(here - 0.125 * (before - after)**2 / bend, 0.0)
+    return lags[k] + 0.5 * (before - after) / bend, least, median * least / max(here, 1e-300)
 
 
 def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
@@ -242,9 +245,10 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
                 if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
-                    stretches.append(Stretch(start + begin * step, start + end * step,
-                                         found_lag[0] * step, found_lag[1],
-                                         float(np.sqrt(variance[first:last + 1].mean()))))
+                    stretches.append(Stretch(
+                        start + begin * step, start + end * step, found_lag[0] * step,
+                        found_lag[1], found_lag[2],
+                        float(np.sqrt(variance[first:last + 1].mean()))))
         half = len(y) // 2
         y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])
         start, step = start + 0.5 * step, 2.0 * step
@@ -263,6 +267,7 @@ def best_stretch(stretches: list[Stretch]) -> Stretch:
             if (abs(stretch.period / best.period / times - 1.0) < NEAR / 2
                     and not stretch.outside(best.begin, best.end)
                     and stretch.end - stretch.begin >= LASTING * (best.end - best.begin)
-                    and stretch.difference < BETTER * (best.difference - LESS)):
+                    and stretch.difference < BETTER * (best.difference - LESS)
+                    and stretch.typical < BETTER * (best.typical - LESS)):
                 return stretch
     return best

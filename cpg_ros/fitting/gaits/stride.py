@@ -353,7 +353,7 @@ def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> 
     """Return the phase in a stretch, if enough of its cycles are alike."""
     warp = estimate_phase(times, x, rough)
     if warp.cycles < CYCLES:
-        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
+        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.2f} cycles of '
                            f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed: '
                            f'record {SURE:g} strides or more, {SURE / warp.frequency:.3g} s')
     return warp

@@ -19,6 +19,7 @@ import asyncio
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+import signal
 import sys
 import time
 from typing import Any
@@ -105,7 +106,9 @@ USUAL = ('/rosout', '/parameter_events')
 
 
 def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
-    """Record topics until Ctrl-C; by default all that exist or appear.
+    """Record topics until SIGINT or SIGTERM; by default all that exist or appear.
+
+    A second signal does not interrupt the writing of the bag.
 
     Raises:
         BagError: the name is taken, or the folder cannot be written to.
@@ -113,16 +116,17 @@ def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
     """
     recorder, searched = BagRecorder(node, path), 0.0
     names = [node.resolve_topic_name(name) for name in topics]
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda number, frame: signals.append(number))
     try:
-        while True:
+        while not signals:
             if time.monotonic() > searched + SEARCH_PERIOD:
                 searched = time.monotonic()
                 for topic in _subscribed(node, recorder, names):
                     print(f'recording {topic}', file=sys.stderr, flush=True)
             recorder.poll()
             time.sleep(EVERY)
-    except KeyboardInterrupt:
-        pass
     finally:
         recorder.close()
     return recorder

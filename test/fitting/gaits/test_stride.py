@@ -110,6 +110,16 @@ def test_the_stretch_leaves_standing_and_starts_out():
     assert stride.gait == 'trot'
 
 
+@pytest.mark.parametrize('slip', [0.15, 0.2])
+def test_a_single_slip_of_the_phase_does_not_make_three_strides_one(slip):
+    driven, t = Driven('delayed', 'walk'), stamps(np.random.default_rng(23), 7.0, 100.0)
+    # A generator that was held up goes on where it was.
+    angles = driven(0.97 * t - slip * (t > 3.4))
+    stride = find_stride(Recorded(tuple(driven.joints), t, angles), driven.by_leg, Delayed,
+                         driven.cells)
+    assert stride.gait == 'walk' and stride.frequency == pytest.approx(0.97, rel=0.05)
+
+
 def test_a_drift_of_the_frequency_is_followed():
     rng = np.random.default_rng(3)
     t = stamps(rng, 25.0, 200.0)

@@ -150,7 +150,9 @@ def test_what_is_recorded_is_what_the_generator_publishes(unhurried, tmp_path):
     until(lambda: watcher.node.count_subscribers('/joint_states') > before, 'the recorder')
     time.sleep(2.0)
     assert not (tmp_path / 'bag').exists()
+    # An impatient user, or timeout, which signals the process and its group.
     recorder.send_signal(signal.SIGINT)
+    recorder.send_signal(signal.SIGTERM)
     told, errors = recorder.communicate(timeout=60)
     assert recorder.returncode == 0 and not errors and 'messages' in told
     # Nothing in it is hidden from a shell's *, or beside it.
