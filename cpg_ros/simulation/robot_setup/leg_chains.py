@@ -18,7 +18,7 @@ Anchors of joints and lengths between them do not depend on the joints' zeros, s
 find the legs. Names only decide which way a robot faces, and which limbs are arms.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from cpg_ros.fitting.gaits.leg_names import Legs, LegsError, limb_of, place_of
 from cpg_ros.motion.description import (
@@ -44,8 +44,9 @@ UNLIKE = 0.2
 #: end;
 #: HIGHER: height of its first joint.
 SHORTER, HIGHER = 0.35, 0.4
-#: CROSSWISE: ratio of axes along x to axes along y above which legs move along y.
-CROSSWISE = 1.3
+#: CROSSWISE: ratio of axes along x to axes along y above which legs move along y; LEVEL: largest
+#: vertical component of an axis that is level.
+CROSSWISE, LEVEL = 1.3, 0.5
 #: FLAT: fraction of the axes' directions up to which they lie in a plane.
 FLAT = 0.05
 #: ENDLESS: range of a joint from which on it counts as unlimited, rad.
@@ -71,13 +72,14 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
     if given:
         return _cleaned(description, _named(description, given))
     paths = _paths(description)
-    crosswise = _crosswise(description, paths)
+    facing_x = _assigned(description, paths, 0)
+    crosswise = _crosswise(description, (facing_x or _assigned(description, paths, 1)).values())
     quarters = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
     by_quarter = {quarter: legs for quarter in quarters
                   if (legs := _assigned(description, paths, quarter))}
-    if crosswise and not faces_x and (legs := _assigned(description, paths, 0)) and all(
-            place_of(joints)[0] for joints in legs.values()) and not _misnamed(legs):
-        by_quarter = {0: legs}
+    if crosswise and not faces_x and facing_x and not _misnamed(facing_x) and all(
+            place_of(joints)[0] for joints in facing_x.values()):
+        by_quarter = {0: facing_x}
     if not by_quarter:
         raise LegsError(_question(description, paths))
     fitting = [quarter for quarter in by_quarter if faces_x or not _misnamed(by_quarter[quarter])]
@@ -101,15 +103,24 @@ def _paths(description: RobotDescription) -> list[tuple[str, ...]]:
     return [chain for name, chain in chains.items() if name not in inner]
 
 
-def _crosswise(description: RobotDescription, paths: Sequence[Sequence[str]]) -> bool:
-    """Return whether more joints turn about x than about y, as in a robot that faces y."""
-    along = np.zeros(3)
-    for path in paths:
-        axes = np.array([description.direction(name) for name in path
+def _crosswise(description: RobotDescription, legs: Iterable[Sequence[str]]) -> bool:
+    """Return whether legs pitch about x rather than about y, as in a robot that faces y.
+
+    Two joints in a row with parallel axes pitch. Below a level axis, such as that of abduction,
+    they are across it when the leg hangs, whatever the zero of that joint.
+    """
+    across = np.zeros(3)
+    for leg in legs:
+        axes = np.array([description.direction(name) for name in leg
                          if description.joints[name].kind in TURNING])
-        if len(axes) and not sprawls(axes):
-            along += np.abs(axes).sum(axis=0)
-    return bool(along[0] > CROSSWISE * along[1])
+        first = next((k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99), None)
+        if first is None:
+            across += np.abs(axes).sum(axis=0)
+        elif first and abs(axes[first - 1, 2]) < LEVEL:
+            across += np.abs(np.cross((0.0, 0.0, 1.0), axes[first - 1]))
+        elif not sprawls(axes[max(first - 1, 0):first + 2]):
+            across += np.abs(axes[first])
+    return bool(across[0] > CROSSWISE * across[1])
 
 
 def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], quarter: int

@@ -65,25 +65,40 @@ class Benefit:
 
     Attributes:
         gait: its name.
-        upright: number of undisturbed runs with feedback without a fall, of UNDISTURBED.
+        undisturbed: runs without a push that are survived without feedback (before) and with it
+            (after).
+        falls: undisturbed runs that fall with feedback, and when, in words.
         pushes: survived without feedback (before) and with it (after).
 
     """
 
     gait: str
-    upright: int
+    undisturbed: Survivors
+    falls: tuple[str, ...]
     pushes: Survivors
 
     @property
     def helps(self) -> bool:
-        """Whether no undisturbed robot falls, and significantly more pushes are survived."""
-        return self.upright == UNDISTURBED and self.pushes.better
+        """Whether it fells no undisturbed robot, and significantly more pushes are survived."""
+        return not self.undisturbed.lost and self.pushes.better
+
+    @property
+    def verdict(self) -> str:
+        """Whether feedback helps, and the reason if it does not."""
+        if self.undisturbed.lost:
+            return 'it fells the robot without a push'
+        if self.pushes.better:
+            return 'it helps'
+        if self.pushes.worse:
+            return 'it fells the robot after pushes'
+        return 'cannot tell whether it helps'
 
     def __str__(self) -> str:
-        pushes = self.pushes
-        return (f'{self.gait}: {pushes.after} of {pushes.runs} pushes survived (without feedback '
-                f'{pushes.before}; {pushes.won} with it only, {pushes.lost} without it only), '
-                f'{self.upright} of {UNDISTURBED} undisturbed runs, sensors '
+        pushes, calm = self.pushes, self.undisturbed
+        return (f'{self.gait}: {self.verdict}: {pushes.after} of {pushes.runs} pushes survived '
+                f'(without feedback {pushes.before}; {pushes.won} with it only, {pushes.lost} '
+                f'without it only), {calm.after} of {calm.runs} undisturbed runs (without '
+                f'{calm.before}{"".join(f"; {fall}" for fall in self.falls)}), sensors '
                 f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
 
@@ -145,22 +160,21 @@ class FeedbackTrial:
 
     def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
         """Return which runs with pushes are survived; None runs them without feedback."""
-        return self._upright(gains, pushed, WATCHED)
+        return np.isinf(self._fell(gains, pushed, WATCHED))
 
-    def upright(self, gains: Gains | None) -> int:
-        """Return the number of undisturbed runs without a fall."""
-        return int(self._upright(gains, self.calm(), WALKED).sum())
+    def fell(self, gains: Gains | None) -> np.ndarray:
+        """Return when undisturbed runs fell, s, infinite without a fall, shape (UNDISTURBED,)."""
+        return self._fell(gains, self.calm(), WALKED)
 
-    def _upright(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
-                 ) -> np.ndarray:
-        upright = np.zeros(len(scenarios), dtype=bool)
+    def _fell(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
+              ) -> np.ndarray:
+        fell = np.full(len(scenarios), math.inf)
         for k, delay in enumerate(DELAYS):
             some = slice(k, len(scenarios), len(DELAYS))
-            if not scenarios[some]:
-                continue
-            upright[some] = self.loop.run(scenarios[some], duration, gains,
-                                        noise=replace(SENSORS, delay=delay)).upright
-        return upright
+            if scenarios[some]:
+                fell[some] = self.loop.run(scenarios[some], duration, gains,
+                                           noise=replace(SENSORS, delay=delay)).fell
+        return fell
 
 
 def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
@@ -186,22 +200,31 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
     trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
     pushed = {gait: trial.pushed(np.random.default_rng(seed), BENEFIT_PUSHES, BENEFIT_IMPULSES)
               for gait, trial in trials.items()}
-    before = {gait: trial.survived(None, pushed[gait]) for gait, trial in trials.items()}
+    before = {gait: (trial.fell(None), trial.survived(None, pushed[gait]))
+              for gait, trial in trials.items()}
     first: list[Benefit] = []
     for without in WITHOUT:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
         gains, benefits = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
-            upright, old = trial.upright(gains), before[gait]
-            new = (trial.survived(gains, pushed[gait]) if upright == UNDISTURBED
-                   else np.zeros_like(old))
-            benefits.append(Benefit(gait, upright, Survivors.of(old, new)))
+            fell = trial.fell(gains)
+            calm = Survivors.of(np.isinf(before[gait][0]), np.isinf(fell))
+            if calm.lost and first:
+                break
+            benefits.append(Benefit(gait, calm, _falls(fell), Survivors.of(
+                before[gait][1], trial.survived(gains, pushed[gait]))))
             if not benefits[-1].helps:
                 break
-        first = first or benefits
-        if all(benefit.helps for benefit in benefits):
+        else:
             return replace(robot, feedback=replace(tried, made=_text(benefits))), benefits
+        first = first or benefits
     return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
+
+
+def _falls(fell: np.ndarray) -> tuple[str, ...]:
+    """Return which undisturbed runs fell, from their times in s."""
+    return tuple(f'run {k + 1}, sensors {1e3 * DELAYS[k % len(DELAYS)]:g} ms late, falls after '
+                 f'{fell[k]:.1f} s' for k in np.flatnonzero(np.isfinite(fell)))
 
 
 def _text(benefits: Sequence[Benefit]) -> str:
@@ -383,4 +406,4 @@ def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed
 
     return TunedFeedback(Survivors.of(survivors(before), survivors(after)),
                          int(survivors(None).sum()),
-                         sum(UNDISTURBED - trial.upright(after) for trial in trials))
+                         sum(int(np.isfinite(trial.fell(after)).sum()) for trial in trials))

@@ -351,7 +351,7 @@ def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDes
 
 
 def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,
-         executor: Executor | None = None, seeds: int = 1, kp: float | None = None,
+         executor: Executor | None = None, kp: float | None = None,
          kd: float | None = None, threads: int = 0,
          say: Callable[[str], None] = lambda line: None
          ) -> tuple[Robot, list[Tuned], list[str]]:
@@ -363,8 +363,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         gaits: of AIMS.
         evaluations: approximate number of designs to try for each.
         seed: determines the result, whatever the workers.
-        executor: for all gaits and seeds at once; None for this process.
-        seeds: number of searches for each gait, from this seed on; the lowest price counts.
+        executor: for all gaits at once; None for this process.
         kp: gain of the joints, as of OpenLoopBatch.
         kd: the same.
         threads: of each search; 0 for all cores.
@@ -391,22 +390,16 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     file = Path(model)
     # Workers may have another folder for theirs.
     model_name = str(file.resolve()) if file.is_file() else model
-    trials = [DesignTrial(robot, model_name, gait, evaluations, seed + k, kp, kd, threads or 1)
-              for gait in gaits for k in range(seeds)]
-    results = iter(_here(tuner, trials) if executor is None else executor.map(search, trials))
+    trials = [DesignTrial(robot, model_name, gait, evaluations, seed, kp, kd, threads or 1)
+              for gait in gaits]
+    results = _here(tuner, trials) if executor is None else executor.map(search, trials)
     motions, designs, missing = dict(robot.motions), [], []
-    for gait in gaits:
-        tuned = [next(results) for _ in range(seeds)]
-        # Of equal prices, the first seed's counts.
-        best = min(tuned, key=lambda design: math.inf if isinstance(design, NoDesign)
-                   else design.price)
-        if isinstance(best, NoDesign):
-            missing.append(str(best))
+    for gait, result in zip(gaits, results, strict=True):
+        if isinstance(result, NoDesign):
+            missing.append(str(result))
             continue
-        motions[gait] = replace(best.motion, verdict=best.verdict)
-        designs.append(best)
-    # Let the progress bar end.
-    next(results, None)
+        motions[gait] = replace(result.motion, verdict=result.verdict)
+        designs.append(result)
     if not designs:
         raise NoDesign('; '.join(missing))
     # Feedback needs the efference copies, too.
@@ -494,6 +487,11 @@ class Survivors:
         changed = self.won + self.lost
         return changed > 0 and bool(
             binomtest(self.won, changed, alternative='greater').pvalue < 0.05)
+
+    @property
+    def worse(self) -> bool:
+        """Whether significantly more runs are lost than won, by the same test."""
+        return Survivors(self.runs, self.after, self.before, self.won).better
 
 
 def cma_es() -> ModuleType:

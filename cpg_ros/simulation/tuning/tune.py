@@ -84,9 +84,6 @@ def _parser() -> Parser:
                         "N m/rad (default: a Go2's, scaled to the robot's mass)")
     parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
                         'N m s/rad (default: the same)')
-    parser.add_argument('--seeds', type=int, default=1, metavar='N', help='number of '
-                        'searches for each gait, with seeds from --seed on; the best result is '
-                        'kept (default: %(default)s)')
     add_options(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='the robot file to write')
@@ -115,8 +112,6 @@ def _refuse_options(args: argparse.Namespace) -> None:
             raise InputError(f'argument --{option}: {value:g} is not above 0 and up to 100000')
     if args.jobs < 0:
         raise InputError(f'argument --jobs: {args.jobs} is negative')
-    if args.seeds < 1:
-        raise InputError(f'argument --seeds: {args.seeds} is not positive')
     refuse_repeated('argument --gaits', args.gaits or [])
 
 
@@ -189,11 +184,11 @@ def _tune(args: argparse.Namespace) -> int:
         gaits_of_network = NETWORKS[robot.networks[0]].gaits()
         args.gaits = [gait for gait in AIMS if gait in gaits_of_network]
     _refuse_out(args)
-    with executor_for(len(args.gaits) * args.seeds, args, 'searches', report) as executor:
+    with executor_for(len(args.gaits), args, 'searches', report) as executor:
         robot, designs, missing = tune(
             robot, args.model, args.gaits, args.evaluations, args.seed,
-            executor=executor, seeds=args.seeds, kp=args.kp, kd=args.kd,
-            threads=1 if executor else args.jobs, say=report)
+            executor=executor, kp=args.kp, kd=args.kd, threads=1 if executor else args.jobs,
+            say=report)
     lines = [*figures(designs), *missing, *invented_limits(robot, 'model')]
     if judged := evaluated_gaits(robot):
         robot, _ = evaluate_feedback(robot, args.model, judged, args.kp, args.kd, args.seed)

@@ -199,6 +199,21 @@ def test_a_robot_that_faces_y_is_refused_with_the_remedy():
         legs_of(quadruped(places=places, crosswise=True))
 
 
+@pytest.mark.parametrize('zero', [1.5, -1.2])
+@pytest.mark.parametrize('crosswise', [False, True])
+def test_where_a_robot_faces_does_not_depend_on_the_zeros_of_its_hips(zero, crosswise):
+    """With its hips at 0 a leg is stretched out to the side, and its knee turns about z."""
+    turned = f'0 {zero} 0' if crosswise else f'{zero} 0 0'
+    urdf = re.sub(r'(xyz="-?0\.[12] -?0\.[12] 0")/>', rf'\1 rpy="{turned}"/>', quadruped(
+        {leg: str(k) for k, leg in enumerate(QUADRUPED)}, crosswise=crosswise))
+    assert urdf.count('rpy') == 4
+    if crosswise:
+        with pytest.raises(LegsError, match='faces y or -y of the URDF'):
+            legs_of(urdf)
+    else:
+        assert list(legs_of(urdf)) == list(QUADRUPED)
+
+
 @pytest.mark.parametrize('kind', ['continuous', 'revolute'])
 def test_wheels_are_held(tmp_path, capsys, kind):
     urdf = quadruped(foot='continuous')

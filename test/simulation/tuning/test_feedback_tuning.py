@@ -57,7 +57,8 @@ class Body(FeedbackTrial):
         fraction = self.alone if gains is None else math.exp(-2.0 * off * off)
         upright = [one < fraction if isinstance(one, float) else
                    gains is None or not self.falls_undisturbed for one in scenarios]
-        return SimpleNamespace(upright=np.array(upright), cost=np.ones(len(scenarios)),
+        return SimpleNamespace(upright=np.array(upright), fell=np.where(upright, math.inf, 1.0),
+                               cost=np.ones(len(scenarios)),
                                velocity=np.full((len(scenarios), 10, 3), self.speed))
 
 
