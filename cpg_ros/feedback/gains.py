@@ -131,6 +131,14 @@ def leg_length(geometry: Geometry) -> float:
     return float(lengths.mean()) if turning.any() else LENGTH
 
 
+def shorter_times(length: float) -> float:
+    """Return the factor of times for legs of a length in m that are shorter than a Go2's, else 1.
+
+    Sensors may be late by a fraction of the time in which a body falls.
+    """
+    return min(math.sqrt(length / LENGTH), 1.0)
+
+
 @cache
 def _powers(unit: str) -> tuple[int, ...]:
     over, *under = unit.split('/')

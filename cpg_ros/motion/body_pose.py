@@ -123,8 +123,8 @@ class BodyPose:
         spans = np.zeros((2, len(angles))) if plan is None else plan.span
         gait = '' if plan is None else f" in the gait '{plan.name}'"
         for joint, angle, low, high in zip(self._robot.joints, angles, *spans, strict=True):
-            if message := beyond_limits(joint, angle + min(low, 0.0), angle + max(high, 0.0)):
-                raise InputError(f'{_text(pose)}{gait} takes {message}')
+            if faults := beyond_limits(joint, angle + min(low, 0.0), angle + max(high, 0.0)):
+                raise InputError(f'{_text(pose)}{gait} takes {faults[0]}')
         return angles
 
     @cached_property

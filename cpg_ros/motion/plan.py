@@ -369,10 +369,10 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
         raise PlanError(str(error)) from error
 
 
-def beyond_limits(joint: Joint, low: float, high: float) -> str:
-    """Return how a joint that moves from low to high, rad, exceeds its limits, or ''."""
-    return next((message for excess, _, message in _beyond(
-        joint, low - joint.offset, high - joint.offset, 0.0) if excess > 1e-9), '')
+def beyond_limits(joint: Joint, low: float, high: float, fastest: float = 0.0) -> list[str]:
+    """Return how a joint that moves from low to high, rad, and at up to rad/s exceeds limits."""
+    return [message for excess, _, message in _beyond(
+        joint, low - joint.offset, high - joint.offset, fastest) if excess > 1e-9]
 
 
 def _beyond(joint: Joint, low: float, high: float, fastest: float

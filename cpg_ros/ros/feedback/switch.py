@@ -25,7 +25,7 @@ from cpg_ros.feedback.biped.gains import GAINS as BALANCE_GAINS
 from cpg_ros.feedback.closed_loop import CONTACTS
 from cpg_ros.feedback.estimate import Odometry, SCALE
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
-from cpg_ros.feedback.gains import Gains, LAWS, robot_gains
+from cpg_ros.feedback.gains import Gains, LAWS, leg_length, robot_gains, shorter_times
 from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
 from cpg_ros.feedback.laws.law import Gain
@@ -73,7 +73,8 @@ TOPICS = fixed({
                                'that of the robot file'),
     f'{PREFIX}max_delay': Spec(LATE, 'largest age of measurements when they are used, by their '
                                'stamps [s]: feedback fades out above it; '
-                               f'by default {LATE:g}, and {LATE_BALANCE:g} for a robot with soles',
+                               f"by default {LATE:g}, less for legs shorter than a Go2's, and "
+                               f'{LATE_BALANCE:g} for a robot with soles',
                                0.001, DELAYED),
     f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, computed from the '
                                     "robot's legs and IMU, such as odom; none by default"),
@@ -117,10 +118,11 @@ def specs(robot: Robot) -> dict[str, Spec]:
 
     """
     mount = robot.feedback.imu_mount if robot.feedback is not None else ()
-    balanced = robot.biped is not None
+    short = 1.0 if robot.geometry is None else shorter_times(leg_length(geometry_of(robot)))
+    latest = LATE_BALANCE if robot.biped is not None else round(LATE * short, 4)
     topics = {**TOPICS, **{f'{PREFIX}{name}': replace(TOPICS[f'{PREFIX}{name}'], default=value)
                            for name, value in (('imu_mount', list(mount) or [0.0] * 3),
-                                               ('max_delay', LATE_BALANCE if balanced else LATE))}}
+                                               ('max_delay', latest))}}
     if robot.biped is None:
         return {**topics, **of_gains(robot_gains(robot))}
     return {**topics, **_specs(BIPED_GAIN_OF, BipedGains.of_body(robot.biped))}

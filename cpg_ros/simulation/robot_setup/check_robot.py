@@ -168,13 +168,13 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
         notes += f'\nvelocity limits: {args.velocity:g} rad/s, as given with --velocity'
     leg, joints = next(iter(robot.legs.items()))
     stand = ', '.join(f'{joint.name} at {joint.offset:g}' for joint in joints)
-    notes += f'\ninvented: small amplitudes, and the stand, which has in {leg} {stand} rad'
+    notes += f'\nassumed: small amplitudes, and the stand, which has in {leg} {stand} rad'
     source = find_model(args.mjcf) if args.urdf is None else args.urdf
     write_robot(args.make, robot, COMMENT.format(source=source.name, format=description.format,
                                                    notes=notes))
     if args.forward not in ('', 'x'):
         notes += f'\nfor {args.urdf}, which faces x: use it from here on'
-    note('check_robot', f'wrote {args.make}, check what it takes each joint for:\n{notes}')
+    note('check_robot', f'wrote {args.make}; check the role of each joint:\n{notes}')
     return load_robot(str(args.make.absolute()))
 
 

@@ -35,8 +35,9 @@ from cpg_ros.motion.description import (
     SERVOS,
     SLOW,
 )
-from cpg_ros.motion.plan import GaitPlan, plan_gait, PlanError
+from cpg_ros.motion.plan import beyond_limits, GaitPlan, plan_gait, PlanError
 from cpg_ros.motion.robot import Joint, Motion, Robot
+from cpg_ros.motion.robot_file import LIMITS
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import NETWORKS
 import numpy as np
@@ -397,23 +398,15 @@ def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
     faults, rooms, fractions = [], [], []
     for joint, low, high, speed in zip(robot.joints, *gait_plan.span, gait_plan.speed,
                                        strict=True):
-        limits: list[tuple[str, Joint | JointDescription]] = [("the robot file's", joint)]
         there = description.joints.get(joint.name)
         if there and not there.undrivable:
-            limits.append((f"the {description.format}'s", there))
-        lower, below = max((limit.lower, whose) for whose, limit in limits)
-        upper, above = min((limit.upper, whose) for whose, limit in limits)
-        fastest, slower = min((limit.velocity, whose) for whose, limit in limits)
+            joint = replace(joint, lower=max(joint.lower, there.lower),
+                            upper=min(joint.upper, there.upper),
+                            velocity=min(joint.velocity, there.velocity))
         low, high = joint.offset + low, joint.offset + high
-        rooms.append((min(low - lower, upper - high), joint.name))
-        fractions.append((speed / fastest, joint.name))
-        if low < lower - ROUNDING:
-            faults.append(f'{joint.name} goes to {low:.3f} rad, below {below} limit {lower:g}')
-        if high > upper + ROUNDING:
-            faults.append(f'{joint.name} goes to {high:.3f} rad, above {above} limit {upper:g}')
-        if speed > fastest + ROUNDING:
-            faults.append(f'{joint.name} moves at {speed:.2f} rad/s, above {slower} limit '
-                          f'{fastest:g}')
+        rooms.append((min(low - joint.lower, joint.upper - high), joint.name))
+        fractions.append((speed / joint.velocity, joint.name))
+        faults += beyond_limits(joint, low, high, speed)
     return GaitCheck(network, name, gait_plan.frequency, *min(rooms), *max(fractions),
                      tuple(faults))
 
@@ -451,19 +444,16 @@ def _notes(robot: Robot, description: RobotDescription) -> Iterator[str]:
         yield (f'velocity limits of {" and ".join(f"{speed:g}" for speed in slow)} rad/s are slow '
                f'for a walking robot ({SERVOS}), and gaits keep to them: if your motors are '
                f'faster, correct the {what}, or make the file with --velocity and what they reach')
-    unbounded = [name for name in driven
-                 if name in description.joints and description.joints[name].velocity == inf]
-    if unbounded:
-        yield f'the {what} has no velocity limit of ' + (
-            'any joint' if len(unbounded) == len(driven) else ', '.join(unbounded))
 
 
 def invented_limits(robot: Robot, what: str) -> list[str]:
-    """Return a line on limits that are guesses because the description has none, or ''."""
-    listed = [f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
-              if joint.invented]
-    return [f'limits that the {what} does not have are invented: {", ".join(listed)}'] * bool(
-        listed)
+    """Return a line on limits that are assumed because the description has none, or none."""
+    by_key = {key: [joint.name for joint in robot.joints if key in joint.invented]
+              for key in LIMITS}
+    listed = [f'{key} of ' + ('all joints' if len(names) == len(robot.joints) else
+                              ', '.join(names)) for key, names in by_key.items() if names]
+    return [f'limits that the {what} does not have are assumed (key invented): '
+            + '; '.join(listed)] * bool(listed)
 
 
 def _span(limits: Joint | JointDescription) -> str:

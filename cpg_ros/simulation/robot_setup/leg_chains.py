@@ -73,13 +73,13 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
         return _cleaned(description, _named(description, given))
     paths = _paths(description)
     facing_x = _assigned(description, paths, 0)
-    crosswise = _crosswise(description, (facing_x or _assigned(description, paths, 1)).values())
+    agrees = facing_x and not _misnamed(facing_x) and all(
+        place_of(joints)[0] for joints in facing_x.values())
+    crosswise = not agrees and _crosswise(
+        description, (facing_x or _assigned(description, paths, 1)).values())
     quarters = (0,) if faces_x else (1, 3) if crosswise else (0, 2)
     by_quarter = {quarter: legs for quarter in quarters
                   if (legs := _assigned(description, paths, quarter))}
-    if crosswise and not faces_x and facing_x and not _misnamed(facing_x) and all(
-            place_of(joints)[0] for joints in facing_x.values()):
-        by_quarter = {0: facing_x}
     if not by_quarter:
         raise LegsError(_question(description, paths))
     fitting = [quarter for quarter in by_quarter if faces_x or not _misnamed(by_quarter[quarter])]

@@ -23,7 +23,14 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 import math
 
-from cpg_ros.feedback.gains import dimensionless, GAINS, Gains, leg_length, robot_gains
+from cpg_ros.feedback.gains import (
+    dimensionless,
+    GAINS,
+    Gains,
+    leg_length,
+    robot_gains,
+    shorter_times,
+)
 from cpg_ros.feedback.gait_tables import Timetable
 from cpg_ros.feedback.kinematics import geometry_of, GRAVITY
 from cpg_ros.motion.body_file import OwnFeedback
@@ -49,7 +56,8 @@ PUSHED, WATCHED = 1.6, 3.4
 #: FROUDE: v / sqrt(g l) of the commanded speed; FRACTION: the largest commanded speed, as a
 #: fraction of the fastest one.
 FROUDE, FRACTION = 0.2, 0.8
-#: DELAYS: of the sensors, s, by turns from run to run; SENSORS: their other errors.
+#: DELAYS: of the sensors, s, by turns from run to run, in proportion to sqrt(l) less for legs
+#: shorter than a Go2's; SENSORS: their other errors.
 DELAYS = (0.01, 0.02)
 SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
                       gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,
@@ -69,6 +77,7 @@ class Benefit:
             (after).
         falls: undisturbed runs that fall with feedback, and when, in words.
         pushes: survived without feedback (before) and with it (after).
+        delays: of the sensors, by turns from run to run, s.
 
     """
 
@@ -76,6 +85,7 @@ class Benefit:
     undisturbed: Survivors
     falls: tuple[str, ...]
     pushes: Survivors
+    delays: Sequence[float] = DELAYS
 
     @property
     def helps(self) -> bool:
@@ -99,7 +109,7 @@ class Benefit:
                 f'(without feedback {pushes.before}; {pushes.won} with it only, {pushes.lost} '
                 f'without it only), {calm.after} of {calm.runs} undisturbed runs (without '
                 f'{calm.before}{"".join(f"; {fall}" for fall in self.falls)}), sensors '
-                f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
+                f'{" and ".join(f"{1e3 * delay:.2g}" for delay in self.delays)} ms late')
 
 
 def evaluated_gaits(robot: Robot) -> list[str]:
@@ -140,6 +150,11 @@ class FeedbackTrial:
         if plan.motion.steering is not None:
             self.speed = min(self.speed, FRACTION * plan.speeds[1])
 
+    @property
+    def delays(self) -> list[float]:
+        """Delays of the sensors, by turns from run to run, s."""
+        return [delay * shorter_times(self.length) for delay in DELAYS]
+
     def pushed(self, rng: np.random.Generator, count: int, impulses: Sequence[float]
                ) -> list[Scenario]:
         """Return runs with pushes of each impulse, see IMPULSES, from some directions."""
@@ -169,7 +184,7 @@ class FeedbackTrial:
     def _fell(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
               ) -> np.ndarray:
         fell = np.full(len(scenarios), math.inf)
-        for k, delay in enumerate(DELAYS):
+        for k, delay in enumerate(self.delays):
             some = slice(k, len(scenarios), len(DELAYS))
             if scenarios[some]:
                 fell[some] = self.loop.run(scenarios[some], duration, gains,
@@ -211,8 +226,8 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
             calm = Survivors.of(np.isinf(before[gait][0]), np.isinf(fell))
             if calm.lost and first:
                 break
-            benefits.append(Benefit(gait, calm, _falls(fell), Survivors.of(
-                before[gait][1], trial.survived(gains, pushed[gait]))))
+            benefits.append(Benefit(gait, calm, _falls(fell, trial.delays), Survivors.of(
+                before[gait][1], trial.survived(gains, pushed[gait])), trial.delays))
             if not benefits[-1].helps:
                 break
         else:
@@ -221,9 +236,9 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
     return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
 
 
-def _falls(fell: np.ndarray) -> tuple[str, ...]:
-    """Return which undisturbed runs fell, from their times in s."""
-    return tuple(f'run {k + 1}, sensors {1e3 * DELAYS[k % len(DELAYS)]:g} ms late, falls after '
+def _falls(fell: np.ndarray, delays: Sequence[float]) -> tuple[str, ...]:
+    """Return which undisturbed runs fell, from their times and their sensors' delays in s."""
+    return tuple(f'run {k + 1}, sensors {1e3 * delays[k % len(delays)]:.2g} ms late, falls after '
                  f'{fell[k]:.1f} s' for k in np.flatnonzero(np.isfinite(fell)))
 
 

@@ -193,6 +193,6 @@ def test_one_command_makes_a_robot_that_is_driven(tmp_path):
         output, _ = process.communicate(timeout=400)
         assert process.returncode == 0
         said = output.decode()
-        assert all(f'step {k}: took' in said for k in (1, 2)) and 'invented: ' in said
+        assert all(f'step {k}: took' in said for k in (1, 2)) and 'assumed: ' in said
         assert re.search(r'^ +\d+\.\d s  trot ', said, re.MULTILINE)
     assert {'quadruped.yaml', 'quadruped_tuned.yaml'} < {file.name for file in tmp_path.iterdir()}

@@ -61,8 +61,9 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
 class Trial:
     """Runs that fall as the test says: undisturbed ones and pushes, with feedback and without."""
 
-    calm: dict = {}
-    after: dict = {}
+    calm: tuple = ()
+    after: tuple = ()
+    delays = 0.01, 0.02
 
     def __init__(self, robot, model, gait, kp, kd):
         pass
