@@ -250,8 +250,8 @@ class ClosedLoopBatch(BatchPhysics):
             scenarios: one a run.
             duration: s.
             gains: of the feedback; None for none.
-            expected: efference copy of the first gait, or of gaits by name; None for nothing
-                expected.
+            expected: efference copy of the first gait, or of gaits by name; None for those of
+                the robot file.
             noise: of the sensors.
             goal: way forward at which a run ends, m.
             observe: takes the measurements before each step, arrays (runs, ...) that the next

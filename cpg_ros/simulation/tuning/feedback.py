@@ -75,7 +75,7 @@ class Benefit:
         gait: its name.
         undisturbed: runs without a push that are survived without feedback (before) and with it
             (after).
-        falls: undisturbed runs that fall with feedback, and when, in words.
+        fell: when each undisturbed run fell with feedback, s, infinite without a fall.
         pushes: survived without feedback (before) and with it (after).
         delays: of the sensors, by turns from run to run, s.
 
@@ -83,7 +83,7 @@ class Benefit:
 
     gait: str
     undisturbed: Survivors
-    falls: tuple[str, ...]
+    fell: Sequence[float]
     pushes: Survivors
     delays: Sequence[float] = DELAYS
 
@@ -92,24 +92,19 @@ class Benefit:
         """Whether it fells no undisturbed robot, and significantly more pushes are survived."""
         return not self.undisturbed.lost and self.pushes.better
 
-    @property
-    def verdict(self) -> str:
-        """Whether feedback helps, and the reason if it does not."""
-        if self.undisturbed.lost:
-            return 'it fells the robot without a push'
-        if self.pushes.better:
-            return 'it helps'
-        if self.pushes.worse:
-            return 'it fells the robot after pushes'
-        return 'cannot tell whether it helps'
-
     def __str__(self) -> str:
         pushes, calm = self.pushes, self.undisturbed
-        return (f'{self.gait}: {self.verdict}: {pushes.after} of {pushes.runs} pushes survived '
+        verdict = ('it fells the robot without a push' if calm.lost else
+                   'it helps' if pushes.better else
+                   'it fells the robot after pushes' if pushes.worse else
+                   'cannot tell whether it helps')
+        late = [f'{1e3 * delay:.2g}' for delay in self.delays]
+        falls = ''.join(f'; run {k + 1}, sensors {late[k % len(late)]} ms late, falls after '
+                        f'{when:.1f} s' for k, when in enumerate(self.fell) if when < math.inf)
+        return (f'{self.gait}: {verdict}: {pushes.after} of {pushes.runs} pushes survived '
                 f'(without feedback {pushes.before}; {pushes.won} with it only, {pushes.lost} '
                 f'without it only), {calm.after} of {calm.runs} undisturbed runs (without '
-                f'{calm.before}{"".join(f"; {fall}" for fall in self.falls)}), sensors '
-                f'{" and ".join(f"{1e3 * delay:.2g}" for delay in self.delays)} ms late')
+                f'{calm.before}{falls}), sensors {" and ".join(late)} ms late')
 
 
 def evaluated_gaits(robot: Robot) -> list[str]:
@@ -226,7 +221,7 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
             calm = Survivors.of(np.isinf(before[gait][0]), np.isinf(fell))
             if calm.lost and first:
                 break
-            benefits.append(Benefit(gait, calm, _falls(fell, trial.delays), Survivors.of(
+            benefits.append(Benefit(gait, calm, fell.tolist(), Survivors.of(
                 before[gait][1], trial.survived(gains, pushed[gait])), trial.delays))
             if not benefits[-1].helps:
                 break
@@ -234,12 +229,6 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
             return replace(robot, feedback=replace(tried, made=_text(benefits))), benefits
         first = first or benefits
     return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
-
-
-def _falls(fell: np.ndarray, delays: Sequence[float]) -> tuple[str, ...]:
-    """Return which undisturbed runs fell, from their times and their sensors' delays in s."""
-    return tuple(f'run {k + 1}, sensors {1e3 * delays[k % len(delays)]:.2g} ms late, falls after '
-                 f'{fell[k]:.1f} s' for k in np.flatnonzero(np.isfinite(fell)))
 
 
 def _text(benefits: Sequence[Benefit]) -> str:

@@ -54,7 +54,7 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
     own = OwnFeedback(laws={'placement': False}, gains={'roll': 15.0, 'pitch': 11.0})
     monkeypatch.setattr(feedback, 'WITHOUT', ((), ('reflexes',)))
     robot, (one,) = evaluate_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
-    assert not one.helps and one.undisturbed.lost and one.verdict.startswith('it fells')
+    assert not one.helps and one.undisturbed.lost and ': it fells the robot without' in str(one)
     assert robot.feedback == replace(own, enabled=False, made=f'in simulation, {one}')
 
 
