@@ -61,16 +61,19 @@ def test_every_key_resolves_to_apt_on_ubuntu_24_04():
 
 @pytest.mark.parametrize('distro', ['', 'jazzy'])
 def test_the_build_takes_a_sourced_ros_as_it_is(distro, tmp_path):
-    (tmp_path / '.ci').mkdir()
+    """And the folder of the clone may have a space in its path."""
+    clone = tmp_path / 'a clone'
+    (clone / '.ci').mkdir(parents=True)
     for name in ('Makefile', 'package.xml', 'setup.py', 'setup.cfg', 'pyproject.toml',
                  '.ci/constraints.txt'):
-        shutil.copy2(SOURCE / name, tmp_path / name)
+        shutil.copy2(SOURCE / name, clone / name)
     variables = dict(os.environ, ROS_DISTRO=distro, AMENT_PREFIX_PATH='/opt/ros/jazzy')
-    told = subprocess.run(['make', '-n', 'build', 'shell'], cwd=tmp_path, env=variables,
+    told = subprocess.run(['make', '-n', 'build', 'shell'], cwd=clone, env=variables,
                           text=True, capture_output=True, check=False).stdout
     assert ('--system-site-packages' in told) == bool(distro)
     assert (' docs ros)' in told) != bool(distro)
     assert ('/install/cpg_ros:/opt/ros/jazzy' in told) == bool(distro)
+    assert f"export AMENT_PREFIX_PATH='{clone}/install/cpg_ros:" in told
 
 
 def test_config_launch_and_index_are_installed():

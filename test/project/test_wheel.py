@@ -67,4 +67,5 @@ def test_its_commands_find_what_it_brings(installed, tmp_path):
     assert 'generator' in run(installed / 'cpg', '--help', cwd=tmp_path)
     package, = installed.parent.glob('lib/python3*/site-packages/cpg_ros')
     assert (package / 'dynamics/integration/c/cpg.h').exists()
-    assert (package / 'ros/panel/page/index.html').exists()
+    assert {'index.html', 'three.LICENSE', 'uplot.LICENSE'} <= {
+        path.name for path in (package / 'ros/panel/page').iterdir()}

@@ -184,7 +184,7 @@ def _words(entry: Entry) -> str:
                      for name, value in entry.parameters.items())
 
 
-#: DISCOVERY: time for discovery before topics are listed, s.
+#: DISCOVERY: time without a new topic after which topics are listed, s.
 DISCOVERY = 1.0
 #: COUNT: time for which messages are counted, s; COUNT_PERIOD: period in which they are taken, s;
 #: DEPTH: most messages that wait until then.
@@ -198,9 +198,18 @@ class SilentTopic(CpgError):
 
 
 def topics(node: Node) -> dict[str, str]:
-    """Return the topics that have publishers or subscribers, and their types, sorted."""
-    time.sleep(DISCOVERY)
-    return {name: ' '.join(kinds) for name, kinds in sorted(node.get_topic_names_and_types())}
+    """Return the topics that have publishers or subscribers, and their types, sorted.
+
+    They are found one after another, slowly on a loaded machine: it waits until none has come for
+    ``DISCOVERY``.
+    """
+    found: list[tuple[str, list[str]]] = []
+    changed = time.monotonic()
+    while (now := time.monotonic()) < changed + DISCOVERY:
+        if (new := node.get_topic_names_and_types()) != found:
+            found, changed = new, now
+        time.sleep(0.02)
+    return {name: ' '.join(kinds) for name, kinds in sorted(found)}
 
 
 class Topic:

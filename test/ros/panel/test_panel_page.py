@@ -443,6 +443,35 @@ def test_missed_frames_leave_a_gap_and_speeds_are_averaged_over_a_stride(open_pa
     assert mean == [pytest.approx(0.3, abs=0.1), 0, 1]
 
 
+def test_shift_and_a_drag_on_the_robot_push_it(open_page):
+    page = open_page()
+    page.evaluate("panel.scene.preset('top')")
+    time.sleep(1.0)
+    x, y = page.evaluate("""() => {
+        const { scene } = panel, box = scene.canvas.getBoundingClientRect();
+        window.pushed = [];
+        scene.push = (...push) => window.pushed.push(push);
+        scene.pushable = true;  // as beside a simulation
+        const at = scene.robot.position.clone().project(scene.camera);
+        return [box.left + (1 + at.x) * box.width / 2, box.top + (1 - at.y) * box.height / 2];
+        }""")
+    page.keyboard.down('Shift')
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 50, y)  # seen from above with x down, to the left of the robot
+    assert page.evaluate('panel.scene.aim.visible')
+    page.mouse.up()
+    page.keyboard.up('Shift')
+    ((force, direction),) = page.evaluate('window.pushed')
+    assert 20.0 < force <= 300.0 and direction == pytest.approx(90.0, abs=10.0)
+    assert not page.evaluate('panel.scene.aim.visible')
+    before = page.evaluate('panel.scene.view')
+    page.mouse.down()
+    page.mouse.move(x, y)
+    page.mouse.up()
+    assert page.evaluate('panel.scene.view') != before  # without Shift it turns the camera
+
+
 def test_it_comes_back_after_the_panel_was_gone(rig, browser):
     domain = rig[0].domain
     panel, address = start_panel(domain, '-r', '__node:=second_panel')
