@@ -446,12 +446,15 @@ def test_missed_frames_leave_a_gap_and_speeds_are_averaged_over_a_stride(open_pa
 def test_shift_and_a_drag_on_the_robot_push_it(open_page):
     page = open_page()
     page.evaluate("panel.scene.preset('top')")
-    time.sleep(1.0)
+    until(lambda: page.evaluate(
+        'Math.abs(panel.scene.camera.matrixWorld.elements[14] - panel.scene.camera.position.z)'
+        ) < 1e-3, 'a picture from above')
     x, y = page.evaluate("""() => {
         const { scene } = panel, box = scene.canvas.getBoundingClientRect();
         window.pushed = [];
         scene.push = (...push) => window.pushed.push(push);
-        scene.pushable = true;  // as beside a simulation
+        // As beside a simulation.
+        Object.defineProperty(scene, 'pushable', { get: () => true, set() {} });
         const at = scene.robot.position.clone().project(scene.camera);
         return [box.left + (1 + at.x) * box.width / 2, box.top + (1 - at.y) * box.height / 2];
         }""")

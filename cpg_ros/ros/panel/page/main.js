@@ -237,9 +237,11 @@ setInterval(() => link.postMessage({}), 50);
 
 // Where a picture takes so long, ms, none is drawn while the robot is steered.
 const SLOW = 150;
+// Longest pause after a picture, ms.
+const LONGEST = 300;
 // A simulation that takes longer than this much of real time is said to be slow; measured over s.
 const REAL = 0.9, PACED = 4;
-let slowest = 0, ended = 0;
+let slowest = 0, ended = 0, spent = 0;
 const pauses = () => !!steering.held && slowest > SLOW;
 
 // Draw, and take note of how long that takes.
@@ -248,6 +250,7 @@ function timed(drawing) {
   drawing();
   link.postMessage({});
   ended = performance.now();
+  spent = Math.min(ended - began, LONGEST);
   slowest = Math.max(ended - began, 0.95 * slowest);
 }
 
@@ -255,7 +258,7 @@ function draw() {
   requestAnimationFrame(draw);
   scene.beat(performance.now());
   // Half of the time is for all else.
-  if (!fresh || pauses() || performance.now() - ended < slowest) return;
+  if (!fresh || pauses() || performance.now() - ended < spent) return;
   fresh = false;
   timed(picture);
 }
