@@ -1,6 +1,6 @@
 // The robot in three.js: its links, their shadow, the forces on its feet, and pushes.
 import { BasicShadowMap, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color,
-  CylinderGeometry, DirectionalLight, DoubleSide, Fog, GridHelper, Group, HemisphereLight, Matrix4,
+  CylinderGeometry, DirectionalLight, DoubleSide, Fog, Group, HemisphereLight, Matrix4,
   Mesh, MeshLambertMaterial, MeshStandardMaterial, OrbitControls, PCFShadowMap, PerspectiveCamera,
   Plane, PlaneGeometry, Quaternion, Raycaster, Scene as World, SphereGeometry, SRGBColorSpace,
   toCreasedNormals, Vector2, Vector3, WebGLRenderer } from './three.min.js';
@@ -12,6 +12,7 @@ const HARDEST = 300;       // hardest push, N
 const REACH = 0.6;         // length of the arrow of the hardest push, m
 const CREASE = 0.7;        // edges that bend by more stay sharp, rad
 const COARSE = 0.008;      // vertices closer than this are one where software draws, m
+const HALF = 30, STRIPE = 0.006;  // half the floor and half the width of a stripe on it, m
 const RADIANS = Math.PI / 180;
 // Presets of the camera: azimuth and elevation, degrees.
 const VIEWS = { quarter: [50, 18], front: [0, 10], side: [90, 8], top: [0.01, 89] };
@@ -50,6 +51,18 @@ function frame(object, place, [a, b, c, d, e, f, g, h, i]) {
   object.quaternion.setFromRotationMatrix(
     new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1));
   return object;
+}
+
+// Stripes every metre, as triangles: lines are a pixel wide, and software may leave them out.
+function grid() {
+  const corners = [], geometry = new BufferGeometry();
+  for (let k = -HALF; k <= HALF; k++)
+    for (const [x0, y0, x1, y1] of [[k - STRIPE, -HALF, k + STRIPE, HALF],
+      [-HALF, k - STRIPE, HALF, k + STRIPE]])
+      corners.push(x0, y0, 0, x1, y0, 0, x1, y1, 0, x0, y0, 0, x1, y1, 0, x0, y1, 0);
+  geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
+  geometry.computeVertexNormals();
+  return new Mesh(geometry, new MeshLambertMaterial());
 }
 
 // An arrow along z, 1 m long.
@@ -99,13 +112,15 @@ export class Scene {
     this.sun.shadow.radius = 5;
     this.sun.shadow.normalBias = 0.01;
     Object.assign(this.sun.shadow.camera, { left: -1.2, right: 1.2, top: 1.2, bottom: -1.2, far: 8 });
-    this.floor = new Mesh(new PlaneGeometry(60, 60), new MeshLambertMaterial({
+    this.floor = new Mesh(new PlaneGeometry(2 * HALF, 2 * HALF), new MeshLambertMaterial({
       polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }));  // below its grid
     this.floor.receiveShadow = true;
+    this.grid = grid();
+    this.grid.receiveShadow = true;
     this.aim = arrow();
     this.aim.visible = false;
     this.world.add(new HemisphereLight(0xffffff, 0x8899aa, 1.6), this.sun, this.sun.target,
-      this.floor, this.robot, this.aim);
+      this.floor, this.grid, this.robot, this.aim);
     this.paint();
   }
 
@@ -116,10 +131,7 @@ export class Scene {
     const colour = (name) => new Color(style.getPropertyValue(name).trim());
     this.world.background = this.world.fog.color = colour('--sky');
     this.floor.material.color = colour('--floor');
-    this.grid?.removeFromParent();
-    this.grid = new GridHelper(60, 60, colour('--floor-line'), colour('--floor-line'));
-    this.grid.rotateX(Math.PI / 2);
-    this.world.add(this.grid);
+    this.grid.material.color = colour('--floor-line');
     this.good = colour('--good');
     this.aim.tint.copy(colour('--b'));
   }
