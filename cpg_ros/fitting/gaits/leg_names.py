@@ -183,7 +183,8 @@ def legs_of(joints: Sequence[str]) -> Legs:
         if there:
             raise LegsError(_missing(there, labels, read, joints))
         raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
-                        'usually contain LF, RF, LH, RH, front_left ... or left, right')
+                        'usually contain LF, RF, LH, RH, front_left ... or left, right; a robot '
+                        'file (--robot) says which joint is whose')
     return Legs(legs, _explanation(legs, read, joints), _rest(legs, joints))
 
 

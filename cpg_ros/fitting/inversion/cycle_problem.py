@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone."""
+"""Least-squares problem of a gait's fit to a mean cycle, with the readouts eliminated."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -54,7 +54,7 @@ ERRORS = 4
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ReadoutFit(ShortRepr):
-    """The best readouts for some values.
+    """Readouts that fit best at some values of the free numbers.
 
     Attributes:
         orbit: of the gait.
@@ -72,12 +72,12 @@ class ReadoutFit(ShortRepr):
 
 @dataclass
 class Orbits:
-    """Orbits that fits of the same free parameters of a network share, by the parameters' values.
+    """Orbits by the values of the free parameters, shared by fits of the same parameters.
 
     Attributes:
-        solved: the last ones.
-        held: those that are kept as starts.
-        missing: why there is none.
+        solved: the latest orbits.
+        held: orbits that are kept as starts.
+        missing: reasons why there is no orbit.
 
     """
 
@@ -87,14 +87,16 @@ class Orbits:
 
 
 class CycleProblem:
-    """Values are those of the free numbers, then the phase of the orbit where theta is 0.
+    """Residuals of a fit and their derivatives, by its values.
 
-    The gait's duty, if it is free, is the last of the free numbers.
+    Values are the free numbers, the gait's duty last if it is free, then the phase of the orbit
+    where theta is 0.
 
     Attributes:
         joints, network, gait, free, order, readout: data and unknowns of the fit.
-        coordinates: in which a trust region moves.
-        sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
+        coordinates: coordinates of the trust region.
+        sizes: standard error of each joint's mean cycle by which residuals are divided, rad,
+            shape (joints,).
 
     """
 
@@ -130,16 +132,16 @@ class CycleProblem:
         self._placed: tuple[bytes, ReadoutFit] | None = None
 
     def duty(self, values: np.ndarray) -> float | None:
-        """Return the fraction of the stride that legs are to stand; None for what they do."""
+        """Return the duty factor that the fit applies; None for that of the cells."""
         return float(values[self._own]) if self._of_duty.any() else self.readout.duty
 
     @property
     def weights(self) -> int:
-        """Numbers that each joint's readout takes, with its offset."""
+        """Number of values of a joint's readout, with its offset."""
         return 1 + WEIGHTS[self.order]
 
     def begin(self, values: np.ndarray) -> None:
-        """Solve for an orbit from nothing, to start near, unless that has been done.
+        """Solve for a first orbit without one nearby, unless that has been done.
 
         Raises:
             NoOrbit: there is none, or none was found.
@@ -163,14 +165,14 @@ class CycleProblem:
         return solved[key]
 
     def hold(self, values: np.ndarray) -> None:
-        """Keep the orbit at these values as a start: it may be out of reach from later ones."""
+        """Keep the orbit at these values as a start, as Newton's method may not reach it later."""
         self._orbits.held[values[:self._own].tobytes()] = self._solve(values)
 
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
-        """Solve for an orbit, from the nearest one known, and for the signals of the joints.
+        """Solve for an orbit from the nearest known one; also return the signals of the joints.
 
         Raises:
-            NoOrbit: there is none that Newton's method reaches from there.
+            NoOrbit: Newton's method reaches none from there.
 
         """
         key = values[:self._own].tobytes()
@@ -202,7 +204,7 @@ class CycleProblem:
         return list(self._orbits.solved.values())[int(gaps.argmin())][0]
 
     def best_readouts(self, values: np.ndarray) -> ReadoutFit:
-        """Return the best readouts; raises NoOrbit as ``begin`` does."""
+        """Return the readouts that fit best; raise NoOrbit as ``begin`` does."""
         key = np.asarray(values).tobytes()
         if self._placed is None or self._placed[0] != key:
             orbit, seen = self._solve(values)
@@ -213,8 +215,8 @@ class CycleProblem:
     def by_waveform(self, values: np.ndarray) -> np.ndarray:
         """Return the derivative of the residual by errors of the waveforms, rad.
 
-        By the cosine and sine terms of the first ``ERRORS`` harmonics of every waveform, relative
-        to half its range, readouts staying the best; shape (m, joints, terms).
+        Errors are the cosine and sine terms of the first ``ERRORS`` harmonics of every waveform,
+        relative to half its range. Readouts are refitted. The shape is (m, joints, terms).
         """
         orbit, seen = self._solve(values)
         waves, count = len(seen.terms), min(ERRORS, seen.terms.shape[1] - 1) + 1
@@ -233,7 +235,7 @@ class CycleProblem:
             (self.joints.stated / self.sizes)**2))
 
     def left(self, values: np.ndarray) -> np.ndarray:
-        """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
+        """Return the RMS residual of each joint by its degrees of freedom, rad, (joints,)."""
         residual = self.best_readouts(values).residual
         return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - self.weights))
 
@@ -284,13 +286,10 @@ class CycleProblem:
         return other
 
     def weighted(self, columns: np.ndarray) -> np.ndarray:
-        """Divide what is given for each instant and joint by the sizes.
+        """Divide values of each instant and joint by the sizes; return shape (residuals, n).
 
         Args:
             columns: rad, shape (m, joints, n).
-
-        Returns:
-            An array of shape (residuals, n).
 
         """
         return (columns / self.sizes[:, None]).reshape(-1, columns.shape[-1])
@@ -307,22 +306,22 @@ class CycleProblem:
         return 0.5 * float(left @ left)
 
     def first_phase(self, values: np.ndarray) -> float:
-        """Guess the phase: of an even grid, the one whose readouts explain most."""
+        """Return the phase of an even grid whose readouts explain most."""
         return self.explained(values)[0]
 
     def explained(self, values: np.ndarray) -> tuple[float, float]:
-        """Return the phase of an even grid whose readouts explain most, and how much they do.
+        """Return the phase of an even grid whose readouts explain most, and what they explain.
 
-        As a sum of squares over the squares of the sizes, the mean of each joint included.
+        That is a sum of squares over the squares of the sizes, with the mean of each joint.
         """
         explained = self.explained_by(values).sum(axis=0)
         best = int(explained.argmax())
         return best / explained.size, float(explained[best])
 
     def explained_by(self, values: np.ndarray) -> np.ndarray:
-        """Return how much the readout of each joint explains at phases of an even grid.
+        """Return what the readout of each joint explains at phases of an even grid.
 
-        As a sum of squares over the square of its size, its mean included; shape (joints, m).
+        That is a sum of squares over the square of its size, with its mean; shape (joints, m).
         """
         orbit, seen = self._solve(values)
         phases = self._phases(orbit, seen, np.append(values[:-1], 0.0), self._members,

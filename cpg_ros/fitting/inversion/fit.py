@@ -14,11 +14,11 @@
 
 """Fits and their uncertainty: standard errors, intervals, undetermined numbers; the class Fit.
 
-The residual of a model that is not the truth is no noise: it is larger than the standard errors
-of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
-leaves where that is more, and variances are inflated by how far the residual is correlated along
-the cycle. A residual that noise does not explain widens the intervals: the model's waveforms are
-taken to be off by as much as explains it, and so are the numbers that such waveforms move.
+A wrong model leaves a residual that exceeds the standard errors of the mean cycle and is
+correlated along it. Therefore each joint is weighted by its residual where that is larger, and
+variances are multiplied by the residual's correlation length. Where noise does not explain the
+residual, the model's waveforms are assumed to be wrong by as much as explains it, which widens the
+intervals of the numbers that such errors move.
 """
 
 from dataclasses import dataclass, replace
@@ -58,7 +58,7 @@ class Estimate:
     """A fitted number.
 
     Attributes:
-        value: where the cost is least.
+        value: the number at the least cost.
         stderr: standard error; infinite where the data do not separate it from others.
         low, high: 95 % interval, within the bounds.
         bounded: whether the data bound it on both sides; where not, an end of the interval is
@@ -73,15 +73,15 @@ class Estimate:
     bounded: bool
 
     def together(self, other: 'Estimate') -> 'Estimate':
-        """Return this one with an interval that holds another's as well."""
+        """Return this estimate with an interval that includes another's."""
         return replace(self, low=min(self.low, other.low), high=max(self.high, other.high),
                        bounded=self.bounded and other.bounded)
 
 
 def correlation_length(residual: np.ndarray) -> float:
-    """Instants that share one independent residual, at least 1.
+    """Return the number of instants that share one independent residual, at least 1.
 
-    The integrated autocorrelation along the cycle, up to where it falls to zero.
+    It is the integrated autocorrelation along the cycle, up to its first zero.
 
     Args:
         residual: on even instants, over its size, shape (m, joints).
@@ -102,10 +102,10 @@ class Spread(ShortRepr):
 
     Attributes:
         covariance: shape (n, n), in the directions that are determined.
-        blind: directions that change nothing, one a row, each number in units of what it takes
-            to change the cost by itself, shape (directions, n).
-        scale: those units, shape (n,).
-        inflation: factor on all variances, which they have.
+        blind: directions that do not change the residual, one a row, in units of scale, shape
+            (directions, n).
+        scale: change of each number that by itself changes the residual by 1, shape (n,).
+        inflation: factor on all variances, which is included.
 
     """
 
@@ -134,7 +134,7 @@ class Spread(ShortRepr):
 
 
 def spread(jacobian: np.ndarray, inflation: float) -> Spread:
-    """Return the covariance that a weighted derivative gives.
+    """Return the covariance of the numbers of a fit from its derivatives.
 
     Args:
         jacobian: of the residual over its standard errors, shape (residuals, n).
@@ -174,9 +174,9 @@ class ModelError(ShortRepr):
 
 def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndarray,
                 noise: float) -> ModelError:
-    """Estimate the errors of the waveforms, independent and of one size, from the residual.
+    """Estimate the errors of the waveforms from the residual, as independent and of one size.
 
-    Only what the numbers and readouts do not absorb is seen of them; the rest moves the numbers.
+    The residual shows what numbers and readouts do not absorb; the rest moves the numbers.
 
     Args:
         residual: shape (residuals,).
@@ -205,10 +205,10 @@ def estimates(problem: CycleProblem, values: np.ndarray, uncertainty: Spread,
 
     Args:
         problem: the fit.
-        values: where its cost is least, shape (n,).
+        values: at the least cost, shape (n,).
         uncertainty: their covariance.
         model: errors of the model.
-        straight: whether costs are taken for quadratic however wide an interval is.
+        straight: whether the cost is assumed to be quadratic in wide intervals, too.
 
     """
     result, count = {}, len(problem.free)
@@ -230,18 +230,18 @@ def estimates(problem: CycleProblem, values: np.ndarray, uncertainty: Spread,
 
 def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int, half: float
          ) -> tuple[float, bool]:
-    """Follow the least cost for given values of number k to where it has risen enough.
+    """Find an end of an interval, where the least cost for a given number k has risen enough.
 
     Args:
         problem: the fit.
-        values: where its cost is least.
+        values: at the least cost.
         uncertainty: their covariance.
         k: index of the number.
-        half: distance to begin with, its sign that of the side.
+        half: first distance, negative for the lower end.
 
     Returns:
-        Number k there, and whether the cost has risen enough: not at a bound of the number, nor at
-        the edge of where there is an orbit.
+        Number k there, and whether the cost has risen enough; it has not at a bound of the number
+        or where orbits end.
 
     """
     limit = problem.free[k].high if half > 0.0 else problem.free[k].low
@@ -273,9 +273,9 @@ def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int,
 
 def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at: np.ndarray
            ) -> tuple[np.ndarray, float]:
-    """Return values of least cost with number k about at a target, and that cost; from values.
+    """Minimise the cost with number k near a target; return values and cost.
 
-    A residual of its own draws number k there, so that no step begins where there is no orbit.
+    An additional residual pulls number k there, so that no step starts where there is no orbit.
     """
     row = (np.arange(at.size) == k) / (DRAWN * CLOSE * abs(target - at[k]))
 
@@ -333,10 +333,10 @@ class Fit(ShortRepr):
         fractions: order of the readout -> mean RMS error over range with that order, the
             parameters kept.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
-        duty: fraction of the stride that legs are to stand; None for what the network's cells do.
-        stance: phase at which legs begin to stand by themselves, and for which fraction, as in a
-            robot file; None if they stand while their cells fall.
-        parameters: free number -> estimate; then those that were read off the legs' phases.
+        duty: fraction of the stride in stance; None for that of the network's cells.
+        stance: phase at which legs begin to stand without a duty, and the fraction, as in a robot
+            file; None if they stand while their cells fall.
+        parameters: free number -> estimate; then those that were read from the legs' phases.
         correlation: of the free numbers, in their order; nan where the data do not separate one
             from others.
         cells: joint -> the cell behind it, from 1.
@@ -346,13 +346,12 @@ class Fit(ShortRepr):
         errors: fitted minus recorded, rad, shape (joints, m).
         phase: of the orbit where theta is 0, cycles.
         cost: half the sum of squares of the errors over their sizes.
-        sizes: joint -> standard error of its mean cycle as far as it counts: the stated one,
-            or what the readout leaves if that is more, rad.
-        misfit: joint -> what the readout leaves, over the stated standard error of the mean.
-        sharing: instants that share one independent error.
+        sizes: joint -> standard error of its mean cycle, or its residual if that is larger, rad.
+        misfit: joint -> residual over the standard error of its mean cycle.
+        sharing: number of instants that share one independent error.
         model_error: RMS of the waveforms' errors that explain the residual, each harmonic over
             half the waveform's range; 0 where noise explains it, infinite if it is not known.
-        starts: what came of every start.
+        starts: result of each start.
         warnings: one line each.
 
     """
@@ -398,12 +397,12 @@ class Fit(ShortRepr):
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of the parameters that the starts began and ended with."""
+        """Names of the parameters that were fitted."""
         return tuple(self.parameters)[:len(self.correlation)]
 
     @property
     def minima(self) -> list[Minimisation]:
-        """Where the starts converged, each place once, the least cost first."""
+        """Distinct minima that the starts converged to, the least cost first."""
         minima: list[Minimisation] = []
         for trial in sorted(self.starts, key=lambda minimum: minimum.cost):
             if not minima or (trial.converged and all(

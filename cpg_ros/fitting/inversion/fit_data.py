@@ -72,7 +72,7 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
 
 def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray, rows: np.ndarray
             ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit bases to joints and differentiate the residual.
+    """Fit linear readouts of bases to joints, and differentiate the residual.
 
     Args:
         psi: bases, shape (bases, m, n).
@@ -110,7 +110,7 @@ SAMPLES = 2048
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Signals(ShortRepr):
-    """x of every waveform of a gait.
+    """Signals x of a gait's waveforms, as harmonics.
 
     Attributes:
         terms: complex, shape (waves, 1 + H).
@@ -123,7 +123,7 @@ class Signals(ShortRepr):
 
     def values(self, theta: np.ndarray, waves: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y and the derivative of y by phase in radians.
+        """Return x, y and the derivative of y by phase in radians.
 
         Args:
             theta: cycles, shape (places, m).
@@ -156,7 +156,7 @@ class Signals(ShortRepr):
 
 
 def _waves(theta: np.ndarray, count: int) -> np.ndarray:
-    """``exp(2 pi i k theta)``, shape (..., count)."""
+    """Return ``exp(2 pi i k theta)``, shape (..., count)."""
     waves = np.empty((*theta.shape, count), dtype=complex)
     waves[..., 0] = 1.0
     waves[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
@@ -177,7 +177,7 @@ def signals(orbit: Orbit, harmonics: int) -> Signals:
 
 
 def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the waveform over the peak of cell 1, which stays at phase 0."""
+    """Return the terms of a waveform over the peak of cell 1 at phase 0, and their slopes."""
     theta = np.arange(orbit.samples) / orbit.samples
     terms = np.fft.rfft(orbit.waveform(theta, 0, wave)) / theta.size
     slopes = np.fft.rfft(orbit.d_waveform(theta, wave), axis=0) / theta.size
@@ -189,7 +189,7 @@ def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndar
 
 
 def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first harmonics from -1 to 1; their ends move the middle and half the range."""
+    """Return the terms of a waveform's first harmonics, scaled to -1 to 1, and their slopes."""
     theta = np.arange(POINTS) / POINTS
     values = orbit.waveform(theta, 0, wave)
     pairs = smooth_terms(values, harmonics)

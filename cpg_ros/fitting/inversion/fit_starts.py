@@ -14,10 +14,9 @@
 
 """Default starts of a fit: the best of many values that cover the ranges.
 
-A cost may have several minima, as other parameters can produce similar waveforms with a free
-readout. Every candidate is judged by the residual of its best readouts, which takes an orbit and a
-linear fit; the smallest costs on the grid are starts of the trust region, beside the network's own
-values.
+A cost may have several minima, as other parameters can give similar waveforms with a free readout.
+The cost of each candidate takes an orbit and a linear fit of the readouts. The trust region starts
+from the smallest costs on the grid, and from the network's own values.
 """
 
 from contextlib import suppress

@@ -14,8 +14,9 @@
 
 """Free numbers of a fit, the trust region, and its coordinates: delays over the critical one.
 
-Near the onset of a gait its shape is the same all along the Hopf set, which is curved. With the
-delay over its critical value as a coordinate that valley is straight, and the onset a bound.
+Near its onset, the shape of a gait is the same along the Hopf set, which is curved. With the delay
+over its critical value as a coordinate, that valley of the cost is straight, and the onset is a
+bound.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -60,7 +61,7 @@ class Free:
     high: float
 
     def value(self, network: Network) -> float:
-        """Its value in a network."""
+        """Return its value in a network."""
         return float(getattr(network, self.members[0]))
 
 
@@ -204,8 +205,8 @@ ABOVE = 1e-7
 class Coordinates:
     """Free numbers of a fit, and the coordinates in which the trust region moves.
 
-    The phase, which comes last, and all numbers except a free delay are their own coordinates, and
-    so is a delay with bounds of its own.
+    All numbers and the phase, which comes last, are their own coordinates, except a free delay
+    without bounds of its own.
 
     Attributes:
         free: the free numbers.
@@ -273,7 +274,7 @@ class Coordinates:
         return self.values(np.clip(begin + np.linalg.solve(self.slopes(begin), step), low, high))
 
     def bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the coordinates."""
+        """Return the bounds of the coordinates."""
         low = np.array([*(one.low for one in self.free), -np.inf])
         high = np.array([*(one.high for one in self.free), np.inf])
         if not self.straight:
@@ -287,7 +288,7 @@ class Coordinates:
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100
                 ) -> Minimisation:
-        """Minimise from values with an orbit; as trust_region.minimise, but in coordinates.
+        """Minimise from values with an orbit, as ``minimise`` does, in the coordinates.
 
         Args:
             evaluate: the problem, in values.

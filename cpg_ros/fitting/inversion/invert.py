@@ -14,10 +14,9 @@
 
 """Parameters of a network, and joints' readouts, from the mean cycle of a recorded gait.
 
-Joints are read off the gait's exact orbit as the generator reads them; their readouts are
-eliminated, and a trust region moves the network's free numbers by exact derivatives. How fast the
-recording walks is no part of that, since the generator's frequency is free: the orbit's period
-counts only where a time scale is given.
+Joints are computed from the gait's exact orbit as the generator computes them. Their readouts are
+eliminated, and a trust-region method fits the network's free numbers by exact derivatives. The
+orbit's period is not fitted, as the generator's frequency is free.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -79,9 +78,9 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
         free: the free numbers.
         estimates: of them.
         spread: their covariance, and that of the phase.
-        model: what errors of the model add to it.
-        times: the residual over its standard errors.
-        best: the start that led to the fit.
+        model: errors of the model.
+        times: RMS residual over its standard error.
+        best: result of the start that led to the fit.
 
     """
     lines = []
@@ -174,18 +173,18 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         free: names of parameters to fit, or of groups of them; the usual ones by default.
             GAIT_DUTY is the fraction of the stride that legs stand.
         order: of the readouts, 1 to 3.
-        starts: free number -> value to start from; {} starts from the network's own values. By
-            default from these, and from the best of many values all over the ranges.
-        readout: how the generator reads the gait; by default legs stand as the cells do.
+        starts: free number -> initial value; {} for the network's own values. By default these,
+            and the best of a grid over the ranges.
+        readout: the generator's readout of the gait; by default legs stand as the cells do.
         bounds: free number -> lower and upper bound, where narrower than the range.
         orbits: of earlier fits of the same parameters, gait and readout.
-        straight: whether intervals are quadratic however wide they are, which is quicker.
-        loaded: whether the feet bore loads to which joints gave way: the model is then off by
-            nobody knows how much, and no parameter has an interval within its bounds.
-        done: called with the fraction of the work that is done, 0 to 1.
+        straight: whether the cost is assumed to be quadratic in wide intervals, too.
+        loaded: whether the feet bore loads to which joints gave way: the error of the model is
+            then unknown, and parameters have no intervals within their bounds.
+        done: called with the finished fraction, 0 to 1.
 
     Raises:
-        InputError: names, bounds or starts cannot be used.
+        InputError: names, bounds or starts are invalid.
         ValueError: shapes do not fit.
         NoOrbit: no start has such a gait; the message is that of the first.
 
@@ -218,7 +217,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
 def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
              numbers: tuple[Free, ...], order: int, readout: GaitReadout,
              orbits: Orbits | None) -> CycleProblem:
-    """Return what is to be solved, checked; arguments as of ``invert``."""
+    """Check the arguments, which are those of ``invert``, and return the problem."""
     if order not in WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
     taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
@@ -230,7 +229,7 @@ def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
 
 def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],
             done: Callable[[float], None]) -> list[Minimisation]:
-    """Go down from all starts; raise NoOrbit where none has an orbit."""
+    """Minimise from all starts; raise NoOrbit if none has an orbit."""
     begins = [np.append(_begin(problem, start), 0.0) for start in starts or ({},)]
     if not starts:
         begins = best_starts(problem, begins[0])
@@ -288,7 +287,7 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
 
 
 def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimisation:
-    """Go on from where a trial has been left, unless that is hopeless."""
+    """Continue a trial until it converges, unless its cost is far above the least."""
     if trial.converged or trial.why or (
             trial.cost > HOPELESS * least + PROMISING * trial.path[0, 0]):
         return trial
@@ -299,7 +298,7 @@ def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimi
 
 
 def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
-    """Weight the joints by their residuals, and fit again."""
+    """Weight the joints by their residuals and fit again, until the weights settle."""
     for last in range(WEIGHINGS):
         sizes = np.maximum(problem.joints.stated, problem.left(values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
@@ -310,18 +309,18 @@ def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
 
 
 def _as_good(problem: CycleProblem, values: np.ndarray) -> float:
-    """Return by how much more a cost is as good as that at values."""
+    """Return the difference of costs up to which another minimum is as good as values."""
     residual = problem.best_readouts(values).residual / problem.sizes
     return 0.5 * QUANTILE**2 * correlation_length(residual)
 
 
 def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minimisation]
                ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
-    """Return the values of the minimum that is meant, other minima, and those upside down.
+    """Return the values of the preferred minimum, other minima, and inverted ones.
 
-    With a free readout, the waveform of other parameters may be the same upside down. Of minima
-    that are as good as the best, it is the one whose joints move as in the robot file; without
-    one, legs stand for the larger part of the stride.
+    With a free readout, other parameters may give the same waveform upside down. Of minima that
+    are as good as the best, the one whose joints move as in the robot file is preferred; without
+    one, that with the largest duty.
     """
     def readouts(there: np.ndarray) -> np.ndarray:
         return problem.best_readouts(there).weights[1:3]
@@ -364,15 +363,15 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
 
 def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
                ) -> tuple[np.ndarray | None, str]:
-    """Return the best values that the generator runs, and why it rejects the very best, or ''.
+    """Return the best values that the generator runs, and why it rejects the best ones, or ''.
 
     Stability takes longer to assess than an orbit to solve for: it is assessed where the fit has
     ended, and if that is rejected, at as many places on the way there as a bisection takes.
 
     Args:
         problem: the fit.
-        by_cost: where it has ended, the best first.
-        way: the values from the start on, shape (steps, values).
+        by_cost: values of its minima, the best first.
+        way: values from the start to the best minimum, shape (steps, values).
 
     """
     def reason_at(values: np.ndarray) -> str:
@@ -406,7 +405,7 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
 
 def _estimates(problem: CycleProblem, values: np.ndarray, straight: bool
                ) -> tuple[dict[str, Estimate], Spread, ModelError]:
-    """Return the estimates at values, and what they are made from."""
+    """Return the estimates at values, their covariance, and the errors of the model."""
     left, slopes = problem(values)
     uncertainty = spread(slopes, correlation_length(
         problem.best_readouts(values).residual / problem.sizes))
@@ -417,9 +416,9 @@ def _estimates(problem: CycleProblem, values: np.ndarray, straight: bool
 
 def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping[str, Estimate],
                    uncertainty: Spread) -> list[str]:
-    """Name numbers beyond their intervals that fit as well if joints lag their cells.
+    """Warn of values beyond the intervals that fit as well if joints lag their cells.
 
-    The generator's do not; a free readout nearly hides it of those of other robots and animals.
+    The generator's joints do not. In other recordings, a free readout nearly hides such lags.
     """
     if not problem.kinds.any():
         return []
@@ -458,7 +457,7 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
 
 def _fit_at(problem: CycleProblem, trials: Sequence[Minimisation], others: Sequence[np.ndarray],
             values: np.ndarray, straight: bool, warnings: Sequence[str]) -> Fit:
-    """Return the fit at values, with its uncertainties."""
+    """Return the fit at values, with its intervals and warnings."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.best_readouts(values)
     estimated, spread, model = _estimates(problem, values, straight)

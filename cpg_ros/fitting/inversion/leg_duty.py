@@ -103,7 +103,7 @@ class OwnStance(NamedTuple):
 
 def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
                ) -> OwnStance:
-    """Return a leg's own stance, as motion.joint_readout.standing does.
+    """Return the stance of a leg without a duty, as motion.joint_readout.standing does.
 
     Args:
         seen: the gait's signals.

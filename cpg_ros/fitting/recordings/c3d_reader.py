@@ -17,6 +17,7 @@ of Open Source Software 6(58), 2911), which runs in a process of its own (see re
 """
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 import json
 import math
@@ -53,6 +54,8 @@ import numpy as np
 
 #: LARGEST: largest file, bytes; BLOCK: size of its first block, bytes.
 LARGEST, BLOCK = 1_000_000_000, 512
+#: PLUG_IN_GAIT: segments whose feet are looked for without others.
+PLUG_IN_GAIT = 'human_plug_in_gait'
 
 
 def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Sequence[str] = (),
@@ -74,13 +77,19 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
             or a joint has no angle.
 
     """
-    markers, angles, unit, events = _contents(Path(path))
+    markers, angles, unit, events, plates = _contents(Path(path))
     recording = (_modelled(markers, angles, unit, joints) if segments is None and angles else
                  joint_recording(markers, segments, joints))
-    if (loads := contacts(footfalls(events), recording.start, recording.times)) is None:
-        return recording
-    return replace(recording, loads=loads, notes=(*recording.notes, 'which foot is on the ground '
-                                                  "is taken from the file's events"))
+    body = load_segments(PLUG_IN_GAIT if segments is None else segments).named_as(markers.names)
+    feet = {leg: markers.points[:, [markers.names.index(name) for name in names]].mean(axis=1)
+            for leg, names in body.feet.items() if set(names) <= set(markers.names)}
+    for found, source in ((footfalls(events), "the file's events"),
+                          (plate_footfalls(1e-9 * markers.stamps, *plates, feet),
+                           'the force plates')):
+        if (loads := contacts(found, recording.start, recording.times)) is not None:
+            return replace(recording, loads=loads, notes=(
+                *recording.notes, f'which foot is on the ground is taken from {source}'))
+    return recording
 
 
 def _point(parameters: Any, first: int) -> dict[str, Any]:
@@ -102,10 +111,33 @@ def c3d_arrays(path: str) -> dict[str, Any]:
     """Return the parameters of points as JSON, points and residuals, from the library."""
     import ezc3d
     file: Any = ezc3d.c3d(path)
-    first = int(file['header']['points']['first_frame'])
-    return {'point': json.dumps(_point(file['parameters'], first)),
-            'points': np.asarray(file['data']['points'], float),
+    first, points = int(file['header']['points']['first_frame']), file['data']['points']
+    loads, corners = _plates(file['parameters'].get('FORCE_PLATFORM', {}),
+                             file['data']['analogs'][0], points.shape[2])
+    return {'point': json.dumps(_point(file['parameters'], first)), 'loads': loads,
+            'corners': corners, 'points': np.asarray(points, float),
             'residuals': np.asarray(file['data']['meta_points']['residuals'], float)[0]}
+
+
+def _plates(parameters: Any, analogs: np.ndarray, frames: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertical forces on plates, N, shape (plates, frames), and corners (plates, 4, 3).
+
+    Plates of types 1 and 2 have the vertical force in their third channel, those of type 3 in the
+    last four, and those of type 4 as the third row of a matrix gives it of six.
+    """
+    loads, corners = [], []
+    with suppress(LookupError, TypeError, ValueError):
+        for k, kind in enumerate(parameters['TYPE']['value']):
+            own = np.asarray(parameters['CHANNEL']['value'], int).T[k] - 1
+            vertical, weights = own[4:8] if kind == 3 else own[2:3], 1.0
+            if kind == 4:
+                vertical, weights = own[:6], np.asarray(
+                    parameters['CAL_MATRIX']['value'])[2, :6, k, None]
+            force = np.sum(weights * analogs[vertical], axis=0)
+            loads.append(force.reshape(frames, -1).mean(axis=1))
+            corners.append(np.asarray(parameters['CORNERS']['value'], float)[:, :, k].T)
+    count = len(corners)
+    return (np.reshape(loads[:count], (count, frames)), np.reshape(corners, (count, 4, 3)))
 
 
 #: STRIKE, OFF: events of a foot that lands, and of one that leaves the ground.
@@ -132,6 +164,62 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
     return falls
 
 
+#: LOADED: force on a plate, N, from which on a foot stands on it; BESIDE: largest distance of a
+#: foot from a plate that it stands on, over the plate's edge; BRIEF: shortest stance and swing, s;
+#: EVEN: largest ratio of the times between landings; LANDINGS: fewest of them.
+LOADED, BESIDE, BRIEF, EVEN, LANDINGS = 20.0, 0.1, 0.05, 1.6, 5
+
+
+def plate_footfalls(times: np.ndarray, loads: np.ndarray, corners: np.ndarray,
+                    feet: Mapping[str, np.ndarray]) -> list[Footfall]:
+    """Return when feet land on force plates and leave them.
+
+    The force on a plate is that of the foot above it, or of the lower one of two. Landings beside
+    the plates are not seen: only those count that follow one another left and right and evenly in
+    time, if both feet make a whole stride of them.
+
+    Args:
+        times: s, even, shape (n,).
+        loads: vertical forces on the plates, N, shape (plates, n).
+        corners: of the plates, in the unit of the places of feet, shape (plates, 4, 3).
+        feet: leg -> place of its foot, nan where missing, shape (n, 3).
+
+    """
+    from scipy.ndimage import binary_closing, binary_opening
+
+    if len(feet) != 2 or not len(loads):
+        return []
+    edges = corners[:, (1, 3)] - corners[:, :1]
+    upward = np.cross(edges[:, 0], edges[:, 1])
+    upward /= np.linalg.norm(upward, axis=1, keepdims=True)
+    above = []
+    for foot in feet.values():
+        along = foot - corners[:, :1]
+        inside = np.abs(np.einsum('pnx,pex->pen', along, edges)
+                        / np.sum(edges**2, axis=2)[..., None] - 0.5) <= 0.5 + BESIDE
+        above.append(np.where(inside.all(axis=1),
+                              np.abs(np.einsum('pnx,px->pn', along, upward)), np.inf))
+    width, stances = np.ones(max(1, round(BRIEF / float(np.median(np.diff(times)))))), []
+    for leg, own, other in zip(feet, above, above[::-1], strict=True):
+        down = ((np.abs(loads) > LOADED) & (own < other)).any(axis=0)
+        down = binary_opening(binary_closing(down, width), width)
+        changes = (np.flatnonzero(np.diff(down)) + 1)[int(down[0]):]
+        stances += [(float(times[first]), leg, float(times[end]))
+                    for first, end in zip(changes[::2], changes[1::2], strict=False)]
+    run: list[tuple[float, str, float]] = []
+    best = run
+    for stance in sorted(stances):
+        if run and run[-1][1] == stance[1]:
+            run = []
+        elif len(run) > 1 and not 1.0 / EVEN < (stance[0] - run[-1][0]) / (
+                run[-1][0] - run[-2][0]) < EVEN:
+            run = run[-1:]
+        run = [*run, stance]
+        best = max(best, run, key=len)
+    return [event for begin, leg, end in best for event in ((leg, begin, True), (leg, end, False))
+            ] if len(best) >= LANDINGS else []
+
+
 def c3d_markers(path: str | Path) -> Markers:
     """Read the points of a C3D file; points with a negative residual are missing.
 
@@ -145,8 +233,9 @@ def c3d_markers(path: str | Path) -> Markers:
     return _contents(Path(path))[0]
 
 
-def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
-    """Return points, names of angles, the angles' unit, '' if none, and events."""
+def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any],
+                                   tuple[np.ndarray, np.ndarray]]:
+    """Return points, names of angles, their unit, '' if none, events, and what plates measured."""
     stated = _stated(path)
     needed('ezc3d')
     try:
@@ -176,7 +265,8 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any]]:
     subjects = {name.rpartition(':')[2] for name in angles}
     return markers, [name for name, label in zip(names, labels, strict=True)
                    if label in angles or label.rpartition(':')[2] in subjects
-                   ], ''.join(units[:1]).strip(), point.get('EVENT', {})
+                   ], ''.join(units[:1]).strip(), point.get('EVENT', {}), (
+                       arrays['loads'], arrays['corners'])
 
 
 def _names(point: Mapping[str, Any], key: str) -> list[str]:
@@ -207,7 +297,7 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     if silent:
         notes.append(f'without a value, left out: {abbreviate(silent)}')
     return travelling(source, [names[k] for k in indices], unwrapped(first[:, indices]), notes,
-                      load_segments('human_plug_in_gait').named_as(points.names), points,
+                      load_segments(PLUG_IN_GAIT).named_as(points.names), points,
                       points.points)
 
 

@@ -360,8 +360,9 @@ class _Table:
                                        self._scale(header, unit, option, ANGLES)))
             else:
                 others.append(header)
-        positions = [replace(column, joint=match[match.lastindex or 0])
-                     for column in columns if (match := POSITION.match(column.joint))]
+        positions = [column for column in columns if UNNAMED.match(column.header)] or [
+            replace(column, joint=match[match.lastindex or 0])
+            for column in columns if (match := POSITION.match(column.joint))]
         named = {column.index: column for column in (*columns, *positions)}
         if joints:
             matches = []
@@ -397,8 +398,10 @@ class _Table:
             self.read += sum(map(len, lines))
             if self.commas:
                 lines = [line.replace(',', '.') for line in lines]
-            numbers, notes = number_rows(lines, self.needed, self.delimiter, self.path,
-                                         self.line + 1, cut=False, loads=loads, fixed=self.fixed)
+            numbers, notes = number_rows(
+                lines, self.needed, self.delimiter, self.path, self.line + 1, cut=False,
+                loads=loads, fixed=self.fixed,
+                dates=self.time.index if self.time.scale == 1.0 else -1)
             self.notes += notes
             whole = numbers[:, self.time.index] * self.time.scale
             rest = numbers[:, self.rest] if self.rest >= 0 else np.zeros(len(whole))

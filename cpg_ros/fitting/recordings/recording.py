@@ -440,8 +440,9 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
     return notes
 
 
-#: UNNAMED: name of a position by its index in the message: 'position[3]'.
-UNNAMED = re.compile(r'^(?:.*[./])?positions?\[(\d+)\]$')
+#: UNNAMED: name of a position by its index: 'position[3]', 'dof_pos_3', 'q_3'.
+UNNAMED = re.compile(r'^(?:.*[./])?(?:positions?\[\d+\]|(?:(?:dof|joint)_?pos(?:itions?)?|q)'
+                     r'_?(?:\d+|\[\d+\]))$', re.I)
 
 
 def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recording:

@@ -18,6 +18,7 @@ import codecs
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import csv
+from datetime import datetime, UTC
 import gzip
 import io
 import itertools
@@ -45,6 +46,15 @@ def number_in(cell: str) -> float | None:
         return None
 
 
+def seconds_of(date: str) -> float | None:
+    """Return the seconds since 1970 of a date of ISO 8601, UTC by default; None if it is none."""
+    try:
+        when = datetime.fromisoformat(date.strip())
+    except ValueError:
+        return None
+    return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
+
+
 def cells_of(line: str, delimiter: str | None, where: str) -> list[str]:
     """Return the cells of a line; the delimiter None is any white space.
 
@@ -64,7 +74,8 @@ def cells_of(line: str, delimiter: str | None, where: str) -> list[str]:
 
 def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | None, path: Path,
                 first: int, *, cut: bool = True, loads: Collection[int] = (),
-                fixed: Mapping[int, str] | None = None) -> tuple[np.ndarray, list[str]]:
+                fixed: Mapping[int, str] | None = None, dates: int = -1
+                ) -> tuple[np.ndarray, list[str]]:
     """Return the numbers of lines that are not blank, nan where a cell is empty, and notes.
 
     Args:
@@ -76,6 +87,7 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
         cut: drop a last line with fewer cells, as incompletely written.
         loads: columns of loads, which may be words.
         fixed: column -> text in all of its lines.
+        dates: column that may have dates, which become seconds; -1 for none.
 
     Returns:
         Numbers, shape (rows, columns), and a line for each kind of row that was dropped.
@@ -114,6 +126,8 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
                for cell, header in zip(cells, headers, strict=True)]
         for k in loads:
             row[k] = TRUTH.get(cells[k].strip().lower(), math.nan) if row[k] is None else row[k]
+        if dates >= 0 and row[dates] is None:
+            row[dates] = seconds_of(cells[dates])
         if None in row:
             k = row.index(None)
             raise RecordingError(f'{where}, column {headers[k]!r}: {cells[k].strip()[:40]!r} is '

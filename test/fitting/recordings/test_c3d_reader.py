@@ -79,6 +79,68 @@ def test_events_say_which_foot_is_on_the_ground(path, style):
     assert found.loads.loads[:, 1].tolist() == (t > 0.101).astype(float).tolist()
 
 
+def walk_over_plates(path, kind, missed=()):
+    """Write 7 s of a walk on two belts, 1 stride a second; return the feet's loads, N.
+
+    The left foot lands beside its belt in the seconds missed.
+    """
+    time = np.arange(700) / 100.0
+    file = ezc3d.c3d()
+    file['parameters']['POINT']['RATE']['value'] = [100]
+    file['parameters']['POINT']['LABELS']['value'] = list(LABELS)
+    file['parameters']['ANALOG']['RATE']['value'] = [200]
+    points = 1000.0 * places(angles(time)).transpose(2, 1, 0)
+    loads = []
+    for side, lead in (('L', 0.0), ('R', 0.5)):
+        down = (time + lead) % 1.0 < 0.6
+        for second in missed:
+            down &= ~((side == 'L') & (time.astype(int) == second))
+        loads.append(700.0 * down)
+        for name in ('HEE', 'TOE'):
+            row = points[:, LABELS.index(side + name)]
+            row[0], row[1] = 150.0 * (name == 'TOE'), 200.0 if side == 'L' else -200.0
+            row[2] = np.where(down, 0.0, 80.0)
+    wide = {1: 6, 2: 6, 3: 8, 4: 6}[kind]
+    analogs = np.zeros((1, 2 * wide, 1400))
+    for k, load in enumerate(loads):
+        vertical = slice(4, 8) if kind == 3 else slice(2, 3)
+        analogs[0, k * wide:(k + 1) * wide][vertical] = -np.repeat(load, 2) / (
+            4.0 if kind == 3 else 100.0 if kind == 4 else 1.0)
+    corners = np.array([[[x, y + across, 0.0] for x, across in (
+        (500.0, 300.0), (500.0, -100.0), (-500.0, -100.0), (-500.0, 300.0))]
+        for y in (100.0, -300.0)])
+    file.add_parameter('FORCE_PLATFORM', 'USED', [2])
+    file.add_parameter('FORCE_PLATFORM', 'TYPE', [kind, kind])
+    file.add_parameter('FORCE_PLATFORM', 'CORNERS', corners.transpose(2, 1, 0))
+    file.add_parameter('FORCE_PLATFORM', 'CHANNEL',
+                       1.0 + np.arange(2 * wide).reshape(2, wide).T)
+    file.add_parameter('FORCE_PLATFORM', 'CAL_MATRIX', np.repeat(
+        100.0 * np.eye(6)[..., None], 2, axis=2))
+    file['parameters']['ANALOG']['LABELS']['value'] = [f'A{k}' for k in range(2 * wide)]
+    file['data']['points'] = np.concatenate([points, np.ones_like(points[:1])])
+    file['data']['analogs'] = analogs
+    file.write(str(path))
+    return loads
+
+
+@pytest.mark.parametrize('kind', [1, 2, 3, 4])
+def test_force_plates_say_which_foot_is_on_the_ground(tmp_path, kind):
+    loads = walk_over_plates(tmp_path / 'belts.c3d', kind)
+    found = read_c3d(tmp_path / 'belts.c3d', 'human_plug_in_gait')
+    assert 'which foot is on the ground is taken from the force plates' in found.notes
+    assert found.loads.legs == ('left', 'right') and not found.loads.by_motion
+    assert found.loads.times[-1] - found.loads.times[0] >= 4.0
+    for column, load in zip(found.loads.loads.T, loads, strict=True):
+        expected = np.interp(found.loads.times, np.arange(700) / 100.0, load) > 20.0
+        assert np.array_equal(column > 0.0, expected)
+
+
+def test_feet_that_land_beside_plates_are_not_taken_for_lifted(tmp_path):
+    walk_over_plates(tmp_path / 'belts.c3d', 2, missed=(1, 3, 5))
+    found = read_c3d(tmp_path / 'belts.c3d', 'human_plug_in_gait')
+    assert not any('force plates' in note for note in found.notes)
+
+
 def test_a_cut_file_is_read_as_far_as_it_goes(path):
     data = path.read_bytes()
     path.write_bytes(data[:-20 * len(LABELS) * 16])

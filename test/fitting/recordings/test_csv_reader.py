@@ -193,6 +193,31 @@ def test_positions_without_names_are_those_of_a_robot_file(write):
         read_recording(path, robot_joints=['lf_hip', 'rf_hip', 'lh_hip'])
 
 
+@pytest.mark.parametrize('name', ['dof_pos_{}', 'joint_pos_{}', 'q{}', 'dof_pos[{}]'])
+def test_positions_numbered_by_a_simulator_are_those_of_a_robot_file(write, name):
+    path = write(f't,{name},{name},dof_vel_0\n'.format(0, 1) + rows(
+        lambda k, t, a, b: f'{0.004 * k:.3f},{a},{b},7'))
+    recording = read_recording(path, robot_joints=['lf_hip', 'rf_hip'])
+    assert recording.joints == ('lf_hip', 'rf_hip')
+    assert recording.positions == pytest.approx(ANGLES, abs=1e-6)
+    assert read_csv(path).joints == tuple(name.format(k) for k in (0, 1))
+
+
+@pytest.mark.parametrize(('begin', 'zone'), [('2026-11-29T19:34:07', 'Z'),
+                                            ('2026-11-29 19:34:07', ''),
+                                            ('2026-11-29T20:34:07', '+01:00')])
+def test_dates_are_times(write, begin, zone):
+    recording = read_csv(write('timestamp,lf_hip,rf_hip\n' + rows(
+        lambda k, t, a, b: f'{begin}.{4 * k:03d}{zone},{a},{b}')))
+    assert recording.times == pytest.approx(0.004 * np.arange(30), abs=1e-6)
+    assert recording.start == pytest.approx(1795980847.0, abs=1e-6)
+    assert recording.positions == pytest.approx(ANGLES, abs=1e-6)
+    # A date is a time, but no angle, and not in ms.
+    text = f't,knee\n0,1\n1,{begin}\n'
+    assert refused(write(text)) == f", line 3, column 'knee': {begin!r} is not a number"
+    assert 'is not a number' in refused(write(f't,knee\n{begin},1\n'), time='ms')
+
+
 def test_names_that_change_in_an_echo_are_refused_by_line(write):
     text = rows(lambda k, t, a, b: f'{stamp(t)},,{"lf,rf" if k < 9 else "rf,lf"},{a},{b}')
     assert refused(write(text)) == ", line 10: joint 'rf', where the first line has 'lf'"
