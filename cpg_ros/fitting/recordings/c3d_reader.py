@@ -129,7 +129,8 @@ def _plates(parameters: Any, analogs: np.ndarray, frames: int) -> tuple[np.ndarr
     with suppress(LookupError, TypeError, ValueError):
         for k, kind in enumerate(parameters['TYPE']['value']):
             own = np.asarray(parameters['CHANNEL']['value'], int).T[k] - 1
-            vertical, weights = own[4:8] if kind == 3 else own[2:3], 1.0
+            weights: Any = 1.0
+            vertical = own[4:8] if kind == 3 else own[2:3]
             if kind == 4:
                 vertical, weights = own[:6], np.asarray(
                     parameters['CAL_MATRIX']['value'])[2, :6, k, None]
