@@ -25,7 +25,8 @@ from dataclasses import dataclass
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.fitting.gaits.leg_names import legs_of, LegsError
-from cpg_ros.fitting.gaits.steady_stretch import FootLoadsLike, true_runs
+from cpg_ros.fitting.gaits.steady_stretch import true_runs
+from cpg_ros.fitting.recordings.recording import FootLoads
 import numpy as np
 
 #: LOADED: a foot is on the ground above this fraction of the span from its least to its largest
@@ -35,11 +36,10 @@ LOADED, ALWAYS = 0.15, 0.5
 LEAST, LARGEST = 5.0, 95.0
 #: BOUNCE: fraction of a stride below which a contact or a lift is a bounce and is ignored.
 BOUNCE = 0.08
-#: STRIDES: fewest strides from which the phase of touchdown is read.
-#: DISAGREE: largest mean fraction of strides that contradict the majority about stance or swing.
-#: POINTS: number of phases of the cycle at which stance is averaged over the strides.
-#: NEAR: width, in cycles, of the window that averages samples of similar phase.
-STRIDES, DISAGREE, POINTS, NEAR = 3.0, 0.15, 200, 0.02
+#: STRIDES: fewest strides from which the phase of touchdown is read; DISAGREE: largest mean
+#: distance of touchdowns from their median, cycles; LONG: shortest contact that counts, over the
+#: usual one.
+STRIDES, DISAGREE, LONG = 3, 0.12, 0.5
 #: FEWEST: smallest number of samples of a stride that tells stance from swing.
 FEWEST = 12
 #: WALK: fraction of the time in flight up to which a gait is a walk; RUN: fraction from which it
@@ -100,8 +100,7 @@ class FootContacts(ShortRepr):
               ) -> dict[str, float] | None:
         """Return by how much each leg touches down before the first, cycles.
 
-        Touchdown is where a leg begins to stand in most strides, so a stumble or a bouncing foot
-        has no effect.
+        It is the median over the strides, so a stumble or a bouncing foot has no effect.
 
         Args:
             phase: of the stride, cycles, at times, s.
@@ -111,23 +110,19 @@ class FootContacts(ShortRepr):
             None for too few strides, or if the strides disagree.
 
         """
-        cycles = phase(self.times)
-        if np.ptp(cycles) < STRIDES:
-            return None
-        point = (cycles % 1.0 * POINTS).astype(np.int64) % POINTS
-        grid = np.arange(POINTS) / POINTS
-        near = np.exp((np.cos(2.0 * np.pi * (grid[:, None] - grid)) - 1.0)
-                      / (2.0 * np.pi * NEAR)**2)
-        samples = near @ np.bincount(point, minlength=POINTS)
-        down = {}
+        landed = {}
         for leg in legs:
-            stood = near @ np.bincount(point, self.down[:, self.legs.index(leg)], POINTS)
-            at = _touchdown(stood / samples)
-            if at is not None:
-                down[leg] = at
-        if len(down) < len(legs):
-            return None
-        return {leg: (down[legs[0]] - touchdown) % 1.0 for leg, touchdown in down.items()}
+            begins, _, stances = self.strides(leg).T
+            if begins.size < STRIDES:
+                return None
+            # Of a foot that bounces, the begin of the longer contact counts.
+            own = phase(begins[stances > LONG * np.median(stances)])
+            middle = float(np.angle(np.exp(2j * np.pi * own).mean())) / (2.0 * np.pi)
+            off = (own - middle + 0.5) % 1.0 - 0.5
+            if np.abs(off - np.median(off)).mean() > DISAGREE:
+                return None
+            landed[leg] = middle + float(np.median(off))
+        return {leg: (landed[legs[0]] - own) % 1.0 for leg, own in landed.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
@@ -141,8 +136,8 @@ class FootContacts(ShortRepr):
 
 #: FALLS: downward acceleration over GRAVITY (m/s^2) from which on a body falls freely.
 #: NEVER, OFTEN: fractions of a stride of free fall up to which it walks, and from which on it
-#: runs. HARMONICS: number of harmonics of the body's height.
-FALLS, GRAVITY, NEVER, OFTEN, HARMONICS = 0.7, 9.81, 0.02, 0.1, 6
+#: runs. HARMONICS: number of harmonics of the body's height; POINTS: phases of its fall.
+FALLS, GRAVITY, NEVER, OFTEN, HARMONICS, POINTS = 0.7, 9.81, 0.02, 0.1, 6, 200
 
 
 def falling_fraction(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
@@ -164,24 +159,7 @@ def falling_fraction(phases: np.ndarray, height: np.ndarray, frequency: float) -
     return float(np.mean(downward > FALLS * GRAVITY))
 
 
-def _touchdown(stands: np.ndarray) -> float | None:
-    """Return the begin of the longest stance, cycles, or None if the strides disagree too much.
-
-    ``stands`` is the fraction of strides in which the leg stands at each phase, shape (POINTS,).
-    """
-    most = stands > 0.5
-    if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
-        return None
-    begins = np.flatnonzero(most & ~np.roll(most, 1))
-    ends = np.flatnonzero(~most & np.roll(most, 1))
-    long = (ends[np.searchsorted(ends, begins) % len(ends)] - begins) % len(most)
-    k = int(begins[np.argmax(long)])
-    # The touchdown is where the fraction crosses one half, by linear interpolation.
-    before, after = stands[k - 1], stands[k]
-    return float((k - (after - 0.5) / (after - before)) / len(most))
-
-
-def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end: float,
+def foot_contacts(loads: FootLoads, legs: Collection[str], begin: float, end: float,
                   period: float) -> FootContacts | None:
     """Find the feet's contacts between two times.
 

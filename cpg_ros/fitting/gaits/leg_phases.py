@@ -132,15 +132,6 @@ def _roles(joints: Sequence[str]) -> list[str]:
     return joints_of_role if all(joints_of_role) else []
 
 
-def _rotations(axis: str, angle: np.ndarray) -> np.ndarray:
-    """Return rotation matrices about an axis, shape (n, 3, 3)."""
-    i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
-    matrix = np.tile(np.eye(3), (angle.size, 1, 1))
-    matrix[:, i, i] = matrix[:, j, j] = np.cos(angle)
-    matrix[:, j, i], matrix[:, i, j] = np.sin(angle), -np.sin(angle)
-    return matrix
-
-
 def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
     """Return the position of a foot relative to the thorax, mm, shape (n, 3).
 
@@ -149,11 +140,13 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
         pair: f, m or h.
 
     """
-    turned, position = np.tile(np.eye(3), (angles[0].size, 1, 1)), np.zeros((angles[0].size, 3))
+    from scipy.spatial.transform import Rotation
+
+    turned, position = Rotation.identity(), np.zeros((angles[0].size, 3))
     for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
-        turned = turned @ _rotations(axis, angle)
+        turned = turned * Rotation.from_euler(axis, angle[:, None])
         if k in BEGINS:
-            position = position - LENGTHS[pair][BEGINS.index(k)] * turned[:, :, 2]
+            position -= LENGTHS[pair][BEGINS.index(k)] * turned.apply((0.0, 0.0, 1.0))
     return position
 
 

@@ -22,51 +22,8 @@ first.
 """
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
-
-# Interfaces of recordings for the analysis of gaits.
-
-class RecordingLike(Protocol):
-    """Interface of a recording; see Recording."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names."""
-
-    @property
-    def times(self) -> np.ndarray:
-        """Rising, s, shape (n,)."""
-
-    @property
-    def positions(self) -> np.ndarray:
-        """Angles in rad, nan where missing, shape (n, joints)."""
-
-    @property
-    def source(self) -> str:
-        """Name of the recording for messages."""
-
-
-class FootLoadsLike(Protocol):
-    """Interface of loads on the feet; see FootLoads."""
-
-    @property
-    def legs(self) -> tuple[str, ...]:
-        """Names."""
-
-    @property
-    def times(self) -> np.ndarray:
-        """Rising, s, shape (n,)."""
-
-    @property
-    def loads(self) -> np.ndarray:
-        """In any unit, shape (n, legs)."""
-
-    @property
-    def by_motion(self) -> bool:
-        """Whether contacts are estimated from the motion of the feet."""
-
 
 #: FASTEST: largest stride frequency that is searched for, Hz.
 FASTEST = 12.5

@@ -64,10 +64,9 @@ from cpg_ros.fitting.gaits.steady_stretch import (
     FEWEST,
     find_stretches,
     FINER,
-    FootLoadsLike,
-    RecordingLike,
     resample_evenly,
 )
+from cpg_ros.fitting.recordings.recording import FootLoads, Recording
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -86,7 +85,7 @@ class NoSteadyGait(CpgError):
     exit_code = 1
 
 
-def usable_joints(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
+def usable_joints(recording: Recording, legs: Mapping[str, Sequence[str]]
             ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
     """Return the legs' joints that have angles, their positions without spikes, and notes.
 
@@ -252,10 +251,10 @@ class Stride(ShortRepr):
                 f'{self.end:.6g} s, {len(self.joints)} joints')
 
 
-def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str]],
+def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
                 network: type[Network] | Network, cells: Mapping[str, int] | None = None,
                 gains: Mapping[str, complex] | None = None,
-                loads: FootLoadsLike | None = None, body: np.ndarray | None = None,
+                loads: FootLoads | None = None, body: np.ndarray | None = None,
                 known: str = '') -> Stride:
     """Find the steady gait of a recording.
 

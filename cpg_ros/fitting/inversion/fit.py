@@ -33,7 +33,7 @@ from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
 from cpg_ros.fitting.inversion.free_parameters import distinct, Minimisation
 from cpg_ros.networks.network import Network
 import numpy as np
-from scipy.special import stdtrit
+from scipy.special import chdtri, stdtrit
 
 #: QUANTILE: half the width of a 95 % interval, standard errors.
 QUANTILE = 1.959964
@@ -51,6 +51,10 @@ CURVED, STEPS, CLOSE, FURTHER, SHORT, NEGLIGIBLE = 0.05, 10, 0.03, 3.0, 0.2, 1e-
 TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 #: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
 EXPLAINED = 1.1
+#: CHANCE: probability that noise alone is taken for an error of the model; SHOWN: variance of the
+#: noise along a waveform's harmonics, over its mean, as readouts take a part of it and mean cycles
+#: have fewer harmonics than instants.
+CHANCE, SHOWN = 0.01, 1.5
 
 
 @dataclass(frozen=True)
@@ -188,9 +192,14 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
     size = np.linalg.norm(jacobian, axis=0)
     scaled = jacobian / np.where(size > 0.0, size, 1.0)
     absorbed = np.linalg.pinv(scaled, ZERO) @ by_waveform
-    seen = np.linalg.svd(by_waveform - scaled @ absorbed, compute_uv=False)**2
+    ways, seen, _ = np.linalg.svd(by_waveform - scaled @ absorbed, full_matrices=False)
+    ways, seen = ways[:, seen > ZERO * seen[0]], seen[seen > ZERO * seen[0]]**2
     excess = float(residual @ residual) - EXPLAINED**2 * noise
-    if excess <= 0.0 or seen.sum() <= 0.0:
+    shown, level = float(np.sum((residual @ ways)**2)), SHOWN * noise / residual.size
+    if shown > chdtri(seen.size, CHANCE) * level:
+        # In the few directions of such errors far less of them shows than in the whole residual.
+        excess = max(excess, shown - seen.size * level)
+    if excess <= 0.0 or not seen.size:
         return ModelError(0.0, np.zeros(size.size), QUANTILE)
     waveform = float(np.sqrt(excess / seen.sum()))
     # Errors of a model favour some harmonics: as of one direction fewer than are seen.

@@ -16,10 +16,10 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.motion.phase_readout import evaluate, POINTS, smooth_terms
 from cpg_ros.motion.readout import monomials
 from cpg_ros.motion.robot import Robot
@@ -212,26 +212,6 @@ def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.nda
 KNOWN = 1e-4
 
 
-class MeanCycle(Protocol):
-    """The mean cycle of a recording."""
-
-    @property
-    def joints(self) -> Sequence[str]:
-        """Names."""
-
-    @property
-    def theta(self) -> np.ndarray:
-        """Even grid over a cycle, shape (m,)."""
-
-    @property
-    def mean(self) -> np.ndarray:
-        """Joints, rad, shape (joints, m)."""
-
-    @property
-    def error(self) -> np.ndarray:
-        """Standard errors of the mean, rad, shape (joints, m)."""
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Joints(ShortRepr):
     """Joints over one cycle.
@@ -280,7 +260,7 @@ def cells_of(source: Robot | Mapping[str, Sequence[str]], network: type[Network]
     return {joint: legs[leg][0] for leg, joints in source.items() for joint in joints}
 
 
-def joints_of(cycle: MeanCycle, cells: Mapping[str, int], network: Network
+def joints_of(cycle: Stride, cells: Mapping[str, int], network: Network
               ) -> Joints:
     """Return the joints that cells drive.
 

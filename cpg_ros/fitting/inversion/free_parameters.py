@@ -172,15 +172,12 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
     """
     start = np.asarray(start, dtype=float)
     path: list[np.ndarray] = []
-    evaluations = 0
     try:
         size = evaluate(start)[0].size
     except NoOrbit as error:
         return Minimisation.without_orbit(start, error)
 
     def residual(values: np.ndarray) -> np.ndarray:
-        nonlocal evaluations
-        evaluations += 1
         try:
             return evaluate(values)[0]
         except NoOrbit:
@@ -194,7 +191,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
 
     result = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
                           ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
-    return Minimisation(start, result.x, float(result.cost), np.array(path), evaluations,
+    return Minimisation(start, result.x, float(result.cost), np.array(path), result.nfev,
                         result.status > 0)
 
 

@@ -25,7 +25,6 @@ from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.common.files import write_atomically
 from cpg_ros.common.yaml_reader import quoted, YamlReader
 from cpg_ros.fitting.gaits.quality_checks import CHANGE, SURE
-from cpg_ros.fitting.gaits.steady_stretch import RecordingLike
 from cpg_ros.fitting.gaits.stride import NoSteadyGait, Stride
 from cpg_ros.fitting.inversion.parameter_files import (
     check_plan,
@@ -56,7 +55,7 @@ import yaml
 FEWEST = int(SURE)
 
 
-def phase_change(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+def phase_change(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Stride
                  ) -> float | None:
     """Return when the phases of the legs change within a stretch, s, to about one stride.
 
@@ -86,7 +85,7 @@ def phase_change(recording: RecordingLike, legs: Mapping[str, Sequence[str]], st
     return float(np.interp(first + ends[best, 0], stride.warp.phases, stride.warp.knots))
 
 
-def _points(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+def _points(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Stride
             ) -> np.ndarray:
     """Return exp(2 pi i phase) of the legs against the first, shape (whole strides, legs - 1)."""
     warp, joints = stride.warp, list(recording.joints)

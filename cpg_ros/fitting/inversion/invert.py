@@ -25,6 +25,7 @@ from dataclasses import replace
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.cycle_problem import CycleProblem, Orbits
 from cpg_ros.fitting.inversion.fit import (
     correlation_length,
@@ -39,12 +40,7 @@ from cpg_ros.fitting.inversion.fit import (
     Spread,
     spread,
 )
-from cpg_ros.fitting.inversion.fit_data import (
-    Joints,
-    joints_of,
-    MeanCycle,
-    WEIGHTS,
-)
+from cpg_ros.fitting.inversion.fit_data import Joints, joints_of, WEIGHTS
 from cpg_ros.fitting.inversion.fit_starts import best_starts, upside_down
 from cpg_ros.fitting.inversion.free_parameters import (
     distinct,
@@ -156,7 +152,7 @@ WEIGHINGS, SAME = 4, 0.02
 HALVINGS = 6
 
 
-def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+def invert(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str,
            free: Sequence[str] = (), order: int = 3,
            starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
            bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -214,7 +210,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     return fit
 
 
-def _problem(cycle: MeanCycle, joints: Joints, network: Network, gait: str,
+def _problem(cycle: Stride, joints: Joints, network: Network, gait: str,
              numbers: tuple[Free, ...], order: int, readout: GaitReadout,
              orbits: Orbits | None) -> CycleProblem:
     """Check the arguments, which are those of ``invert``, and return the problem."""

@@ -27,7 +27,7 @@ from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.solve_orbit import solve_orbit
-from cpg_ros.fitting.inversion.fit_data import MeanCycle
+from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.free_parameters import (
     free_numbers,
     Minimisation,
@@ -182,7 +182,7 @@ def refuse_others(robot: Robot | None, network: str) -> None:
                          f'{Delayed.name} network: a --robot file has to say which, such as goat')
 
 
-def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+def paper_fits(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str,
                free: Sequence[str], starts: Sequence[Mapping[str, float]] = ({},)
                ) -> list[PaperFit]:
     """Fit parameters to eight joints, once from each start.

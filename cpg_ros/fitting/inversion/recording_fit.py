@@ -25,7 +25,7 @@ from cpg_ros.fitting.gaits.leg_phases import PhaseScatter
 from cpg_ros.fitting.gaits.stride import FEW_CYCLES, find_stride, NoSteadyGait, Stride
 from cpg_ros.fitting.inversion.cycle_problem import Orbits
 from cpg_ros.fitting.inversion.fit import Estimate, Fit
-from cpg_ros.fitting.inversion.fit_data import cells_of, MeanCycle
+from cpg_ros.fitting.inversion.fit_data import cells_of
 from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY, GaitReadout
 from cpg_ros.fitting.recordings.recording import (
@@ -70,7 +70,7 @@ def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, floa
         yield (name,), order, (), f'fitted with {name} free alone'
 
 
-def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+def fit_with_fallbacks(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str,
                        free: Sequence[str] = (), order: int = 3,
                        starts: Sequence[Mapping[str, float]] = (),
                        readout: GaitReadout | None = None, loaded: bool = False,
@@ -150,7 +150,7 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
         'the network do, and the intervals hold for that alone',)
 
 
-def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str, order: int,
+def _as_it_is(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str, order: int,
               readout: GaitReadout, done: Callable[[float], None]) -> Fit:
     """Fit the readouts alone; all parameters of the network keep their values."""
     name = next(iter(network.parameters()))

@@ -34,9 +34,9 @@ from cpg_ros.fitting.gaits.foot_contacts import FootContacts
 from cpg_ros.fitting.gaits.leg_names import role_of
 from cpg_ros.fitting.gaits.mean_cycle import evaluate_coefficients
 from cpg_ros.fitting.gaits.quality_checks import TRAVELS
-from cpg_ros.fitting.gaits.steady_stretch import RecordingLike
 from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.recording_fit import RecordingFit
+from cpg_ros.fitting.recordings.recording import Recording
 import numpy as np
 
 #: PROXIMAL: words of joints that swing a leg; then the words of joints below, which bend it.
@@ -95,7 +95,7 @@ class LegStrides(ShortRepr):
         return self.retractions / self.periods
 
 
-def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], stride: Stride
+def leg_strides(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Stride
                 ) -> list[LegStrides]:
     """Find the strides of every leg within the steady stretch of a recording.
 

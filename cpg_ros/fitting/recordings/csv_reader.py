@@ -42,12 +42,15 @@ from cpg_ros.fitting.recordings.recording import (
 from cpg_ros.fitting.recordings.tables import (
     cells_of,
     EMPTY,
+    Meaning,
     MOST_LINES,
     number_in,
     number_rows,
     opened,
     PREAMBLE,
     preamble,
+    seconds_of,
+    TRUTH,
 )
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
@@ -394,14 +397,16 @@ class _Table:
         places = [column.index for column in self.columns]
         scales = np.array([column.scale for column in self.columns])
         loads = [column.index for column in self.loads]
+        words: dict[int, Meaning] = dict.fromkeys(
+            loads, lambda word: TRUTH.get(word.lower(), np.nan))
+        if self.time.scale == 1.0:
+            words[self.time.index] = seconds_of
         while lines := list(islice(self.lines, LINES)):
             self.read += sum(map(len, lines))
             if self.commas:
                 lines = [line.replace(',', '.') for line in lines]
-            numbers, notes = number_rows(
-                lines, self.needed, self.delimiter, self.path, self.line + 1, cut=False,
-                loads=loads, fixed=self.fixed,
-                dates=self.time.index if self.time.scale == 1.0 else -1)
+            numbers, notes = number_rows(lines, self.needed, self.delimiter, self.path,
+                                         self.line + 1, cut=False, words=words, fixed=self.fixed)
             self.notes += notes
             whole = numbers[:, self.time.index] * self.time.scale
             rest = numbers[:, self.rest] if self.rest >= 0 else np.zeros(len(whole))

@@ -15,7 +15,7 @@
 """Text tables: rows of numbers, limits of unpacked size, stamps of frames, preambles."""
 
 import codecs
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 import csv
 from datetime import datetime, UTC
@@ -36,6 +36,8 @@ import numpy as np
 
 #: TRUTH: word for a contact -> its number.
 TRUTH = {'true': 1.0, 'false': 0.0}
+#: What the words of a column count as; None for no number.
+Meaning = Callable[[str], float | None]
 
 
 def number_in(cell: str) -> float | None:
@@ -49,7 +51,7 @@ def number_in(cell: str) -> float | None:
 def seconds_of(date: str) -> float | None:
     """Return the seconds since 1970 of a date of ISO 8601, UTC by default; None if it is none."""
     try:
-        when = datetime.fromisoformat(date.strip())
+        when = datetime.fromisoformat(date)
     except ValueError:
         return None
     return (when if when.tzinfo else when.replace(tzinfo=UTC)).timestamp()
@@ -73,9 +75,9 @@ def cells_of(line: str, delimiter: str | None, where: str) -> list[str]:
 
 
 def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | None, path: Path,
-                first: int, *, cut: bool = True, loads: Collection[int] = (),
-                fixed: Mapping[int, str] | None = None, dates: int = -1
-                ) -> tuple[np.ndarray, list[str]]:
+                first: int, *, cut: bool = True,
+                words: Mapping[int, Meaning] | None = None,
+                fixed: Mapping[int, str] | None = None) -> tuple[np.ndarray, list[str]]:
     """Return the numbers of lines that are not blank, nan where a cell is empty, and notes.
 
     Args:
@@ -85,9 +87,8 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
         path: for messages.
         first: number of the first line, counted from 1.
         cut: drop a last line with fewer cells, as incompletely written.
-        loads: columns of loads, which may be words.
+        words: column -> what its words mean, such as dates.
         fixed: column -> text in all of its lines.
-        dates: column that may have dates, which become seconds; -1 for none.
 
     Returns:
         Numbers, shape (rows, columns), and a line for each kind of row that was dropped.
@@ -124,10 +125,8 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
                                      f'{text!r}')
         row = [number_in(cell) if header else math.nan
                for cell, header in zip(cells, headers, strict=True)]
-        for k in loads:
-            row[k] = TRUTH.get(cells[k].strip().lower(), math.nan) if row[k] is None else row[k]
-        if dates >= 0 and row[dates] is None:
-            row[dates] = seconds_of(cells[dates])
+        for k, meaning in (words or {}).items():
+            row[k] = meaning(cells[k].strip()) if row[k] is None else row[k]
         if None in row:
             k = row.index(None)
             raise RecordingError(f'{where}, column {headers[k]!r}: {cells[k].strip()[:40]!r} is '

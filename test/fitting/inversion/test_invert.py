@@ -114,6 +114,21 @@ def test_the_error_of_another_readout_is_in_the_intervals(name, gait):
             assert found.low <= truth_of(preset.network, one) <= found.high
 
 
+@pytest.mark.parametrize('gait', ['bound', 'trot'])
+def test_a_waveform_that_is_off_by_less_than_the_noise_widens_the_intervals(gait):
+    preset = PRESETS['delayed'][gait]
+    orbit, cells = solve_preset(preset), (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)
+    for seed in (31, 32):
+        recording, assigned = record(orbit, cells, weights_of(12, 3, seed),
+                                     np.random.default_rng(seed), noise=0.01, jitter=0.0,
+                                     dropouts=0.0, angles=plain_readout)
+        fit = invert(recording, assigned, preset.network, gait)
+        misfit = np.sqrt(np.mean(np.square(list(fit.misfit.values()))))
+        assert misfit < 1.2 and fit.model_error > 0.0
+        for one, found in fit.parameters.items():
+            assert found.low <= truth_of(preset.network, one) <= found.high
+
+
 def test_readouts_of_another_order_do_not_make_a_sharp_number():
     for seed in range(4):
         recording, cells = trot(seed)
