@@ -28,6 +28,7 @@ from types import ModuleType
 from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
+from cpg_ros.common.errors import InputError
 from cpg_ros.motion.description import SERVOS
 from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan_gait, PlanError
 from cpg_ros.motion.robot import Motion, Robot, SteeringTable
@@ -402,9 +403,13 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         designs.append(result)
     if not designs:
         raise NoDesign('; '.join(missing))
-    # Feedback needs the efference copies, too.
-    measured = [design.gait for design in designs]
-    robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
+    robot = replace(robot, motions=motions)
+    for design in designs:
+        try:
+            # Feedback needs the efference copies, too.
+            robot = calibrated(robot, model, [design.gait], kp=kp, kd=kd)
+        except InputError as error:
+            say(str(error))
     return robot, designs, missing
 
 
