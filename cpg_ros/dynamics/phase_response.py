@@ -22,7 +22,7 @@ Kurths, *Synchronization*, ch. 7), and white noise makes it diffuse.
 
 from dataclasses import dataclass
 
-from cpg_ros.common.errors import InputError, ShortRepr
+from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.orbit import Orbit, Waveforms
 from cpg_ros.dynamics.orbit_method import orbit_method
 import numpy as np
@@ -83,22 +83,18 @@ def _over_a_cycle(response: PhaseResponse) -> np.ndarray:
     return response(np.arange(POINTS) / POINTS * response.orbit.period)
 
 
-def locking(response: PhaseResponse, periods: int = 1) -> np.ndarray:
+def locking(response: PhaseResponse) -> np.ndarray:
     """Return the half-width of the range in which a sinusoidal input locks a gait.
 
     Args:
         response: of the gait.
-        periods: of the input in a cycle of the gait.
 
     Returns:
         Range of the gait's frequency, cycles per model time, for an input of amplitude 1 to the
             rate of each variable, shape (cells, variables); proportional to the amplitude.
 
     """
-    if not 1 <= periods < POINTS // 2:
-        raise InputError(f'{periods} periods of the input in a cycle: there must be at least 1')
-    terms = np.fft.rfft(_over_a_cycle(response), axis=0)[periods] / POINTS
-    return np.asarray(np.abs(terms))
+    return np.asarray(np.abs(np.fft.rfft(_over_a_cycle(response), axis=0)[1]) / POINTS)
 
 
 def phase_diffusion(response: PhaseResponse, noise: float) -> float:

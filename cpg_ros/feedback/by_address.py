@@ -28,11 +28,12 @@ from cpg_ros.feedback.closed_loop import (
     close,
     DT,
     finish,
+    FOOT_CONTACTS,
     Instant,
     LoopData,
-    warm_up_senses,
+    Senses,
 )
-from cpg_ros.feedback.estimate import Odometry
+from cpg_ros.feedback.estimate import Odometry, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.kinematics import Geometry, LegArrays
 from cpg_ros.motion.robot import Robot
@@ -104,23 +105,26 @@ def memory_of(value: Any) -> Any:
     return kinds[type(value)](value)
 
 
+def _inputs(legs: int, joints: int) -> tuple[Senses, SensorData]:
+    """Return the inputs of a robot that has sent nothing."""
+    return (Senses.empty(legs, np.zeros((3, joints)), np.zeros(4), 1.0, FOOT_CONTACTS),
+            SensorData.zeros(1, legs, joints))
+
+
 def warm_up_balance(robot: Robot) -> None:
     """Compile what a generator uses of a robot with soles."""
     feedback = BipedFeedback(robot)
     pattern = BalancedPattern(feedback.plan)
     pattern.prepare(feedback)
-    senses, sensors = warm_up_senses(len(robot.legs), len(feedback.order))
     nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)
-    balancing_function((senses, sensors, nothing, np.zeros(2), feedback.biped.servos.rows,
-                        pattern.watch, feedback.biped))
+    balancing_function((*_inputs(len(robot.legs), len(feedback.order)), nothing, np.zeros(2),
+                        feedback.biped.servos.rows, pattern.watch, feedback.biped))
 
 
 def warm_up(geometry: Geometry, joints: int) -> None:
     """Compile what a generator uses; joints is their number."""
-    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
-    senses, sensors = warm_up_senses(legs, joints)
-    angles = np.zeros(joints)
-    loop = LoopData.of(feedback, senses, sensors, Instant.empty(legs, np.zeros(1)), angles, angles,
-                       Odometry.begin(), angles)
+    legs, angles = len(geometry.hips), np.zeros(joints)
+    loop = LoopData.of(Feedback(geometry, joints=joints), *_inputs(legs, joints),
+                       Instant.empty(legs, np.zeros(1)), angles, angles, Odometry.begin(), angles)
     closing_function(loop)
     finishing_function(loop)

@@ -365,12 +365,3 @@ def finish(loop):
     if loop.gains.virtual_stiffness:
         virtual_stiffness.stretch(loop.sent, sensors.joint_positions, memory.stiff, loop.gains,
                                   loop.senses.limits)
-
-
-def warm_up_senses(legs: int, joints: int) -> tuple[Senses, SensorData]:
-    """Run the checks of messages once, for numbers of legs and joints; return the arguments."""
-    senses, sensors = (Senses.empty(legs, np.zeros((3, joints)), np.zeros(4), 1.0, FOOT_CONTACTS),
-                       SensorData.zeros(1, legs, joints))
-    nothing = LegArrays(np.zeros((0, 1)), np.zeros((0, 3), dtype=np.int64), 0.0, 1.0)
-    check_inputs(senses, sensors, nothing, 0.0, False)
-    return senses, sensors

@@ -70,7 +70,6 @@ def test_a_gait_is_locked_up_to_the_edge_of_the_tongue():
 def test_the_range_of_locking_of_oscillators_is_the_closed_one():
     response = phase_response(solved_walk(LEGS))
     assert locking(response) == pytest.approx(np.full((2, 2), 0.5 * SIZE), rel=1e-8)
-    assert np.abs(locking(response, 2)).max() < 1e-10
 
 
 def simulated_diffusion(orbit, noise, *, runs=256, cycles=40, lock=None, seed=0):

@@ -198,7 +198,8 @@ def test_it_survives_pushes_by_placing_its_feet(number):
     commands = ((1.0, 0.3, 0.0, 0.0),)
     assert math.isinf(runner().run(11.0, commands, (push,), seed=number).fell)
     robot = runner().robot
-    fixed = BipedFeedback(robot, BipedGains.of({'place_x': 0.0, 'place_y': 0.0}))
+    fixed = BipedFeedback(robot)
+    fixed.set_gains('walk', BipedGains.of({'place_x': 0.0, 'place_y': 0.0}))
     assert math.isfinite(runner().run(11.0, commands, (push,), fixed, number).fell)
 
 

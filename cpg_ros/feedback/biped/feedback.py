@@ -72,19 +72,16 @@ class BipedFeedback:
         memory: gains.LAWS: state of the laws.
         pose: of the links.
         arms: targets of the joints that belong to no leg.
-        command: speeds forward and left, m/s, and yaw rate, rad/s, requested of the gait in force.
         order: names of the joints in the order of the sensors and links.
         runners: the network in each place among the gaits, None where there is none.
 
     """
 
-    def __init__(self, robot: Robot, gains: BipedGains | None = None,
-                 plan: GaitPlan | None = None) -> None:
+    def __init__(self, robot: Robot, plan: GaitPlan | None = None) -> None:
         """Prepare to stand.
 
         Args:
             robot: whose robot file has the part ``biped``.
-            gains: of the laws in the plan's gait; the robot file's if not given.
             plan: gait whose orbit is the clock; the walk of the robot's first network if not
                 given.
 
@@ -108,18 +105,16 @@ class BipedFeedback:
         kp, effort = np.array([(body.links[name].kp, body.links[name].effort)
                                for name in robot.order]).T.copy()
         servos = ServoArrays(rows, np.array([chained.index(row) for row in rows]), kp, effort,
-                        *np.zeros((2, len(rows))))
+                             *np.zeros((2, len(rows))))
         state, gaits = (np.zeros(size, kind).view(np.recarray)
                         for size, kind in ((1, STATE), (SLOTS, GAIT)))
         self.biped = BipedArrays(links, gaits, Arms.of(robot, SLOTS), servos,
-                           addresses('cpg_track_advance', 'cpg_track_reseed'),
-                           BipedMemory.empty(links), np.zeros((2, 3)), state)
-        self.state, self.arms, self.command = state[0], self.biped.arms, self.biped.velocities[1]
+                                 addresses('cpg_track_advance', 'cpg_track_reseed'),
+                                 BipedMemory.empty(links), np.zeros((2, 3)), state)
+        self.state, self.arms = state[0], self.biped.arms
         self.pose, self.memory = self.biped.memory.pose, self.biped.memory.laws[0]
         self.runners: list[GaitRunner | None] = [None] * SLOTS
         self._put(STOPPING, GaitRunner(walk, 0.0))
-        if gains is not None:
-            self._gains[plan.gait] = gains._replace(frequency=plan.frequency)
         self._put(STOPPING + 1, GaitRunner(plan, 0.0))
         self.state.gait = self.state.goal = self.state.requested = STOPPING + 1
         self._advance: Callable | None = None
