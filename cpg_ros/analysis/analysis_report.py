@@ -213,26 +213,25 @@ class Analysis(ShortRepr):
             'symmetry lock per model time):'] + [
                 f'  {line}' for line in table(rows, '<>>' + '>' * len(names) + '>>>>>>')]
         if not self.existing:
-            lines = ['No gait at these parameters.']
+            lines = ['No gait was found at these parameters.']
         lines += [f'  {orbit.gait}: the multiplier along the orbit comes out as '
                   f'{abs(orbit.multipliers.trivial):.6g} instead of 1; the others are no better'
                   for whole in self.existing for orbit in whole.orbits
                   if orbit.multipliers.error > UNSURE]
         missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
-        return lines + [f'  no {verdict.gait}: {self._reason(verdict)}' for verdict in missing]
+        return lines + [f'  {self._reason(verdict)}' for verdict in missing]
 
     @staticmethod
     def _reason(verdict: GaitAssessment) -> str:
-        """Return why a gait does not exist, without the list of all parameters."""
-        text = verdict.why.removeprefix(f'no {verdict.gait} ')
-        head, found, rest = text.partition(' of the way, to ')
-        return f'{head} of the way, no further{rest.partition("no further")[2]}' if found else text
+        """Return why a gait does not exist or was not found, as a sentence."""
+        subject = f'no {verdict.gait}'
+        return verdict.why if verdict.why.startswith(subject) else f'{subject}: {verdict.why}'
 
     def _conclusion(self) -> str:
         """Return a summary in a sentence or two."""
         if not self.existing:
             nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
-            return f'This set gives no gait{nearest}.'
+            return f'No gait was found at these parameters{nearest}.'
         by_itself, locked, unsure, never, text = [], [], [], [], []
         for verdict in self.existing:
             if stable := [orbit for orbit in verdict.orbits if orbit.stable]:

@@ -50,6 +50,9 @@ from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network, ParameterLine
 import numpy as np
 
+#: Fraction of its terms below which a cubic coefficient is 0.
+VANISHES = 1e-10
+
 
 @dataclass(frozen=True)
 class NormalForm:
@@ -58,16 +61,18 @@ class NormalForm:
     Attributes:
         k1: derivative of the critical eigenvalue by the parameter.
         k2: cubic coefficient.
+        size: sum of the moduli of all terms of k2.
 
     """
 
     k1: complex
     k2: complex
+    size: float = 0.0
 
     @property
     def degenerate(self) -> bool:
-        """Whether the cubic coefficient vanishes, Re k2 = 0."""
-        return self.k2.real == 0.0
+        """Whether the cubic coefficient vanishes, Re k2 = 0, up to rounding."""
+        return abs(self.k2.real) <= VANISHES * self.size
 
     @property
     def supercritical(self) -> bool:
@@ -185,13 +190,14 @@ class HopfPoint(ShortRepr):
         still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
         double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
         ahead = expansion.inputs(q, chi, axis)
-        back, form = ahead.conj(), expansion.multilinear
+        back, form, bound = ahead.conj(), expansion.multilinear, expansion.bound
         flat = expansion.inputs(_moved(still, form(ahead, back)), unit)
         fast = expansion.inputs(_moved(double, form(ahead, ahead)), twice, 2.0 * axis)
         k2 = 0.5 * (p @ (form(ahead, ahead, back) + 2.0 * form(ahead, flat)
                          + form(back, fast)))
-
-        return NormalForm(self._speed(self.line), complex(k2))
+        size = 0.5 * np.abs(p) @ (bound(ahead, ahead, back) + 2.0 * bound(ahead, flat)
+                                  + bound(back, fast))
+        return NormalForm(self._speed(self.line), complex(k2), float(size))
 
     @cached_property
     def _expansion(self) -> Expansion:
@@ -219,8 +225,8 @@ class HopfPoint(ShortRepr):
         The delay scales the time as well; z is half the amplitude of a cell's first variable.
         """
         form, delay = self.normal_form, self.network.delay
-        return NormalForm(1j * self.omega + delay * form.k1,
-                          delay * form.k2 / abs(self.vector[0])**2)
+        scale = delay / abs(self.vector[0])**2
+        return NormalForm(1j * self.omega + delay * form.k1, scale * form.k2, scale * form.size)
 
     @property
     def slopes(self) -> dict[str, float]:

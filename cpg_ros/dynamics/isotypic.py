@@ -21,7 +21,7 @@ state a delay ago. Oscillations of a class are primary gaits: ``x_i ~ chi(i) exp
 the character is the gait (Table 5).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
@@ -126,10 +126,21 @@ class Expansion:
 
     def multilinear(self, *sets: np.ndarray) -> np.ndarray:
         """Derivative of the rates, B(a, b) or C(a, b, c), at sets of arguments, (variables,)."""
-        order, out = len(sets), np.zeros(self.network.variables, dtype=complex)
+        return self._summed(self._derivatives(len(sets)), sets)
+
+    def bound(self, *sets: np.ndarray) -> np.ndarray:
+        """Return the sum of the moduli of the terms of ``multilinear``, shape (variables,)."""
+        sizes = {key: abs(value) for key, value in self._derivatives(len(sets)).items()}
+        return self._summed(sizes, [np.abs(vectors) for vectors in sets]).real
+
+    def _derivatives(self, order: int) -> Mapping[Any, float]:
         if order not in self._higher:
             self._higher[order] = self._equations.higher(order, self._x, self._p)
-        for v, rate in multilinear(self._higher[order], sets).items():
+        return self._higher[order]
+
+    def _summed(self, derivatives: Mapping[Any, float], sets: Sequence[np.ndarray]) -> np.ndarray:
+        out = np.zeros(self.network.variables, dtype=complex)
+        for v, rate in multilinear(derivatives, sets).items():
             out[v] = rate
         return out
 

@@ -22,7 +22,8 @@ import math
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.networks.network import Network, other_gait, stated_gait
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network, other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
@@ -132,11 +133,27 @@ class Orbit(ShortRepr, ABC):
         """Phase of each cell in cycles, shape (cells,)."""
         return self.symmetry.phases
 
+    @cached_property
+    def leads(self) -> np.ndarray:
+        """Lead of each cell on cell 1 in cycles, from 0 to 1, shape (cells,).
+
+        Between different waveforms it is that of the first harmonics of the first variable.
+        """
+        count = int(self.waves.max()) + 1
+        if count == 1:
+            return self.phases
+        theta = np.arange(POINTS) / POINTS
+        first = [np.exp(-2j * np.pi * theta) @ self.waveform(theta, 0, wave)
+                 for wave in range(count)]
+        ahead = np.angle(first) / (2.0 * np.pi)
+        # Rounding must not turn 0 into 1.
+        return np.asarray(np.round(self.phases + (ahead - ahead[0])[self.waves], 9) % 1.0)
+
     @property
     def leg_phases(self) -> dict[str, float]:
         """Leg -> lead of its first cell on cell 1, cycles, from 0 to 1."""
         legs = next(iter(self.network.legs.values()))
-        return {leg: float(self.phases[cells[0] - 1]) for leg, cells in legs.items()}
+        return {leg: float(self.leads[cells[0] - 1]) for leg, cells in legs.items()}
 
     @property
     def waves(self) -> np.ndarray:
@@ -212,6 +229,9 @@ def check_values(network: Network, gait: str) -> None:
     broken = network.broken(network.symmetry(gait))
     if broken:
         raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
+    if (equations_of(type(network)).by_cell
+            and asymmetry(network, network.symmetry(gait)) > ASYMMETRIC):
+        raise NoOrbit(f'no {gait} with these weights: the equations do not have its symmetry')
     if other := other_gait(network, gait):
         raise NoOrbit(other)
 

@@ -32,8 +32,14 @@ from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.solve_orbit import coexisting_orbits, CoexistingOrbits
 from cpg_ros.networks.network import Network
 
-#: Rate at which transverse disturbances decay with the lock gain, 1/model time.
+#: Rate at which transverse disturbances decay with the lock gain, 1/model time. With a delay they
+#: decay by 1/e within it at most: the gain grows exponentially with their product.
 RATE = 0.5
+
+
+def lock_rate(network: Network) -> float:
+    """Return the rate at which transverse disturbances decay with the lock, 1/model time."""
+    return min(RATE, 1.0 / network.delay) if network.delay else RATE
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,7 @@ class Stability:
 
     Attributes:
         enough: symmetry gain above which transverse disturbances decay, 1/model time.
-        lock_gain: gain with which they decay at RATE, 1/model time.
+        lock_gain: gain with which they decay at lock_rate, 1/model time.
         reason: why no gain makes the gait attract, or why that is undecided; or ''.
 
     """
@@ -54,9 +60,10 @@ class Stability:
 
 def stability(orbit: Orbit) -> Stability:
     """Judge an orbit by its multipliers; the gain follows from the network's own bound, if any."""
-    bound = orbit.network.sufficient_gain(RATE)
+    wanted = lock_rate(orbit.network)
+    bound = orbit.network.sufficient_gain(wanted)
     if bound is None:
-        enough, gain = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
+        enough, gain = (sufficient_gain(orbit, rate) for rate in (0.0, wanted))
     else:
         enough = gain = bound
     inside = multipliers_within(orbit)
@@ -109,10 +116,10 @@ class GaitAssessment(ShortRepr):
 
     @property
     def phases(self) -> dict[str, float]:
-        """Phase of each leg's first cell, or of each muscle, in cycles."""
+        """Lead of each leg's first cell, or of each muscle, on cell 1, in cycles."""
         orbit = self.known_orbit
         muscles = orbit.network.muscles
-        return ({name: float(orbit.phases[cell - 1]) for name, cell in muscles.items()}
+        return ({name: float(orbit.leads[cell - 1]) for name, cell in muscles.items()}
                 or orbit.leg_phases)
 
     @cached_property
@@ -133,7 +140,7 @@ class GaitAssessment(ShortRepr):
     @cached_property
     def default_gain(self) -> float:
         """Gain that the generator selects, 1/model time."""
-        return sufficient_gain(self.known_orbit, RATE)
+        return sufficient_gain(self.known_orbit, lock_rate(self.known_orbit.network))
 
     @cached_property
     def stable_with_default_gain(self) -> bool | None:

@@ -57,6 +57,13 @@ class Term:
     def __abs__(self) -> 'Term':
         return Term(f'Abs({self.text})')
 
+    def _no_number(self, *_: object) -> Any:
+        raise TypeError('terms of an equation are no numbers: they have no comparisons, max or '
+                        'functions of math; take functions from cpg_ros.networks.definition, such '
+                        'as positive(x) for max(0, x)')
+
+    __lt__ = __le__ = __gt__ = __ge__ = __bool__ = __float__ = _no_number
+
 
 def _text(value: Number) -> str:
     return value.text if isinstance(value, Term) else repr(value)
@@ -67,8 +74,11 @@ def _function(name: str) -> Callable[[Number], Term]:
 
 
 #: Functions of terms, by the names that they have in mathematics.
-tanh, cosh, exp, log, sin, cos, sqrt = map(
-    _function, ('tanh', 'cosh', 'exp', 'log', 'sin', 'cos', 'sqrt'))
+_NAMES = 'tanh', 'cosh', 'exp', 'log', 'sin', 'cos', 'sqrt'
+tanh, cosh, exp, log, sin, cos, sqrt = map(_function, _NAMES)
+for _name in _NAMES:
+    # numpy's functions of an object are methods of it.
+    setattr(Term, _name, _function(_name))
 
 
 def positive(x: Number) -> Term:

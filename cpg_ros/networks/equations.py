@@ -119,7 +119,8 @@ class Equations:
         """Read a network's equations.
 
         Raises:
-            TypeError: the number of equations is not that of a cell's variables.
+            TypeError: the number of equations is not that of a cell's variables, or they read the
+                past of a network without a delay.
 
         """
         cell = Cell(network.variables, network.cells)
@@ -129,6 +130,9 @@ class Equations:
         if len(self.texts) != network.variables:
             raise TypeError(f'{network.__name__}.equations returns {len(self.texts)} rates for '
                             f'{network.variables} variables')
+        if not network.delay_parameter and any(one.delayed for one in cell.arguments):
+            raise TypeError(f'{network.__name__}.equations reads the past, but the network names '
+                            'no delay_parameter')
         text = ' '.join(self.texts)
         self._numbers = tuple(k for k in range(len(cell.arguments))
                               if re.search(rf'\bx{k}\b', text))

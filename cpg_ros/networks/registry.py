@@ -36,7 +36,7 @@ from cpg_ros.common import files
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.networks.leg_numbers import GIRDLES, split_name, with_legs
 from cpg_ros.networks.library import shipped
-from cpg_ros.networks.network import Network, ParameterLine, Preset
+from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network, ParameterLine, Preset
 
 #: Attributes that every network has.
 STATED = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs', 'usual_gait', 'free',
@@ -144,9 +144,15 @@ def _gaits(network: type[Network]) -> Iterator[str]:
         if type(preset.network) is not network:
             yield f'{where}: it is of another network, {type(preset.network).__name__}'
         else:
-            phases = preset.network.symmetry(preset.gait).phases
-            if len(phases) != network.cells:
-                yield f'{where}: its symmetry is of {len(phases)} cells, not {network.cells}'
+            symmetry = preset.network.symmetry(preset.gait)
+            count = symmetry.group.cells
+            if count != network.cells:
+                yield f'{where}: its symmetry is of {count} cells, not {network.cells}'
+            elif not preset.network.broken(symmetry):
+                change = asymmetry(preset.network, symmetry)
+                if change > ASYMMETRIC:
+                    yield (f'symmetry: the equations do not have that of the {preset.gait}, '
+                           f'which changes their rates by {change:.1g} of their size')
 
 
 GROUP = 'cpg_ros.networks'

@@ -98,7 +98,8 @@ def test_example_1_as_text(capsys):
               (('c=4.5', 'd=0'), 'tau', None))])
 def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name, gait):
     assert main(['--set', *changes]) == 0
-    (nearest,) = re.findall(r'This set gives no gait; (.*)\.\n', capsys.readouterr().out)
+    (nearest,) = re.findall(r'No gait was found at these parameters; (.*)\.\n',
+                            capsys.readouterr().out)
     # What it names is a threshold: just below still nothing, just above a gait (with a delay).
     threshold = float(re.search(r'(?:delay|c\|) (\d+\.\d{4})', nearest)[1])
     rest = [change for change in changes if not change.startswith(f'{name}=')]

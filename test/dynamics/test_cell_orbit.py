@@ -21,6 +21,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
+from cpg_ros.dynamics.stability import GaitAssessment
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import Preset
@@ -218,3 +219,19 @@ def test_gaits_that_the_network_does_by_itself_are_found(network, gait, period):
     end = solve_ivp(lambda t, x: network.rates(x), (0.0, orbit.period), start, 'DOP853',
                     rtol=1e-10, atol=1e-12).y[:, -1]
     assert np.abs(end - start).max() < 1e-6
+
+
+@pytest.mark.parametrize(('gait', 'cell', 'lead'), [
+    # Of the first harmonics, by the simulation below.
+    ('asymmetric_hop', 2, 0.555), ('one_legged_hop', 2, 0.238), ('skip', 3, 0.519)])
+def test_cells_of_other_waveforms_lead_by_their_first_harmonics(gait, cell, lead):
+    orbit = solve_preset(PRESETS['biped'][gait])
+    points = 2048
+    run = simulate(orbit.network, orbit(np.array(0.0)), 1.01 * orbit.period, progress=False)
+    signals = run(np.arange(points) / points * orbit.period)[:, :4]
+    first = np.angle(np.fft.fft(signals, axis=0)[1]) / (2.0 * np.pi)
+    assert orbit.leads == pytest.approx((first - first[0]) % 1.0, abs=1e-4)
+    assert orbit.leads[cell - 1] == pytest.approx(lead, abs=1e-3)
+    assert GaitAssessment(gait, orbit).phases == dict(zip(
+        orbit.network.muscles, orbit.leads[np.array(list(orbit.network.muscles.values())) - 1],
+        strict=True))

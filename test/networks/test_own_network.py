@@ -23,13 +23,17 @@ k sin(omega' tau), its radius is sqrt(mu - k cos(omega' tau)).
 
 from dataclasses import dataclass, replace
 from fractions import Fraction
+import math
 from pathlib import Path
+import re
 
 from cpg_ros import simulate, solve_orbit
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.solve_orbit import solve_preset
-from cpg_ros.networks.definition import log, Range
-from cpg_ros.networks.network import known, Network, Preset
+from cpg_ros.networks.definition import exp, log, Range
+from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.network import asymmetry, known, Network, Preset
+from cpg_ros.networks.registry import definition_error, SHIPPED
 from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
 import pytest
@@ -342,3 +346,61 @@ def test_cells_of_any_number_of_variables_need_no_word():
     orbit = solve_orbit(network, 'walk')
     assert orbit.period == pytest.approx(2.0 * np.pi / 6.0)
     assert orbit.peak == pytest.approx(np.sqrt(1.5), rel=1e-6)
+
+
+def test_a_symmetry_that_the_equations_do_not_have_is_refused():
+    @dataclass(frozen=True)
+    class Uneven(TwoLegs):
+        """The right leg hears itself, too."""
+
+        name = 'uneven'
+
+        @staticmethod
+        def equations(cell, p):
+            x, y = cell.now()
+            x_other, y_other = cell.now((1, 1))
+            rest = p.mu - x ** 2 - y ** 2
+            return rest * x - p.omega * y + p.k * x_other, rest * y + p.omega * x + p.k * y_other
+
+    why = definition_error(Uneven)
+    assert re.fullmatch(r'symmetry: the equations do not have that of the walk, which changes '
+                        r'their rates by 0\.\d+ of their size', why)
+    assert not definition_error(TwoLegs) and not definition_error(Delayed)
+    for shipped in SHIPPED.values():
+        for preset in shipped.presets().values():
+            symmetry = preset.network.symmetry(preset.gait)
+            assert asymmetry(preset.network, symmetry) < 1e-12
+
+
+def test_equations_that_read_a_past_without_a_delay_are_refused():
+    @dataclass(frozen=True)
+    class Forgetful(TwoLegs):
+        name = 'forgetful'
+
+        @staticmethod
+        def equations(cell, p):
+            x, y = cell.past(OTHER)
+            return p.mu * x, p.omega * y * p.k
+
+    with pytest.raises(TypeError, match=r'Forgetful.equations reads the past, but the network '
+                                        r'names no delay_parameter'):
+        definition_error(Forgetful)
+
+
+def test_numpys_functions_are_terms_and_comparisons_say_what_to_use():
+    @dataclass(frozen=True)
+    class Saturated(TwoLegs):
+        name = 'saturated'
+
+        @staticmethod
+        def equations(cell, p):
+            x, y = cell.now()
+            return np.tanh(p.mu * x) - y, np.exp(-y) + p.omega * p.k * x
+
+    x, y = state = np.array([[0.7, -1.2], [0.4, -0.3]])
+    exact = np.concatenate([np.tanh(x) - y, np.exp(-y) - 3.0 * x])
+    assert Saturated(1.0, 6.0, -0.5).rates(state.ravel()) == pytest.approx(exact, abs=1e-14)
+    term = exp(1.0)
+    for wrong in (lambda: max(term, 0.0), lambda: math.tanh(term), lambda: 1.0 if term else 0.0):
+        with pytest.raises(TypeError, match=r'such as positive\(x\) for max\(0, x\)'):
+            wrong()

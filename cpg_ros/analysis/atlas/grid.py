@@ -38,7 +38,7 @@ from cpg_ros.dynamics.fourier.floquet import Accuracy
 from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.dynamics.orbit import extra_symmetry, Orbit
 from cpg_ros.dynamics.solve_orbit import solve_beside, solve_from_path, solve_orbit
-from cpg_ros.dynamics.stability import RATE
+from cpg_ros.dynamics.stability import lock_rate
 from cpg_ros.networks.network import Network, other_gait
 import numpy as np
 
@@ -47,8 +47,9 @@ import numpy as np
 NONE, UNSTABLE, LOCKED, STABLE = range(4)
 #: KEPT: number of points of a waveform that are kept.
 KEPT = 65
-#: Accuracy of multipliers for a map.
-ACCURACY = Accuracy(4, 1e-6, 1e-4, 4)
+#: ACCURACY: of multipliers for a map; DOUBTFUL: distance of a leading one from 1 at which all are
+#: computed as in other reports.
+ACCURACY, DOUBTFUL = Accuracy(4, 1e-6, 1e-4, 4), 1e-3
 #: Random states from which the basin of an orbit is estimated.
 STARTS = 8
 #: MOST: most points of a branch from a Hopf point; TRIED: most nearby orbits that are continued to
@@ -194,14 +195,15 @@ class _Finder:
 def _assess(orbit: Orbit) -> dict[str, Any]:
     """Return the stability of an orbit, and its numbers."""
     spectrum = multipliers(orbit, accuracy=ACCURACY)
-    if None in (spectrum.attracts, spectrum.attracts_within):
+    if any(abs(modulus - 1.0) < DOUBTFUL for modulus in (spectrum.leading_within,
+                                                         spectrum.leading_transverse)):
         spectrum = multipliers(orbit)
     return {'label': (STABLE if spectrum.attracts else
                       LOCKED if spectrum.attracts_within else UNSTABLE),
             'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
             'leading': spectrum.leading, 'leading_within': spectrum.leading_within,
             'unstable': spectrum.unstable,
-            'lock': 0.0 if spectrum.attracts else sufficient_gain(orbit, RATE)}
+            'lock': 0.0 if spectrum.attracts else sufficient_gain(orbit, lock_rate(orbit.network))}
 
 
 def _proper(orbit: Orbit) -> Iterator[Orbit]:

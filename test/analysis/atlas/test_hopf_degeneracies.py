@@ -28,6 +28,7 @@ from cpg_ros.analysis.atlas.hopf_curves import (
     HopfStart,
     with_degeneracies,
 )
+from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.networks.registry import find_network, PRESETS
 from depth import in_depth
 import numpy as np
@@ -185,7 +186,13 @@ def test_with_a_delay_the_trots_bautin_point_is_that_of_the_formula():
     c = brentq(gap, 4.0, 5.5, xtol=1e-14)
     found = [point.values for curve in through_line(chart, ('trot',), fraction=0.5)
              for point in hopf_degeneracies(chart, curve) if point.kind == 'Bautin']
-    assert found == [pytest.approx((c, born(c, (2, 1), b, n=1)[1]), abs=1e-9)]
+    tau = born(c, (2, 1), b, n=1)[1]
+    assert found == [pytest.approx((c, tau), abs=1e-9)]
+    # There the normal form is degenerate, up to rounding, and nowhere else.
+    for weight, degenerate in ((c, True), (c + 1e-6, False)):
+        points = hopf_points(replace(TROT, b=b, c=weight), 'tau', tau - 0.01, tau + 0.01)
+        assert [point.normal_form.degenerate for point in points
+                if point.gait == 'trot'] == [degenerate]
 
 
 @pytest.mark.deep
