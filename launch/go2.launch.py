@@ -21,7 +21,9 @@ and with real_time_factor:=0, as fast as they can; time begins when both are the
 
 from pathlib import Path
 
-from cpg_ros.ros.launch_arguments import declared, page, started
+from cpg_ros.common.files import resource_folder
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.launch_arguments import declared, page, started, value, viewers
 from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
@@ -47,6 +49,12 @@ SIMULATION = {
     'footfalls': ('out/footfalls.png', str, 'footfall diagram to write, or none'),
     'duration': ('0.0', float, 'exit after this much simulated time [s]; 0 for never'),
 }
+OTHERS = {
+    'rviz': ('false', bool, 'show the robot in RViz'),
+    'frame_prefix': ('', str, 'before the names of all frames on /tf, such as left/'),
+    'own_clock': ('false', bool, 'simulated time on the topic clock of the namespace, not on '
+                  '/clock: a second simulation needs its own'),
+}
 #: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
 DRAWING = '300'
 #: Commands of the simulation -> of the generator.
@@ -56,6 +64,9 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
+    prefix = LaunchConfiguration('frame_prefix').perform(context)
+    clock = [('/clock', 'clock')] if value(context, 'own_clock', bool) else []
+    frames = {'base_frame': f'{prefix}base_link', 'odom_frame': f'{prefix}odom'} if prefix else {}
     unwanted, folders = {}, {}
     for picture in ('film', 'footfalls'):
         path = Path(LaunchConfiguration(picture).perform(context)).expanduser()
@@ -66,10 +77,18 @@ def nodes(context):
     both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 # The simulation begins at the stand, with the generator's first command.
-                'assume_stand': True, 'use_sim_time': True}, on_exit=Shutdown()),
+                'assume_stand': True, 'use_sim_time': True}, on_exit=Shutdown(),
+                remappings=clock),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING),
+                'lockstep': True, **unwanted, **frames}, on_exit=Shutdown(),
+                sigterm_timeout=DRAWING, remappings=clock),
             *page(context)]
+    if value(context, 'rviz', bool):
+        from cpg_ros.simulation.robot_model import description
+        model, robot = (LaunchConfiguration(name).perform(context) for name in ('model', 'robot'))
+        both += viewers(context, description(model, load_robot(robot), 'base_link'),
+                        f'{prefix}odom', str(resource_folder('rviz') / 'cpg.rviz'),
+                        frame_prefix=prefix, remappings=clock)
     for picture, folder in folders.items():
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -80,5 +99,5 @@ def nodes(context):
 
 def generate_launch_description():
     """Return generator and robot_sim, optionally in a namespace."""
-    return LaunchDescription([*declared({**BOTH, **GENERATOR, **SIMULATION}),
+    return LaunchDescription([*declared({**BOTH, **GENERATOR, **SIMULATION, **OTHERS}),
                               OpaqueFunction(function=nodes)])

@@ -19,10 +19,18 @@ messages; optionally feedback, a page in the browser and a recording. simulator:
 Unitree's simulator on this computer.
 """
 
+import os
+
 from cpg_ros.ros.launch_arguments import declared, page, started, value
 from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
 from launch import LaunchDescription
-from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
+from launch.actions import (
+    ExecuteProcess,
+    LogInfo,
+    OpaqueFunction,
+    SetEnvironmentVariable,
+    Shutdown,
+)
 from launch.substitutions import LaunchConfiguration
 
 BOTH = {
@@ -65,10 +73,13 @@ def nodes(context):
     domain = value(context, 'domain', int) if given else int(simulator)
     command = LaunchConfiguration('command').perform(context)
     generator = {name: one for name, one in {**BOTH, **GENERATOR}.items() if name != 'command'}
+    # LOCALHOST, which ROS's users often set, finds no participant of Unitree.
+    network = {'ROS_DOMAIN_ID': str(domain), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
     found = [
-        SetEnvironmentVariable('ROS_DOMAIN_ID', str(domain)),
-        # LOCALHOST, which ROS's users often set, finds no participant of Unitree.
-        SetEnvironmentVariable('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET'),
+        *(LogInfo(msg=f'{name} is {setting} for these nodes, not {os.environ[name]} as in this '
+                  'shell (the argument domain selects the domain)')
+          for name, setting in network.items() if os.environ.get(name, setting) != setting),
+        *(SetEnvironmentVariable(*setting) for setting in network.items()),
         started(context, 'unitree_bridge', 'unitree_bridge', {**BOTH, **BRIDGE}, {
             'motion_switcher': not simulator}, on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.

@@ -20,7 +20,9 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 import math
 from pathlib import Path
-from xml.etree.ElementTree import Element
+import shutil
+import subprocess
+from xml.etree.ElementTree import Element, tostring
 
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.common.files import one_line, parse, read_bytes
@@ -296,13 +298,29 @@ class LegChain(ShortRepr):
 # URDF files: joints with their limits and places, links with their masses and feet.
 
 def read_tree(path: str | Path) -> Element:
-    """Read a URDF file as XML, tags without prefixes.
+    """Read a URDF file as XML, tags without prefixes; the program xacro expands one with macros.
 
     Raises:
-        DescriptionError: the file cannot be read, is not XML, is xacro or no URDF.
+        DescriptionError: the file cannot be read, is not XML, is xacro that cannot be expanded
+            here, or no URDF.
 
     """
-    return parse_tree(read_bytes(path, DescriptionError, 'URDF'), str(path))
+    data, xacro = read_bytes(path, DescriptionError, 'URDF'), shutil.which('xacro')
+    if b'<xacro:' in data and xacro:
+        expanded = subprocess.run([xacro, str(path)], capture_output=True)
+        if expanded.returncode:
+            reason = expanded.stderr.decode(errors='replace').strip()
+            raise _error(str(path), f'xacro cannot expand it: {reason[-500:]}')
+        data = expanded.stdout
+    return parse_tree(data, str(path))
+
+
+def read_urdf_text(path: str | Path) -> str:
+    """Return a URDF file as text, expanded; errors as of ``load_urdf``."""
+    file = Path(path).expanduser()
+    tree = read_tree(file)
+    describe(tree, str(file), file)
+    return tostring(tree, encoding='unicode')
 
 
 def parse_tree(data: bytes, source: str) -> Element:

@@ -141,7 +141,7 @@ class Diagnostics:
         return level, text, values
 
     def _why_anew(self, jumps: int) -> str:
-        publishers = self._node.count_publishers('/clock')
+        publishers = self._node.count_publishers(self._node.resolve_topic_name('/clock'))
         text = ('simulated time jumped back: starting again from the stand' if jumps == 1 else
                 f'simulated time jumped back {jumps} times in a second')
         if publishers > 1:
@@ -187,14 +187,19 @@ class Generator(StartedNode):
     #: Parameters that set others: a gait loads its preset.
     SETS_OTHERS = frozenset({'gait'})
 
-    def __init__(self) -> None:
+    def __init__(self, name: str = NAME, **options: Any) -> None:
         """Declare the parameters, check them, and prepare to start.
+
+        Args:
+            name: of the node.
+            options: further arguments of rclpy's Node, such as ``namespace``, ``context`` and
+                ``parameter_overrides``.
 
         Raises:
             CpgError: a parameter or the robot file cannot be used.
 
         """
-        super().__init__(NAME)
+        super().__init__(name, **options)
         joined = time.monotonic()
         network, robot = self._load()
         self._create_pattern(network, self._first_plan(network, robot))
@@ -286,9 +291,10 @@ class Generator(StartedNode):
                                lambda: self._value('ramp'),
                                lambda: self._feedback.active) if steered else None
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
-                                self._value('command'))
+                                self._value('command'), self._value('stamped'))
         self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
-        self._cells = cells_block(self, network, self.pattern.addresses['state'])
+        self._cells = cells_block(self, network, self.pattern.addresses['state'],
+                                  self._value('stamped'))
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -566,7 +572,7 @@ class Generator(StartedNode):
         crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()
         sits = self._value('end') == 'sit'
         deadline = began + (LAST_CROUCH if crouches or sits else LAST_DEADLINE)
-        if self.failure is None and self.ticker.ticks and (sits or not self.pattern.standing):
+        if self.ticker.is_alive() and self.ticker.ticks and (sits or not self.pattern.standing):
             self.get_logger().info(
                 'coming to a stand and crouching before the end' if crouches else
                 f'ramping down over {LAST_RAMP:g} s{", sitting down" if sits else ""} before the '

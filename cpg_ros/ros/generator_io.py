@@ -14,7 +14,7 @@
 
 """The generator's topics: messages of every tick, measured joint angles, and cmd_vel."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import math
 import threading
 import time
@@ -27,8 +27,9 @@ from cpg_ros.networks.network import Network
 from cpg_ros.ros.node.health import node_of, STEADY
 from cpg_ros.ros.node.message_block import indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import StartError
+from cpg_ros.ros.node.parameters import Spec
 from cpg_ros.ros.node.polled import best_effort, OVERRIDABLE, PolledSubscription
-from geometry_msgs.msg import Twist, TwistStamped
+from geometry_msgs.msg import Twist, TwistStamped, WrenchStamped
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -43,6 +44,9 @@ COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_traject
                   'forward_position': 'forward_position_controller/commands'}
 #: CELLS: period in which the cells are published, s; shorter than people can see.
 CELLS = 0.02
+#: STAMPED: parameter of all nodes with topics that have no stamps.
+STAMPED = Spec(False, 'publish messages with stamps, too, where the usual ones have none',
+               read_only=True)
 
 
 class Outputs:
@@ -53,8 +57,9 @@ class Outputs:
 
     """
 
-    def __init__(self, node: Node, robot: Robot, combined_topic: str, command: str) -> None:
-        """Prepare all messages.
+    def __init__(self, node: Node, robot: Robot, combined_topic: str, command: str,
+                 stamped: bool = False) -> None:
+        """Prepare all messages; with ``stamped`` that of the phases with a stamp, too.
 
         Raises:
             StartError: the combined topic equals another one.
@@ -82,6 +87,8 @@ class Outputs:
         if combined_topic:
             messages.append((combined_topic, joint_state(robot.order, positions, velocities)))
         messages.append(('~/phase', labelled(tuple(robot.legs), phases)))
+        if stamped:
+            messages.append(('~/phase_stamped', joint_state(tuple(robot.legs), phases)))
         if command == 'joint_trajectory':
             # One point a message, reached a period after it: stamp 0 means from now.
             point = JointTrajectoryPoint()
@@ -94,14 +101,16 @@ class Outputs:
             messages.append((COMMAND_TOPICS[command],
                              Template(array, numbers=[(array, 'data', positions)])))
         self.block = MessageBlock(node, sizes, messages)
-        phase = node.resolve_topic_name('~/phase')
-        self.topics = [topic for topic in self.block.topics if topic != phase]
+        still = [node.resolve_topic_name(f'~/phase{end}') for end in ('', '_stamped')]
+        self.topics = [topic for topic in self.block.topics if topic not in still]
 
 
-def cells_block(node: Node, network: type[Network], state: int) -> MessageBlock:
+def cells_block(node: Node, network: type[Network], state: int, stamped: bool = False
+                ) -> MessageBlock:
     """Return the message ``~/cells``: a row for each variable of a cell, one for each rate.
 
-    Rates are in model time; state is the address of a pointer to the numbers.
+    Rates are in model time; state is the address of a pointer to the numbers. With ``stamped``,
+    ``~/cells_stamped`` has the same: variables as positions, rates as velocities.
     """
     rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
     count = len(rows) * network.cells
@@ -109,9 +118,11 @@ def cells_block(node: Node, network: type[Network], state: int) -> MessageBlock:
     message.layout.dim = [
         MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
         MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
-    return MessageBlock(node, [count], [
-        ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))]).feed(
-            state, period=CELLS)
+    messages = [('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))]
+    if stamped:
+        names = [f'{name}{cell + 1}' for name in network.states for cell in range(network.cells)]
+        messages.append(('~/cells_stamped', joint_state(names, *np.split(np.arange(count), 2))))
+    return MessageBlock(node, [count], messages).feed(state, period=CELLS)
 
 
 def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
@@ -133,6 +144,19 @@ def labelled(names: tuple[str, ...], slots: np.ndarray) -> Template:
     message = Float64MultiArray()
     message.layout.dim = [MultiArrayDimension(label=','.join(names), stride=1, size=len(names))]
     return Template(message, numbers=[(message, 'data', slots)])
+
+
+def foot_wrenches(legs: Sequence[str], places: np.ndarray, frames: Mapping[str, str]
+                  ) -> list[tuple[str, Template]]:
+    """Return the forces on the feet along z of frames by leg, one topic and message each."""
+    messages = []
+    for k, leg in enumerate(legs):
+        message = WrenchStamped()
+        message.header.frame_id = frames[leg]
+        messages.append((f'{leg}/foot_contacts', Template(
+            message, [message.header.stamp], numbers=[
+                (message.wrench.force, 'z', places[k:k + 1])])))
+    return messages
 
 
 # The joint angles that the robot's own driver publishes.

@@ -32,6 +32,7 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.ros import posture
+from cpg_ros.ros.generator_io import STAMPED
 from cpg_ros.ros.node import ticker
 from cpg_ros.ros.node.parameters import as_doubles, one_of, PRESETS, Spec
 from rclpy.parameter import Parameter
@@ -67,6 +68,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                               "at which the gait attracts, 0 is the paper's model", -1.0, 200.0),
         'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '
                                'none', read_only=True),
+        'stamped': STAMPED,
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints=one_of(COMMANDS)),
         'measured_topic': Spec('joint_states', "topic of the robot's measured joint states, from "

@@ -35,9 +35,11 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import is_path
 from cpg_ros.ros.node import node_base
 from cpg_ros.ros.node.client import CallError, NodeClient, ServiceClients
+from cpg_ros.ros.node.health import Health, HealthPublisher
 from cpg_ros.ros.node.node_base import StartedNode, StartError
 from cpg_ros.ros.node.parameters import Spec
 from cpg_ros.ros.node.polled import best_effort, latched, OVERRIDABLE
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException
@@ -104,7 +106,8 @@ class Inversion(StartedNode):
         self._group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/fit', self._fit, callback_group=self._group)
         self._timer: Timer | None = None
-        self._busy = False
+        self._busy, self._received, self._last = False, 0, (True, 'no fit yet')
+        self._health = HealthPublisher(self, 'fit', name, self._report_health)
         self._often(self._value('every'))
         self._network = self._value('network')
         self.add_on_set_parameters_callback(self._allowed)
@@ -135,7 +138,17 @@ class Inversion(StartedNode):
         if every > 0.0:
             self._timer = self.create_timer(every, self._again, callback_group=self._group)
 
+    def _report_health(self) -> Health:
+        """Return the status of the last second: WARN without joint states or after a failure."""
+        received, self._received = self._received, 0
+        well, text = self._last
+        if not received:
+            well, text = False, f'no joint states; {text}'
+        return DiagnosticStatus.OK if well else DiagnosticStatus.WARN, text, {
+            'joint states in the last second': received, 'fitting': self._busy}
+
     def _receive(self, topic: str, message: bytes) -> None:
+        self._received += 1
         self._live.add(topic, self.get_clock().now().nanoseconds, message)
 
     async def _again(self) -> None:
@@ -160,7 +173,7 @@ class Inversion(StartedNode):
             work.add_done_callback(lambda _: None)
             self.thread = threading.Thread(target=self._work, args=(live, work), daemon=True)
             self.thread.start()
-            well, message = await work
+            well, message = self._last = await work
         finally:
             self._busy = False
         if well:

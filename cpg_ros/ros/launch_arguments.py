@@ -14,12 +14,14 @@
 
 """Launch arguments that become a node's parameters, shared by the launch files."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_origin
 
-from launch.actions import DeclareLaunchArgument
+from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from launch.actions import DeclareLaunchArgument, OpaqueFunction, Shutdown
 from launch.launch_context import LaunchContext
+from launch.launch_description_entity import LaunchDescriptionEntity
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -40,17 +42,26 @@ GENERATOR: Arguments = {
 }
 #: Arguments that have been renamed; launch itself says nothing of one that it does not know.
 RENAMED = {'feedback': 'feedback.enabled'}
+#: GIVEN: configuration with the names of the arguments that the user gave.
+GIVEN = 'cpg_ros.given'
 
 
-def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
+def declared(arguments: Arguments) -> list[LaunchDescriptionEntity]:
     """Return the actions that declare the arguments, and those of every launch file."""
     declarations = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
              'panel': ('false', bool, 'serve a browser page at http://127.0.0.1:8080/'),
+             'panel_port': ('8080', int, 'port of that page'),
              'params_file': ('', str, 'parameter file, such as one written by inversion; '
-                             'arguments that differ from their defaults override it; empty for '
-                             'none')}
-    return [DeclareLaunchArgument(name, default_value=default, description=text)
-            for name, (default, _, text) in declarations.items()]
+                             'arguments that are given override it; empty for none')}
+
+    def note(context: LaunchContext) -> None:
+        # Once declared, an argument that equals its default looks the same, given or not.
+        given = context.launch_configurations
+        given[GIVEN] = ' '.join(name for name in declarations if name in given)
+
+    return [OpaqueFunction(function=note),
+            *(DeclareLaunchArgument(name, default_value=default, description=text)
+              for name, (default, _, text) in declarations.items())]
 
 
 def value(context: LaunchContext, name: str, kind: type) -> Any:
@@ -82,7 +93,49 @@ def page(context: LaunchContext) -> list[Node]:
     if not value(context, 'panel', bool):
         return []
     return [Node(package='cpg_ros', executable='panel', name='cpg_panel', output='screen',
-                 namespace=LaunchConfiguration('namespace'))]
+                 namespace=LaunchConfiguration('namespace'),
+                 parameters=[{'port': value(context, 'panel_port', int)}])]
+
+
+def viewers(context: LaunchContext, urdf: str, fixed_frame: str, config: str, *,
+            frame_prefix: str = '', with_rviz: bool = True, sim_time: Any = True,
+            remappings: Sequence[tuple[str, str]] = ()) -> list[Node]:
+    """Return robot_state_publisher and rviz2; the end of one ends the launch.
+
+    Args:
+        context: with the values of the arguments.
+        urdf: text.
+        fixed_frame: of RViz.
+        config: file of RViz.
+        frame_prefix: before the names of all links on /tf.
+        with_rviz: whether to start rviz2.
+        sim_time: value of use_sim_time.
+        remappings: of both.
+
+    Raises:
+        RuntimeError: one of them is not installed; says how to get it.
+
+    """
+    common: dict[str, Any] = {'namespace': LaunchConfiguration('namespace'), 'output': 'screen',
+                              'on_exit': Shutdown()}
+    packages = ('robot_state_publisher', 'rviz2')[:1 + with_rviz]
+    for package in packages:
+        try:
+            get_package_prefix(package)
+        except PackageNotFoundError as error:
+            raise RuntimeError(f'the display needs the package {package}: sudo apt install '
+                               f'ros-$ROS_DISTRO-{package.replace("_", "-")}') from error
+    options: dict[str, dict[str, Any]] = {
+        'robot_state_publisher': {'parameters': [{
+            'robot_description': ParameterValue(urdf, value_type=str),
+            'publish_frequency': 50.0, 'frame_prefix': frame_prefix, 'use_sim_time': sim_time}],
+            'remappings': list(remappings)},
+        'rviz2': {'parameters': [{'use_sim_time': sim_time}],
+                  'arguments': ['-d', config, '-f', fixed_frame],
+                  # The configuration has no namespace.
+                  'remappings': [('/robot_description', 'robot_description'), *remappings]}}
+    return [Node(package=package, executable=package, **options[package], **common)
+            for package in packages]
 
 
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,
@@ -117,8 +170,8 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         if not file.is_file():
             raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
         # Later values take precedence: defaults give way to the file.
-        asked = {key: parameter for key, parameter in parameters.items()
-                 if LaunchConfiguration(key).perform(context) != arguments[key][0]}
+        given_names = LaunchConfiguration(GIVEN).perform(context).split()
+        asked = {key: parameter for key, parameter in parameters.items() if key in given_names}
         layers = [parameters, str(file), {**asked, **(fixed or {})}]
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',
                 namespace=LaunchConfiguration('namespace'),

@@ -16,6 +16,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 import signal
 import time
@@ -24,16 +25,16 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.command_topics import Commands, HeldSubscription, KINDS, KpScaleSubscription
 from cpg_ros.ros.feedback.odometry import has_transforms, odometry, PERIOD, transform
-from cpg_ros.ros.generator_io import joint_state, labelled
-from cpg_ros.ros.node.health import Health, HealthPublisher
+from cpg_ros.ros.generator_io import foot_wrenches, joint_state, labelled, STAMPED
+from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers
 from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
-from cpg_ros.ros.node.polled import latched
+from cpg_ros.ros.node.polled import latched, latched_text
 from cpg_ros.ros.node.ticker import Ticker, TickThread
 from cpg_ros.simulation.body import Approach, Body
 from cpg_ros.simulation.recorder import RunLog, summary, without_opengl
-from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.robot_model import description, SimulationError
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.sensors import SimulatedSensors
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
@@ -54,11 +55,11 @@ from std_srvs.srv import Trigger
 class Measurements:
     """Publisher of ``joint_states``, ``odom``, ``foot_contacts``, ``imu``, with tf2 ``/tf``."""
 
-    def __init__(self, node: Node, body: Body, sensors: SimulatedSensors, frame: str,
-                 delay: float = 0.0) -> None:
-        """Publish a body's motion and sensors; ``frame`` is that of its base.
+    def __init__(self, node: Node, body: Body, sensors: SimulatedSensors,
+                 frames: tuple[str, str], delay: float = 0.0, stamped: bool = False) -> None:
+        """Publish a body's motion and sensors; ``frames`` are odometry's and that of the base.
 
-        Joints and feet are delayed by ``delay`` s.
+        Joints and feet are delayed by ``delay`` s; ``stamped`` adds stamped forces on the feet.
         """
         self._body, self._sensors, self._holds = body, sensors, bool(body.robot.held)
         self._delay = round(1e9 * delay)
@@ -72,18 +73,18 @@ class Measurements:
             names = *names, *held
             joints = [np.concatenate(pair) for pair in zip(joints, indices(sizes)[7:],
                                                            strict=True)]
-        frames = 'odom', frame
         self._block = MessageBlock(node, sizes, [
             ('joint_states', joint_state(names, *joints)),
             odometry('odom', frames, base, quaternion, twist),
-            ('foot_contacts', labelled(tuple(feet), forces))])
+            ('foot_contacts', labelled(feet, forces)),
+            *(foot_wrenches(feet, forces, dict.fromkeys(feet, frames[0])) if stamped else [])])
         self._transform, self._period = None, round(1e9 * PERIOD)
         self._transformed = -self._period
         if has_transforms():
             self._transform = MessageBlock(node, sizes[4:6], [transform(frames,
                                                                         *indices(sizes[4:6]))])
         imu = Imu()
-        imu.header.frame_id = frame
+        imu.header.frame_id = frames[1]
         self._imu = MessageBlock(node, [10], [('imu', Template(imu, [imu.header.stamp], numbers=[
             *each(imu.orientation, 'xyzw', np.arange(4)),
             *each(imu.angular_velocity, 'xyz', np.arange(4, 7)),
@@ -127,7 +128,7 @@ MOST_BEHIND = 0.05
 class Lockstep(TickThread):
     """Thread that sets the time with ``tell``, waits for its commands, and calls ``tick``.
 
-    Simulated time begins when every command has a publisher and /clock a reader, and the first
+    Simulated time begins when every command has a publisher and ``lacking`` is '', and the first
     ``tick`` is at the first command, so that a run is repeatable. It recognises commands at every
     n-th period, from a generator with a lower rate. No tick is dropped; a late one lacked its
     command. With ``pace``, simulated time passes that many times as fast as real time, or slower
@@ -135,25 +136,26 @@ class Lockstep(TickThread):
     """
 
     def __init__(self, node: Node, rate: float, commands: Commands,
-                 tell: Callable[[int], None], ready: Callable[[], bool],
+                 tell: Callable[[int], None], lacking: Callable[[], str],
                  tick: Callable[[float, int], None], failed: Callable[[BaseException], None],
                  pace: float = 0.0) -> None:
         super().__init__('lockstep', rate, failed)
         self._due = 0.0
         self._spacing = 1.0 / (rate * pace) if pace else 0.0
         self._node, self._commands = node, commands
-        self._tell, self._ready, self._tick = tell, ready, tick
+        self._tell, self._lacking, self._tick = tell, lacking, tick
 
     def _run(self) -> None:
         logger = self._node.get_logger()
-        announced = False
-        while not (self._ready() and self._commands.connected):
+        announced = ''
+        none = ('waiting for a node that listens to /clock and publishes '
+                + ', '.join(self._commands.topics))
+        while reason := self._lacking() or none * (not self._commands.connected):
             if self._ending.wait(0.02):
                 return
-            if not announced:
-                announced = True
-                logger.info('waiting for a node that listens to /clock and publishes '
-                            + ', '.join(self._commands.topics))
+            if reason != announced:
+                announced = reason
+                logger.info(reason)
         period = round(1e9 / self.rate)
         now, every, since, patience = 0, 1, 0, PATIENCE
         started = False
@@ -208,6 +210,8 @@ class Lockstep(TickThread):
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
 PUSH = 0.1
+#: DISCOVERY: time after which two nodes have usually discovered each other, s.
+DISCOVERY = 1.0
 #: SLOWEST: least real_time_factor other than 0.
 SLOWEST = 1e-3
 #: BOUNCE: time after the last instant of a fall, s, from which on the robot counts as upright.
@@ -263,8 +267,10 @@ SPECS = fixed({
     'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a fraction of '
                         'the force', 0.0, 1.0),
     'noise_seed': Spec(0, 'seed of all noise', 0, 2**31 - 1),
-    'base_frame': Spec('base', "frame of the robot's base in odom, imu and /tf; by default the "
-                       "root of the shipped URDFs and of Unitree's"),
+    'base_frame': Spec('base_link', "frame of the robot's base in odom, imu, /tf and "
+                       'robot_description'),
+    'odom_frame': Spec('odom', 'frame of odom, in which the robot moves'),
+    'stamped': STAMPED,
     'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)})
 
 
@@ -280,6 +286,7 @@ class RobotSim(StartedNode):
         """
         # It makes the time that others may use.
         super().__init__(NAME, parameter_overrides=[Parameter('use_sim_time', value=False)])
+        self._made = time.monotonic()
         self._declare(SPECS)
         self._one_of('command', KINDS)
         self._rate, timestep, factor = map(self._value, ('rate', 'timestep', 'real_time_factor'))
@@ -312,8 +319,13 @@ class RobotSim(StartedNode):
                 name: self._value(name) for name in (
                     'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
                     'accelerometer_bias', 'orientation_bias', 'force_noise')}))
-        self._measurements = Measurements(self, self._body, sensors,
-                                          *map(self._value, ('base_frame', 'joint_delay')))
+        base = self._value('base_frame')
+        self._measurements = Measurements(
+            self, self._body, sensors, (self._value('odom_frame'), base),
+            *map(self._value, ('joint_delay', 'stamped')))
+        # A prefix on /tf is not part of the links' names.
+        self._description = latched_text(self, 'robot_description', description(
+            self._value('model'), robot, base.rpartition('/')[2], self._body.model))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0
@@ -322,15 +334,19 @@ class RobotSim(StartedNode):
         self._clock_message = Clock()
         self._tell_time: Publisher | None = None
         lockstep = self._value('lockstep') or not factor
+        clock = self.resolve_topic_name('/clock')
+        #: A second clock would make time jump to and fro for all who follow this one.
+        self._others: OtherPublishers | None = None
         if self._value('clock') or lockstep:
             self._tell_time = self.create_publisher(Clock, '/clock', 10)
+            self._others = OtherPublishers(self, [clock])
         self.ticker: Ticker | Lockstep
         if not lockstep:
             self.ticker = Ticker(self, self._rate * factor, self._tick, lambda: None, self._fail)
         else:
             self.ticker = Lockstep(self, self._rate, self._commands, self._tell,
-                                   lambda: self.count_subscribers('/clock') > 0, self._move,
-                                   self._fail, factor)
+                                   partial(self._find_lack, clock), self._move, self._fail,
+                                   factor)
         self._kp_scale = KpScaleSubscription(self)
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
@@ -435,13 +451,30 @@ class RobotSim(StartedNode):
     def _summary(self) -> str:
         return summary(self._body, (self._now - self._since) / self._rate)
 
+    def _find_other_clocks(self) -> str:
+        """Return which other node publishes on the same clock, and the remedy, or ''."""
+        others = self._others.check() if self._others is not None else ''
+        return others and (f'{others}: simulations need a clock each, as with -r /clock:=clock in '
+                           'namespaces')
+
+    def _find_lack(self, clock: str) -> str:
+        """Return for what time waits on a clock of its own, or ''."""
+        if others := self._find_other_clocks():
+            return f'waiting: {others}'
+        if not self.count_subscribers(clock):
+            return f'waiting for a node that listens to {clock}'
+        # By then another clock would have been found.
+        return 'waiting for discovery' * (time.monotonic() < self._made + DISCOVERY)
+
     # -- its health -----------------------------------------------------------------------
 
     def _health(self) -> Health:
         then, periods, late = self._before
         self._before = wall, now, behind = time.monotonic(), self._now, self.ticker.late
         factor = (now - periods) / self._rate / (wall - then)
-        if self._fallen:
+        if others := self._find_other_clocks():
+            level, text = DiagnosticStatus.ERROR, others
+        elif self._fallen:
             level, text = DiagnosticStatus.ERROR, 'the robot has fallen'
         elif 100 * (behind - late) > max(now - periods, 1):
             level, text = DiagnosticStatus.WARN, f'{behind - late} late periods'

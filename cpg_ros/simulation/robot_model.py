@@ -30,10 +30,10 @@ from cpg_ros.common import files
 from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import resource_folder
 from cpg_ros.motion.body_file import BipedLink
-from cpg_ros.motion.description import DescriptionError, load_urdf
+from cpg_ros.motion.description import DescriptionError, load_urdf, read_tree
 from cpg_ros.motion.meshes import merged, Mesh
 from cpg_ros.motion.robot import Robot
-from cpg_ros.simulation.urdf_model import part_touching, read_urdf
+from cpg_ros.simulation.urdf_model import part_touching, read_urdf, rooted, to_urdf
 import numpy as np
 
 # Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
@@ -247,6 +247,27 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
     except (ValueError, DescriptionError) as error:
         why = _reason(error).removeprefix(f'URDF {path}: ')
         raise SimulationError(f'model {path}: {why}') from error
+
+
+def description(name: str, robot: Robot, frame: str, model: Any = None) -> str:
+    """Return a model as URDF: the text of a URDF file, or what MuJoCo makes of another file.
+
+    Args:
+        name: as ``find_model`` takes it.
+        robot: whose joints it has.
+        frame: of the base, the root of the URDF.
+        model: the loaded ``mujoco.MjModel``; None to load it.
+
+    Raises:
+        SimulationError: as of ``load``.
+        DescriptionError: the URDF cannot be read.
+
+    """
+    path = find_model(name)
+    if path.suffix.lower() == '.urdf':
+        return rooted(read_tree(path), frame)
+    return to_urdf(load(name, robot) if model is None else model, robot.name, frame,
+                   {joint.name: joint.velocity for joint in robot.joints})
 
 
 def _reason(error: Exception) -> str:

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Conversion of ROS URDF files into ones that MuJoCo accepts; every change is reported.
+"""Conversion of ROS URDF files into ones that MuJoCo accepts, and of its models into URDF.
 
 A URDF may name meshes by package, in formats that MuJoCo does not read, and have links without
 mass or with inertias that no body has. Links that joints move need both; frames that hang on
-fixed joints become part of the link above.
+fixed joints become part of the link above. Every change is reported.
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -28,6 +28,7 @@ from xml.etree import ElementTree
 from cpg_ros.common import files
 from cpg_ros.motion.description import mesh_folder, numbers, read_tree
 from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
+from cpg_ros.motion.rotations import rotation_about, rpy_of
 import numpy as np
 
 # Meshes that MuJoCo cannot read: the reasons, and the convex hulls that take their place.
@@ -347,3 +348,144 @@ def _write(inertial: ElementTree.Element, mass: float, matrix: np.ndarray) -> No
     ElementTree.SubElement(inertial, 'inertia', {
         key: repr(float(value)) for key, value in
         zip(_KEYS, matrix[np.triu_indices(3)], strict=True)})
+
+
+# A model as URDF, for the topic ``robot_description``.
+
+def to_urdf(model: Any, name: str, frame: str, velocities: Mapping[str, float]) -> str:
+    """Return the moving bodies of a model as URDF; a mesh becomes the box around it.
+
+    Args:
+        model: ``mujoco.MjModel``, whose first free joint is that of the robot's base.
+        name: of the robot.
+        frame: of the base, the root of the URDF.
+        velocities: largest speed of each joint, rad/s.
+
+    """
+    import mujoco
+    kinds = mujoco.mjtJoint
+    base = int(model.jnt_bodyid[np.flatnonzero(model.jnt_type == kinds.mjJNT_FREE)[0]])
+    effort = dict(zip(model.actuator_trnid[:, 0].tolist(), model.actuator_forcerange[:, 1],
+                      strict=True))
+    robot = ElementTree.Element('robot', name=name)
+    # Body -> its link, and the origin of that link in the body's frame.
+    links: dict[int, tuple[str, np.ndarray]] = {}
+    for body in range(base, model.nbody):
+        above = links.get(int(model.body_parentid[body]))
+        if above is None and body != base:
+            continue
+        own = model.body(body).name or f'body_{body}'
+        first, count = model.body_jntadr[body], model.body_jntnum[body]
+        joints = range(first, first + count) if above else ()
+        parent, at = above or ('', np.zeros(3))
+        place, turn = model.body_pos[body] - at, _matrix(model.body_quat[body])
+        at = np.zeros(3)
+        for k in joints:
+            axis, angle = model.jnt_axis[k], float(model.qpos0[model.jnt_qposadr[k]])
+            place, at = place + turn @ (model.jnt_pos[k] - at), model.jnt_pos[k]
+            slides = model.jnt_type[k] == kinds.mjJNT_SLIDE
+            link = own if k == first + count - 1 else f'{own}_{k}'
+            joint = _joined(robot, model.joint(k).name, parent, link, (
+                place - angle * turn @ axis, turn) if slides else (
+                    place, turn @ rotation_about(axis, -angle)))
+            bounded = bool(model.jnt_limited[k])
+            joint.set('type', 'prismatic' if slides else 'revolute' if bounded else 'continuous')
+            ElementTree.SubElement(joint, 'axis', xyz=_text(axis))
+            low, high = model.jnt_range[k] if bounded else (0.0, 0.0)
+            ElementTree.SubElement(joint, 'limit', lower=f'{low:.6g}', upper=f'{high:.6g}',
+                                   effort=f'{effort.get(k, 0.0):.6g}',
+                                   velocity=f'{velocities.get(model.joint(k).name, 0.0):.6g}')
+            if not bounded and not slides:
+                for bound in ('lower', 'upper'):
+                    del joint[-1].attrib[bound]
+            parent, place, turn = link, np.zeros(3), np.eye(3)
+        if above and not count:
+            _joined(robot, f'{own}_joint', parent, own, (place, turn))
+        links[body] = own, at
+        _fill(robot, model, body, links[body])
+    return rooted(robot, frame)
+
+
+def rooted(robot: ElementTree.Element, frame: str) -> str:
+    """Return a URDF as text, with a link named ``frame`` above its root unless that is the root.
+
+    The link has no mass, as the KDL library asks of a root.
+    """
+    moved = {child.get('link') for child in robot.iterfind('joint/child')}
+    root = next((link.get('name', '') for link in robot.iterfind('link')
+                 if link.get('name') not in moved), frame)
+    if root != frame:
+        ElementTree.SubElement(robot, 'link', name=frame)
+        _joined(robot, f'{root}_root', frame, root, (np.zeros(3), np.eye(3)))
+    ElementTree.indent(robot)
+    return ElementTree.tostring(robot, encoding='unicode')
+
+
+def _matrix(quaternion: np.ndarray) -> np.ndarray:
+    import mujoco
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+def _text(numbers_: np.ndarray) -> str:
+    return ' '.join(f'{number:.9g}' for number in numbers_)
+
+
+def _origin(element: ElementTree.Element, place: np.ndarray, turn: np.ndarray) -> None:
+    import mujoco
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(turn).ravel())
+    ElementTree.SubElement(element, 'origin', xyz=_text(place), rpy=_text(rpy_of(quaternion)))
+
+
+def _joined(robot: ElementTree.Element, name: str, parent: str, child: str,
+            pose: tuple[np.ndarray, np.ndarray]) -> ElementTree.Element:
+    """Add a fixed joint; return it."""
+    joint = ElementTree.SubElement(robot, 'joint', name=name, type='fixed')
+    _origin(joint, *pose)
+    ElementTree.SubElement(joint, 'parent', link=parent)
+    ElementTree.SubElement(joint, 'child', link=child)
+    return joint
+
+
+def _fill(robot: ElementTree.Element, model: Any, body: int, link: tuple[str, np.ndarray]) -> None:
+    """Add a body's link, with mass and shapes, and the empty links of its further joints."""
+    own, at = link
+    known = {one.get('name') for one in robot.iterfind('link')}
+    for child in robot.findall('joint/child'):
+        if (name := child.get('link')) not in known and name != own:
+            ElementTree.SubElement(robot, 'link', name=name or '')
+    element = ElementTree.SubElement(robot, 'link', name=own)
+    if model.body_mass[body]:
+        inertial = ElementTree.SubElement(element, 'inertial')
+        _origin(inertial, model.body_ipos[body] - at, _matrix(model.body_iquat[body]))
+        ElementTree.SubElement(inertial, 'mass', value=f'{model.body_mass[body]:.9g}')
+        x, y, z = (f'{value:.9g}' for value in model.body_inertia[body])
+        ElementTree.SubElement(inertial, 'inertia', ixx=x, iyy=y, izz=z, ixy='0', ixz='0', iyz='0')
+    first = model.body_geomadr[body]
+    for k in range(first, first + model.body_geomnum[body]):
+        for tag in ('visual', 'collision'):
+            for place, turn, kind, sizes in _solids(model, k):
+                part = ElementTree.SubElement(element, tag)
+                _origin(part, place - at, turn)
+                ElementTree.SubElement(ElementTree.SubElement(part, 'geometry'), kind, sizes)
+
+
+def _solids(model: Any, k: int) -> list[tuple[np.ndarray, np.ndarray, str, dict[str, str]]]:
+    """Return position, axes, kind and sizes of the URDF solids of a geom, in its body's frame."""
+    import mujoco
+    kind, turn = mujoco.mjtGeom(model.geom_type[k]).name, _matrix(model.geom_quat[k])
+    place, size = model.geom_pos[k], model.geom_size[k]
+    ball = {'radius': f'{size[0]:.6g}'}
+    if kind == 'mjGEOM_SPHERE':
+        return [(place, turn, 'sphere', ball)]
+    if kind in ('mjGEOM_CYLINDER', 'mjGEOM_CAPSULE'):
+        solids = [(place, turn, 'cylinder', {**ball, 'length': f'{2.0 * size[1]:.6g}'})]
+        if kind == 'mjGEOM_CAPSULE':
+            solids += [(place + end * size[1] * turn[:, 2], turn, 'sphere', ball)
+                       for end in (-1.0, 1.0)]
+        return solids
+    # The box around all else.
+    middle, half = model.geom_aabb[k].reshape(2, 3)
+    return [(place + turn @ middle, turn, 'box', {'size': _text(2.0 * half)})]

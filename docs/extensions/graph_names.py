@@ -36,10 +36,10 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
         {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""',
          'assume_stand': 'true'},
         {'robot': 'unitree_go2', 'feedback.enabled': 'true', 'combined_topic': '""',
-         'feedback.odometry_topic': 'odom'})),
-    'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},
+         'feedback.odometry_topic': 'odom', 'stamped': 'true'})),
+    'robot_sim': (RobotSim, ({'clock': 'true', 'stamped': 'true'}, {'command': 'joint_trajectory'},
                              {'command': 'forward_position'})),
-    'unitree_bridge': (UnitreeBridge, ({}, {'command': 'joint_trajectory'},
+    'unitree_bridge': (UnitreeBridge, ({'stamped': 'true'}, {'command': 'joint_trajectory'},
                                        {'command': 'forward_position'})),
     'inversion': (Inversion, ({},))}
 #: Topics whose names are the same in every namespace.
@@ -48,7 +48,7 @@ ABSOLUTE = ('/diagnostics', '/clock', '/tf', '/lowcmd', '/lowstate')
 DOMAIN = 180 + os.getpid() % 50
 #: Every node of ROS has these.
 COMMON = ('/rosout', '/parameter_events', 'parameters', 'parameter_types',
-          'parameters_atomically', 'get_type_description')
+          'parameters_atomically', 'get_type_description', 'logger_levels')
 
 
 def of(kind: str) -> dict[str, tuple[str, str]]:

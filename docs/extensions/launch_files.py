@@ -29,6 +29,8 @@ def arguments(name: str) -> dict[str, tuple[str, str]]:
     found = _constants(source, ast.Assign)
     if name == 'rviz':
         return {**arguments('generator'), **found}
+    if 'declared(' not in source:
+        return found
     if 'GENERATOR' in source:
         found = {**_constants(shared, ast.AnnAssign), **found}
     return {**found, **_constants(shared, ast.FunctionDef)}

@@ -16,7 +16,10 @@
 
 import contextlib
 from pathlib import Path
+from types import SimpleNamespace
+from xml.etree import ElementTree
 
+from cpg_ros.motion.description import describe, parse_tree
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.ros.bridges.servos.bridge import SPECS as SERVO_BRIDGE
 from cpg_ros.ros.bridges.servos.bus import SPECS as SERVO_BUS
@@ -37,6 +40,11 @@ from launch_files import (
 import pytest
 import rclpy
 from setuptools import find_packages
+
+
+def tree_of(text):
+    """Return an XML text in a canonical form."""
+    return ElementTree.canonicalize(text)
 
 
 @pytest.fixture
@@ -103,13 +111,18 @@ def test_an_argument_of_another_kind_is_named(described, name, given, words):
         described(name, **given)
 
 
-@pytest.mark.parametrize('name', ['generator', 'inversion', 'go2'])
-def test_a_parameter_file_comes_between_defaults_and_what_is_asked(described, name, tmp_path,
-                                                                   monkeypatch):
+@pytest.mark.parametrize(('name', 'usual'), [
+    ('generator', ('amplitude', '1.0')), ('inversion', ('kp', '0.0')),
+    ('go2', ('cmd_vel', 'false'))])
+def test_a_parameter_file_comes_between_defaults_and_what_is_asked(described, name, usual,
+                                                                   tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     file = tmp_path / 'fitted.yaml'
     file.write_text('/**: {ros__parameters: {robot: a.yaml, frequency: 2.1}}')
-    found = described(name, params_file=str(file), robot='goat')
+    same, value = usual
+    found = described(name, params_file=str(file), robot='goat', **{same: value})
+    assert found.arguments[same] == value
+    assert any(same in node.options['parameters'][2] for node in found.nodes)
     for node in found.nodes:
         defaults, given, asked = node.options['parameters']
         assert given == str(file) and 'params_file' not in {**defaults, **asked}
@@ -192,7 +205,8 @@ def test_a_former_argument_is_refused_with_the_new_one(described, name, monkeypa
 def test_a_page_comes_with_them_if_asked_for(described, name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     page = node_of(described(name, panel='true'), 'panel')
-    assert page.options['name'] == 'cpg_panel' and 'parameters' not in page.options
+    assert page.options['name'] == 'cpg_panel'
+    assert page.options['parameters'] == [{'port': 8080}]
     with pytest.raises(RuntimeError, match='panel:=maybe is not true or false'):
         described(name, panel='maybe')
 
@@ -208,10 +222,18 @@ def test_go2_without_pictures(described, monkeypatch, tmp_path):
 @pytest.mark.parametrize(('given', 'domain', 'switch', 'command'), [
     ({}, '0', True, 'forward_position'), ({'simulator': 'true'}, '1', False, 'forward_position'),
     ({'domain': '7', 'command': 'joint_states'}, '7', True, 'none')])
-def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, command):
+def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, command,
+                                            monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '5')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
     found = described('go2_robot', gait='walk', record='bag', namespace='dog', **given)
     assert found.environment == {'ROS_DOMAIN_ID': domain,
                                  'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
+    # The setting of the shell is not replaced silently.
+    (line,) = found.lines
+    assert line.startswith(f'ROS_DOMAIN_ID is {domain} for these nodes, not 5 as in this shell')
+    monkeypatch.setenv('ROS_DOMAIN_ID', domain)
+    assert described('go2_robot', **given).lines == []
     generator, bridge = (node_of(found, name) for name in ('generator', 'unitree_bridge'))
     assert parameters(found, generator) == {
         'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2', 'rate': 500.0,
@@ -254,15 +276,20 @@ def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
     urdf.write_text(text)
     found = described('rviz', urdf=str(urdf), use_sim_time='true', namespace='dog')
     assert found.includes == [str(SOURCE / 'launch' / 'generator.launch.py')]
-    # The end of one is the end of all.
-    assert found.whole
+    # The end of one of them, but of nothing else in a larger launch, is the end of all.
     publisher, viewer = found.nodes
-    assert parameters(found, publisher) == {
-        'robot_description': text, 'publish_frequency': 50.0, 'use_sim_time': True}
+    assert 'on_exit' in publisher.options and 'on_exit' in viewer.options
+    (handler,) = found.handlers
+    ends = handler.arguments[0].options['target_action']
+    assert ends(SimpleNamespace(node_name='/dog/cpg_generator'))
+    assert not ends(SimpleNamespace(node_name='/cpg_generator')) and not ends(SimpleNamespace())
+    given = parameters(found, publisher)
+    assert (tree_of(given.pop('robot_description')) == tree_of(text)
+            and given == {'publish_frequency': 50.0, 'frame_prefix': '', 'use_sim_time': True})
     assert viewer.options['package'] == 'rviz2'
     assert viewer.options['remappings'] == [('/robot_description', 'robot_description')]
     display, config, fixed, frame = viewer.options['arguments']
-    assert display == '-d' and Path(config.perform(found.context)).is_file()
+    assert display == '-d' and Path(config).is_file()
     assert (fixed, frame) == ('-f', 'trunk')
     assert Path(found.arguments['urdf']).is_file()
     assert [node.options['package'] for node in described('rviz', rviz='false').nodes] == [
@@ -280,13 +307,39 @@ def test_rviz_refuses_what_is_no_urdf(described, tmp_path, text, words):
         described('rviz', urdf=str(urdf))
 
 
-def test_rviz_says_which_package_is_missing(described):
-    from ament_index_python.packages import get_package_prefix
-    found = described('rviz', rviz='false')
-    found.space['get_package_prefix'] = get_package_prefix
-    with pytest.raises(RuntimeError, match='needs the package no_such_thing: sudo apt install '
-                                           r'ros-\$ROS_DISTRO-no-such-thing'):
-        found.space['needed']('no_such_thing')
+def test_rviz_says_which_package_is_missing(described, monkeypatch, tmp_path):
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    with pytest.raises(RuntimeError, match='needs the package robot_state_publisher: sudo apt '
+                                           r'install ros-\$ROS_DISTRO-robot-state-publisher'):
+        described('rviz', installed=False)
+
+
+def test_go2_shows_the_simulated_robot(described, monkeypatch, tmp_path):
+    pytest.importorskip('mujoco')
+    monkeypatch.chdir(tmp_path)
+    found = described('go2', rviz='true', namespace='dog', frame_prefix='dog/', own_clock='true')
+    publisher, viewer = (node_of(found, name) for name in ('robot_state_publisher', 'rviz2'))
+    given = parameters(found, publisher)
+    assert given['frame_prefix'] == 'dog/' and given['use_sim_time'] is True
+    urdf = describe(parse_tree(given['robot_description'].encode(), 'text'), 'text')
+    assert urdf.root() == 'base_link' and 'FL_calf_joint' in urdf.joints
+    assert viewer.options['arguments'][-2:] == ['-f', 'dog/odom']
+    simulation = parameters(found, node_of(found, 'robot_sim'))
+    assert (simulation['base_frame'], simulation['odom_frame']) == ('dog/base_link', 'dog/odom')
+    # All of them follow the clock of the namespace.
+    for name in ('generator', 'robot_sim', 'robot_state_publisher', 'rviz2'):
+        assert ('/clock', 'clock') in node_of(found, name).options['remappings']
+
+
+def test_two_go2_share_neither_page_nor_clock_nor_frames(described):
+    left, right = (dict(include.options['launch_arguments'])
+                   for include in described('two_go2').includes)
+    assert (left['namespace'], right['namespace']) == ('left', 'right')
+    assert left['panel_port'] != right['panel_port']
+    assert left['own_clock'] == right['own_clock'] == 'true'
+    assert left['frame_prefix'] == 'left/' and right['frame_prefix'] == 'right/'
+    names = described('go2', film='none', footfalls='none').arguments
+    assert set(left) <= set(names)
 
 
 @pytest.mark.parametrize('name', FILES)
@@ -300,13 +353,13 @@ def test_with_launch_itself(name):
     source = PythonLaunchDescriptionSource(str(SHARE / 'launch' / f'{name}.launch.py'))
     description = source.get_launch_description(context)
     names = {argument.name for argument in description.get_launch_arguments()}
-    assert 'namespace' in names and len(names) >= 10
-    if name in ('rviz', 'go2'):
+    assert ('namespace' in names and len(names) >= 10) or name == 'two_go2'
+    if name in ('rviz', 'go2', 'two_go2'):
         return  # these start what may not be installed
     for argument in description.get_launch_arguments():
         argument.execute(context)
     found = [node for entity in description.entities if isinstance(entity, OpaqueFunction)
-             for node in entity.execute(context) if isinstance(node, Node)]
+             for node in entity.execute(context) or () if isinstance(node, Node)]
     for node in found:
         node._perform_substitutions(context)
     assert {node.node_name for node in found} == {

@@ -135,7 +135,7 @@ def test_it_walks_in_lockstep_whatever_it_is_commanded_by(graph, tmp_path, comma
     assert tuple(watcher.names) == ROBOT.order
     # A copy: what is on its way may still come in.
     check_odometry(list(watcher.odometry))
-    check_transforms(list(watcher.transforms), list(watcher.odometry), ('odom', 'base'))
+    check_transforms(list(watcher.transforms), list(watcher.odometry), ('odom', 'base_link'))
     if files:
         assert steps.stat().st_size > 5000
         assert sorted(file.name for file in tmp_path.iterdir()) == [steps.name]
@@ -147,7 +147,7 @@ WAYS: list = []
 def check_odometry(messages):
     """Show that the pose's way is the twist's, turned into the world and summed up."""
     assert messages[0].header.frame_id == 'odom'
-    assert messages[0].child_frame_id == 'base'
+    assert messages[0].child_frame_id == 'base_link'
     times = np.array([seconds(message.header.stamp) for message in messages])
     places, velocities = [], []
     for message in messages:

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from graph import EXECUTABLE, Process, until
 from lxml import etree
+from panel_client import Client, start_panel
 import pytest
 import rclpy
 from servo_chain import calibrated, ServoChain
@@ -37,16 +38,60 @@ def test_the_policies_are_of_the_schema():
 def allowed(executable, kind, what):
     """Return the full names that an enclave may use."""
     (enclave,) = POLICY.findall(f".//enclave[@path='/cpg/{executable}']")
-    node = enclave.find('.//profile').get('node')
+    nodes = [(profile.get('node'), profile) for profile in enclave.iterfind('.//profile')]
     return {name if name.startswith('/') else f'/{name.replace("~", f"{node}/")}'
-            for rules in enclave.findall(f".//{kind}s[@{what}='ALLOW']")
+            for node, profile in nodes for rules in profile.findall(f"{kind}s[@{what}='ALLOW']")
             for name in (one.text for one in rules.findall(kind))}
+
+
+def used(looker, node):
+    """Return the names that a node publishes, hears and answers."""
+    services = until(lambda: looker.get_service_names_and_types_by_node(node, '/')
+                     if node in looker.get_node_names() else None, f'the node {node}')
+    return [{name for name, _ in entries} for entries in (
+        looker.get_publisher_names_and_types_by_node(node, '/'),
+        looker.get_subscriber_names_and_types_by_node(node, '/'), services)]
+
+
+def test_the_panel_may_record_what_any_node_publishes_or_hears():
+    named = {name for enclave in POLICY.iterfind('.//enclave')
+             for what in ('publish', 'subscribe')
+             for name in allowed(enclave.get('path').removeprefix('/cpg/'), 'topic', what)}
+    assert named | {'/tf_static', '/clock'} == allowed('panel', 'topic', 'subscribe')
+
+
+def test_a_panel_that_records_needs_no_more_than_its_policy(tmp_path):
+    generator = Process('-p', 'robot:=unitree_go2', '-p', 'stamped:=true')
+    panel, address = start_panel(generator.domain, '-p', f'recordings:={tmp_path}')
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=generator.domain)
+    looker = rclpy.create_node('looker', context=context)
+    page = None
+    try:
+        generator.wait_for('publishing')
+        page = Client(address).ready()
+        until(lambda: page.value('rate'), 'the parameters')
+        page.send(do='record', on=True)
+        until(lambda: '/cpg_generator/cells_stamped' in used(looker, 'cpg_panel_watch')[1],
+              'recording')
+        published, heard, services = used(looker, 'cpg_panel_watch')
+    finally:
+        if page is not None:
+            page.end()
+        looker.destroy_node()
+        rclpy.shutdown(context=context)
+        for process in (panel, generator):
+            process.end()
+    assert published <= allowed('panel', 'topic', 'publish')
+    assert heard <= allowed('panel', 'topic', 'subscribe')
+    assert services <= allowed('panel', 'service', 'reply')
 
 
 @pytest.mark.parametrize(('executable', 'node', 'sign', 'words'), [
     ('generator', 'cpg_generator', 'publishing', [
         'cmd_vel:=true', 'robot:=unitree_go2', 'command:=forward_position', "combined_topic:=''",
-        'assume_stand:=true']),
+        'assume_stand:=true', 'stamped:=true']),
+    ('generator', 'cpg_generator', 'until it is configured', ['managed:=true']),
     ('robot_sim', 'robot_sim', 'Go2|go2', []),
     ('inversion', 'cpg_inversion', 'listening', []),
     ('panel', 'cpg_panel', 'http://', ['port:=0']),
@@ -64,11 +109,7 @@ def test_a_running_node_needs_no_more_than_its_policy(executable, node, sign, wo
     looker = rclpy.create_node('looker', context=context)
     try:
         process.wait_for(sign)
-        services = {name for name, _ in until(
-            lambda: looker.get_service_names_and_types_by_node(node, '/')
-            if node in looker.get_node_names() else None, f'the node {node}')}
-        published = {name for name, _ in looker.get_publisher_names_and_types_by_node(node, '/')}
-        heard = {name for name, _ in looker.get_subscriber_names_and_types_by_node(node, '/')}
+        published, heard, services = used(looker, node)
     finally:
         looker.destroy_node()
         rclpy.shutdown(context=context)

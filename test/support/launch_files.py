@@ -27,7 +27,7 @@ from cpg_ros.ros.generator_parameters import Planner, specs
 
 SOURCE = Path(__file__).resolve().parents[2]
 SHARE = Path(get_package_share_directory('cpg_ros'))
-FILES = ('generator', 'inversion', 'go2', 'go2_robot', 'servo_robot', 'rviz')
+FILES = ('generator', 'inversion', 'go2', 'go2_robot', 'servo_robot', 'rviz', 'two_go2')
 
 
 def executables():
@@ -61,14 +61,24 @@ class Stub:
             self.name, self.options['default'])
 
 
+class Context(dict):
+    """Stands for a LaunchContext: the configurations by name."""
+
+    @property
+    def launch_configurations(self):
+        return self
+
+
 def describing(monkeypatch):
     """Yield what runs a launch file with stand-ins for launch, which is not on PyPI."""
     kinds = {name: type(name, (Stub,), {}) for name in (
-        'LaunchDescription', 'LaunchContext', 'DeclareLaunchArgument', 'OpaqueFunction',
+        'LaunchDescription', 'LaunchDescriptionEntity', 'LaunchContext', 'DeclareLaunchArgument',
+        'LogInfo', 'GroupAction', 'OpaqueFunction',
         'IncludeLaunchDescription', 'Shutdown', 'SetEnvironmentVariable', 'ExecuteProcess',
         'RegisterEventHandler', 'OnProcessExit', 'LaunchConfiguration', 'Node',
         'ParameterValue', 'PythonLaunchDescriptionSource')}
     for name in ('launch', 'launch.actions', 'launch.substitutions', 'launch.launch_context',
+                 'launch.launch_description_entity',
                  'launch.launch_description_sources', 'launch.event_handlers', 'launch_ros',
                  'launch_ros.actions',
                  'launch_ros.parameter_descriptions'):
@@ -77,33 +87,38 @@ def describing(monkeypatch):
         monkeypatch.setitem(sys.modules, name, module)
     monkeypatch.delitem(sys.modules, 'cpg_ros.ros.launch_arguments', raising=False)
 
-    def run(name, **given):
+    def run(name, installed=True, **given):
         space = {'__file__': str(SOURCE / 'launch' / f'{name}.launch.py')}
         exec(compile(Path(space['__file__']).read_text(), space['__file__'], 'exec'), space)
-        if name == 'rviz':
-            space['get_package_prefix'] = lambda package: f'/opt/{package}'
-        described = SimpleNamespace(arguments={}, nodes=[], includes=[], space=space,
-                                    whole=False)
-        functions = []
+        shared = sys.modules.get('cpg_ros.ros.launch_arguments')
+        if shared is not None and installed:
+            shared.get_package_prefix = lambda package: f'/opt/{package}'
+        described = SimpleNamespace(arguments={}, includes=[])
+        # Those of the files that rviz and two_go2 include.
+        context = Context({'namespace': '', 'use_sim_time': 'false'} if name == 'rviz' else {})
+        context.update(given)
+        made = []
         for entity in space['generate_launch_description']().arguments[0]:
             if isinstance(entity, kinds['DeclareLaunchArgument']):
                 described.arguments[entity.name] = entity.options['default_value']
+                context.setdefault(entity.name, entity.options['default_value'])
                 assert entity.options['description']
             elif isinstance(entity, kinds['OpaqueFunction']):
-                functions.append(entity.options['function'])
-            elif isinstance(entity, kinds['RegisterEventHandler']):
-                described.whole = True
+                made += entity.options['function'](context) or ()
+            elif isinstance(entity, kinds['GroupAction']):
+                described.includes += entity.arguments[0]
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
         assert not set(given) - set(described.arguments) - {'feedback'} or name == 'rviz'
-        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false', 'panel': 'false',
-                   **described.arguments, **given}
-        made = [one for function in functions for one in function(context) or ()]
-        described.nodes = [one for one in made if isinstance(one, kinds['Node'])]
-        described.environment = {one.arguments[0]: one.arguments[1] for one in made
-                                 if isinstance(one, kinds['SetEnvironmentVariable'])}
-        described.processes = [one.options['cmd'] for one in made
-                               if isinstance(one, kinds['ExecuteProcess'])]
+
+        def of_kind(kind):
+            return [one for one in made if isinstance(one, kinds[kind])]
+
+        described.nodes, described.handlers = of_kind('Node'), of_kind('RegisterEventHandler')
+        described.environment = {one.arguments[0]: one.arguments[1]
+                                 for one in of_kind('SetEnvironmentVariable')}
+        described.lines = [one.options['msg'] for one in of_kind('LogInfo')]
+        described.processes = [one.options['cmd'] for one in of_kind('ExecuteProcess')]
         described.context = context
         return described
     yield run

@@ -21,7 +21,6 @@ import math
 import re
 import threading
 import time
-from unittest import mock
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.generator import Generator
@@ -68,8 +67,7 @@ class SteppedGenerator:
                    context=self._context, domain_id=self.domain,
                    signal_handler_options=SignalHandlerOptions.NO)
         try:
-            with mock.patch('rclpy.node.get_default_context', lambda: self._context):
-                self._node = Generator()
+            self._node = Generator(context=self._context)
         except BaseException:
             rclpy.shutdown(context=self._context)
             raise
@@ -77,9 +75,7 @@ class SteppedGenerator:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
         self._serving = threading.Thread(target=self._serve, daemon=True)
-        self._node.begin()
         self._serving.start()
-        self._node.parameter_service.thread.start()
         self.watcher = Watcher(self.domain, self._node.get_fully_qualified_name())
         self.lines: list[str] = []
         self.watcher.node.create_subscription(
@@ -95,8 +91,7 @@ class SteppedGenerator:
     def _serve(self) -> None:
         while not self._node.stop.is_set():
             try:
-                self._executor.spin_once(timeout_sec=0.02)
-                self._node.poll()
+                self._executor.spin_once(timeout_sec=0.1)
             except ExternalShutdownException:
                 return
 
@@ -178,6 +173,8 @@ class SteppedGenerator:
                 ending.callback(step)
             ending.callback(OCCUPIED.discard, self.domain)
             self._ended.set()
+            # It need not ramp down.
+            self._node.hand_over()
             self._node.stop.set()
 
 

@@ -27,6 +27,7 @@ import time
 from typing import Any, ClassVar
 
 from cpg_ros.common.errors import CpgError
+from cpg_ros.motion.description import read_urdf_text
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.bridges.robot_state import BridgeSettings, JointCommand, RobotState
@@ -42,7 +43,7 @@ from cpg_ros.ros.command_topics import Commands, KINDS, KpScaleSubscription
 from cpg_ros.ros.node.health import Health, HealthPublisher, NAMELESS, others_on, STEADY
 from cpg_ros.ros.node.node_base import StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, Spec
-from cpg_ros.ros.node.polled import command_qos, latched, PolledSubscription
+from cpg_ros.ros.node.polled import command_qos, latched_text, PolledSubscription
 from cpg_ros.ros.node.ticker import Ticker
 from diagnostic_msgs.msg import DiagnosticStatus
 import numpy as np
@@ -183,8 +184,9 @@ class BridgeNode(StartedNode):
         self._requests: deque[Callable[[float], None]] = deque()
         self._ending = self._new = False
         self.received = self.sent = 0
-        self._state_publisher = self.create_publisher(String, '~/state', latched())
-        self._state_publisher.publish(String(data=BridgeState.IDLE.value))
+        self._state_publisher = latched_text(self, '~/state', BridgeState.IDLE.value)
+        if urdf := value('urdf'):
+            self._description = latched_text(self, 'robot_description', read_urdf_text(urdf))
         self.ticker = Ticker(self, value('rate'), self._tick, lambda: None, self._fail,
                              lambda _: None)
         self._start: StartSequence | None = None

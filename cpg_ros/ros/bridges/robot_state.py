@@ -32,6 +32,8 @@ def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
         'robot': Spec(robot, 'robot file, or the name of a shipped one',
                       constraints='a shipped name, or the path of a YAML file'),
         **others,
+        'urdf': Spec('', 'URDF or xacro file of the robot, published on robot_description; empty '
+                     'for none'),
         'command': Spec('joint_states', 'kind of command messages to follow',
                         constraints=one_of(KINDS)),
         'torque_factor': Spec(1.0, "fraction of the motors' torque limits that commands may use",

@@ -32,6 +32,7 @@ from typing import Any
 from cpg_ros.common.command_line import say
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.node.console import never_wait, TO_STREAM
+from cpg_ros.ros.node.health import STEADY
 from cpg_ros.ros.node.parameters import as_doubles, as_list, kind_of, Spec, StrictParameterService
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
@@ -168,6 +169,8 @@ class Lifecycle(LifecycleNodeMixin):
     on_shutdown = partialmethod(_step, 'shutdown')
 
 
+#: TURN: period in which a node takes its turn in the executor of another program, s.
+TURN = 0.02
 #: LAST_DOMAIN: largest domain id; the ports of larger ones exceed UDP's range.
 LAST_DOMAIN = 232
 
@@ -178,6 +181,9 @@ class StartError(CpgError):
 
 class StartedNode(Node):
     """A node with parameters declared by specs, and a thread.
+
+    ``run`` starts and ends it. In the executor of another program it starts when that spins, and
+    ends with ``destroy_node``; its callbacks must not run at the same time as each other.
 
     Attributes:
         stop: set to end the node.
@@ -192,7 +198,8 @@ class StartedNode(Node):
     SETS_OTHERS: frozenset[str] = frozenset()
 
     def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, start_parameter_services=False, **options)
+        super().__init__(name, start_parameter_services=False, enable_logger_service=True,
+                         **options)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self._lists: dict[str, list] = {}
@@ -205,6 +212,8 @@ class StartedNode(Node):
         self.thread: threading.Thread | None = None
         self.stop = threading.Event()
         self.signals: list[int] = []
+        self._begun = self._over = False
+        self._turns = self.create_timer(TURN, self._take_turn, clock=STEADY)
 
     def _declare(self, specs: Mapping[str, Spec]) -> None:
         """Declare parameters by name.
@@ -273,9 +282,46 @@ class StartedNode(Node):
             if not self.has_parameter(name):
                 self.get_logger().warning(f"there is no parameter '{name}': ignored")
 
+    def start(self) -> None:
+        """Start all threads."""
+        self._begun = True
+        self.begin()
+        self.parameter_service.thread.start()
+
+    def end(self) -> None:
+        """End all threads, as ``finish`` does; do nothing if they have been ended."""
+        self.stop.set()
+        self._turns.cancel()
+        if self._begun and not self._over:
+            self._over = True
+            self.parameter_service.end()
+            self.finish()
+
+    def _take_turn(self) -> None:
+        """Start, poll and end the node in the executor of another program."""
+        if self.stop.is_set():
+            self.end()
+        elif self._begun:
+            self.poll()
+        else:
+            self.start()
+
+    def hand_over(self) -> None:
+        """Leave starting, polling and ending to the caller."""
+        self._turns.cancel()
+
+    def destroy_node(self) -> None:
+        """End all threads, and destroy the node."""
+        self.end()
+        super().destroy_node()
+
     def _fail(self, error: BaseException) -> None:
         """End the node because of an exception in its thread."""
         self.failure = error
+        if not self.context.ok():
+            print(f'{self.get_name()}: rclpy was shut down before the node was destroyed: nothing '
+                  'more is published', file=sys.stderr)
+            return
         self.get_logger().fatal('the publishing thread failed:\n'
                                 + ''.join(traceback.format_exception(error)))
         self.stop.set()
@@ -422,18 +468,16 @@ def run(make: Callable[[], StartedNode], name: str, text: str, specs: Mapping[st
     serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
     gc.collect()
     gc.freeze()
-    node.begin()
+    node.hand_over()
+    node.start()
     serving.start()
-    node.parameter_service.thread.start()
     # A signal wakes the main thread whichever thread receives it: a stop must not wait.
     woken, waking = os.pipe()
     os.set_blocking(waking, False)
     signal.set_wakeup_fd(waking, warn_on_full_buffer=False)
     while not signals and not node.stop.is_set():
         select.select([woken], [], [], node.poll())
-    node.stop.set()
-    node.parameter_service.end()
-    node.finish()
+    node.end()
     for number in ending:
         # It ends already: a second one, while the interpreter winds up, would kill it.
         signal.signal(number, signal.SIG_IGN)

@@ -23,8 +23,10 @@ from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import String
 
 # Qualities of service that more than one node uses.
 
@@ -35,6 +37,13 @@ OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 def latched(depth: int = 1) -> QoSProfile:
     """Return the QoS of a topic whose last messages reach later subscribers."""
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+def latched_text(node: Node, topic: str, text: str) -> Publisher:
+    """Publish a text that later subscribers receive, too; return the publisher."""
+    publisher = node.create_publisher(String, topic, latched())
+    publisher.publish(String(data=text))
+    return publisher
 
 
 def command_qos() -> QoSProfile:

@@ -40,7 +40,7 @@ from cpg_ros.ros.node.client import (
     ServiceClients,
 )
 from cpg_ros.ros.node.console import aside
-from cpg_ros.ros.node.health import START
+from cpg_ros.ros.node.health import HealthPublisher, START
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
 from cpg_ros.ros.panel import pages as requests
@@ -344,6 +344,9 @@ class Panel(StartedNode):
         self._server = WebServer(AccessControl(self._token), self._pages, self._recorder.packed,
                                  self._come, self._on_request, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
+        self._own_health = HealthPublisher(self, 'pages', '', lambda: (
+            DiagnosticStatus.OK, 'serving', {'open pages': len(self._pages.everyone),
+                                             'recording': self._recorder.running}))
         self._warn_of_unknown()
 
     def _free(self) -> None:

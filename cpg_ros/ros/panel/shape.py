@@ -529,14 +529,17 @@ def shipped_robot(name: str) -> Robot | None:
 def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 
+    A simulation's own description has no meshes: its model comes first, if that is shipped.
     ``report`` takes a line about each better shape that is not available.
     """
     robot = shipped_robot(info.robot)
+    described = [
+        lambda: (from_text(info.description, 'robot_description', report)
+                 if info.description else None),
+        lambda: _from_model(info, robot, report) if robot else None]
     for make in (
             lambda: from_file(Path(info.urdf).expanduser(), report) if info.urdf else None,
-            lambda: (from_text(info.description, 'robot_description', report)
-                     if info.description else None),
-            lambda: _from_model(info, robot, report) if robot else None):
+            *(described if not info.model or _is_file(info.model) else described[::-1])):
         try:
             shape = make()
             if shape and (size := len(json.dumps(shape.message()))) > LONGEST:
@@ -557,9 +560,13 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     return _sticks(info, robot)
 
 
+def _is_file(model: str) -> bool:
+    return '/' in model or model.endswith(('.xml', '.urdf'))
+
+
 def _from_model(info: RobotInfo, robot: Robot, report: Callable[[str], None]) -> Shape | None:
     model = info.model
-    if '/' in model or model.endswith(('.xml', '.urdf')):
+    if _is_file(model):
         report(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
                         'node names; publish robot_description, or start the panel with '
                         '-p urdf:=FILE'))

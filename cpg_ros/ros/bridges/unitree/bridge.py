@@ -41,7 +41,7 @@ from cpg_ros.ros.bridges.unitree.messages import (
     settings_of,
 )
 from cpg_ros.ros.bridges.watchdog_link import RobotInterface
-from cpg_ros.ros.generator_io import joint_state, labelled
+from cpg_ros.ros.generator_io import foot_wrenches, joint_state, labelled, STAMPED
 from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from cpg_ros.ros.node.node_base import run
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
@@ -162,6 +162,7 @@ SPECS = fixed(bridge_specs(
                         constraints='as foot_offset'),
     stop_button=Spec('B', 'button of the wireless remote that stops the robot, pressed alone or '
                      'with others', constraints=one_of(BUTTONS)),
+    stamped=STAMPED,
     motion_switcher=Spec(True, "ask the robot's own service to release its motion modes; set to "
                          'false for simulators, which have none')))
 
@@ -175,8 +176,12 @@ FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
 class Sensors:
     """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
 
-    def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces) -> None:
-        """Publish the contents of ``state``, joints in ``robot.order``."""
+    def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces,
+                 stamped: bool = False) -> None:
+        """Publish the contents of ``state``, joints in ``robot.order``.
+
+        ``stamped`` adds forces on the feet with stamps, in frames such as ``lh_foot``.
+        """
         self._state, self._forces, self._legs = state, feet, tuple(robot.legs)
         names = robot.order
         self._from = [JOINTS.index(name) for name in names]
@@ -192,7 +197,9 @@ class Sensors:
                 *each(imu.orientation, 'wxyz', orientation),
                 *each(imu.angular_velocity, 'xyz', rates),
                 *each(imu.linear_acceleration, 'xyz', acceleration)])),
-            ('foot_contacts', labelled(tuple(robot.legs), forces))])
+            ('foot_contacts', labelled(self._legs, forces)),
+            *(foot_wrenches(self._legs, forces, {leg: f'{leg}_foot' for leg in self._legs})
+              if stamped else [])])
         self._battery = node.create_publisher(BatteryState, 'battery', QoSProfile(depth=100),
                                               qos_overriding_options=OVERRIDABLE)
 
@@ -330,7 +337,7 @@ class UnitreeBridge(BridgeNode):
         self._button = BUTTONS[self._value('stop_button')]
         self._sensors = Sensors(self, self.robot, self._state, FootForces(
             len(self.robot.legs), self._value('foot_scale'), self._value('foot_offset'),
-            self._value('foot_threshold')))
+            self._value('foot_threshold')), self._value('stamped'))
         self._announcements = Announcements(self.context.get_domain_id())
 
     def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
