@@ -196,7 +196,7 @@ def test_what_a_simulated_robot_publishes(graph, values):
         setattr(body, name, part)
     unit = SimpleNamespace(measure=lambda stamp: (stamp - 30, felt), seed=0,
                            foot_forces=body.feet)
-    Measurements(graph, body, unit, 'trunk').publish(12_000_000_034)
+    Measurements(graph, body, unit, ('odom', 'trunk')).publish(12_000_000_034)
     stamp = Time(sec=12, nanosec=34)
     position, velocity, torque, feet, base, quaternion, twist = (part.tolist() for part in parts)
     same(graph.sent['joint_states'],
