@@ -29,6 +29,7 @@ from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.gait_tables import POINTS, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.fitting.gaits.stride import find_stride
+from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, write_robot
@@ -82,8 +83,11 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
 
     """
     network, geometry = NETWORKS[robot.networks[0]], geometry_of(robot)
-    stride = find_stride(recording, {leg: tuple(joint.name for joint in joints)
-                                     for leg, joints in robot.legs.items()}, network)
+    times = recording.times - recording.times[0]
+    stride = find_stride(
+        Recording(recording.joints, times, recording.positions, recording.source),
+        {leg: tuple(joint.name for joint in joints) for leg, joints in robot.legs.items()},
+        network)
     gait = gait or stride.gait
     if gait not in network.presets():
         raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
@@ -91,7 +95,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     gait_plan = plan_gait(robot, gait)
     columns = [recording.joints.index(name) for name in stride.joints]
 
-    times, felt, estimate = recording.times, recording.senses, BodyState(geometry)
+    felt, estimate = recording.senses, BodyState(geometry)
     velocity = np.empty((len(times), 2))
     for k, row in enumerate(velocity):
         now = SensorData(*(rows[k:k + 1] for rows in felt))
