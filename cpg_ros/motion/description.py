@@ -371,8 +371,9 @@ def describe(tree: Element, source: str, path: Path | None = None) -> RobotDescr
     for element in tree.iterfind('ros2_control/joint'):
         if (name := element.get('name', '')) in joints:
             joints[name] = _controlled(element, joints[name])
+    folder = mesh_folder(tree)
     return RobotDescription('URDF', joints, {
-        link.get('name', '').strip(): _link(link, path, mesh_folder(tree))
+        link.get('name', '').strip(): _link(link, path, folder)
         for link in tree.iterfind('link')})
 
 

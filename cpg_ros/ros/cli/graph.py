@@ -230,16 +230,16 @@ class Topic:
         self._end, self._silence = began + wait, began + SILENCE
         self._late = late
         self._name = topic = node.resolve_topic_name(name)
-        while not (kinds := dict(node.get_topic_names_and_types()).get(topic)):
+        while not (publishers := node.get_publishers_info_by_topic(topic)):
             if time.monotonic() > self._end:
                 raise SilentTopic(f'nobody publishes on {topic}')
             self._pause()
         # What was published before is kept for those that ask as its publisher offers it.
-        kept = {publisher.qos_profile.durability
-                for publisher in node.get_publishers_info_by_topic(topic)}
+        kept = {publisher.qos_profile.durability for publisher in publishers}
         quality = latched if kept == {DurabilityPolicy.TRANSIENT_LOCAL} else best_effort
-        self._subscription = PolledSubscription(node, message_class(kinds[0]), name,
-                                                quality(DEPTH), overridable=False)
+        self._subscription = PolledSubscription(
+            node, message_class(publishers[0].topic_type), name, quality(DEPTH),
+            overridable=False)
 
     def messages(self) -> Iterator[Any]:
         """Yield messages as they arrive.

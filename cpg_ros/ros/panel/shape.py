@@ -332,6 +332,8 @@ def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
 #: LARGEST: largest text on ``robot_description``, bytes; TRIANGLES: most triangles that are drawn;
 #: MESHES: most bytes of all meshes.
 LARGEST, TRIANGLES, MESHES = 4_000_000, 100_000, 500_000_000
+#: Triangles of a solid as the page draws it.
+SOLIDS = {'box': 12, 'cylinder': 96, 'sphere': 720, 'capsule': 816}
 #: FURTHEST: nothing that is drawn is longer or further away, m; THIN: half the least width of a
 #: box in place of what is missing, m.
 FURTHEST, THIN = 1e4, 0.01
@@ -444,7 +446,7 @@ class _Drawing:
         for solid in visual.iterfind('geometry/*'):
             part = self._part(solid)
             part.colour, part.position, part.pose = colour, position, pose
-            count = 0 if part.mesh is None else len(part.mesh.triangles)
+            count = SOLIDS[part.kind] if part.mesh is None else len(part.mesh.triangles)
             if count > self._remaining:
                 raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
             self._remaining -= count
