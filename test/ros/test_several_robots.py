@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Several robots in one domain, each in a namespace: their clocks, topics and descriptions."""
 
 import importlib.util

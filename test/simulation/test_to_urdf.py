@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """A model as URDF: the same bodies at the same places, whatever the angles of the joints."""
 
 from xml.etree import ElementTree
