@@ -299,7 +299,7 @@ class SimulatedTime:
         for now in np.arange(start, end, step):
             self._tell(now)
             ends, waits = time.monotonic() + PATIENCE, 0
-            while any(samples[-1][0] < now - 2.5 * step for samples in moving):
+            while any(not samples or samples[-1][0] < now - 2.5 * step for samples in moving):
                 assert time.monotonic() < ends, f'waited {PATIENCE} s in vain for joint states'
                 time.sleep(0.0002)
                 waits += 1

@@ -21,17 +21,21 @@ import math
 import re
 import threading
 import time
+from unittest import mock
 
 from cpg_ros.common.errors import CpgError
 from cpg_ros.ros.generator import Generator
 from graph import free_domain, OCCUPIED, PATIENCE, until, Watcher
-from rcl_interfaces.msg import Log
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.impl import rcutils_logger
+from rclpy.logging import get_logger, LoggingSeverity
 from rclpy.signals import SignalHandlerOptions
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import SetBool
+
+# A line's caller is beyond this file, too.
+rcutils_logger._internal_callers.append(__file__)
 
 #: Of /clock, s: below what a generator takes for a stall.
 STEP = 0.02
@@ -48,7 +52,7 @@ class SteppedGenerator:
     Attributes:
         domain: of both.
         watcher: of it, in the same process.
-        lines: what generators of the domain have logged.
+        lines: what the generator has logged.
         now: the simulated time, s.
         pace: simulated time by that of the wall at most.
 
@@ -66,8 +70,10 @@ class SteppedGenerator:
         rclpy.init(args=['generator', '--ros-args', '-p', 'use_sim_time:=true', *ros_args],
                    context=self._context, domain_id=self.domain,
                    signal_handler_options=SignalHandlerOptions.NO)
+        self.lines: list[str] = []
         try:
-            self._node = Generator(context=self._context)
+            with mock.patch('rclpy.node.get_logger', self._logger):
+                self._node = Generator(context=self._context)
         except BaseException:
             rclpy.shutdown(context=self._context)
             raise
@@ -77,16 +83,25 @@ class SteppedGenerator:
         self._serving = threading.Thread(target=self._serve, daemon=True)
         self._serving.start()
         self.watcher = Watcher(self.domain, self._node.get_fully_qualified_name())
-        self.lines: list[str] = []
-        self.watcher.node.create_subscription(
-            Log, '/rosout', lambda message: self.lines.append(message.msg),
-            QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self.now, self.pace, self._end_time = 100.0, math.inf, math.inf
         self._clock = self.watcher.node.create_publisher(Clock, '/clock', 10)
         self._going, self._ended = threading.Event(), threading.Event()
         self._ticking = threading.Thread(target=self._tick, daemon=True)
         self._ticking.start()
         self._first = self._values()
+
+    def _logger(self, name: str) -> rcutils_logger.RcutilsLogger:
+        """Return a logger that keeps its lines: nodes of one name in a process share /rosout."""
+        logger = get_logger(name)
+        log = logger.log
+
+        def record(message: str, severity: LoggingSeverity, **options: object) -> bool:
+            if logged := log(message, severity, **options):
+                self.lines.append(message)
+            return logged
+
+        logger.log = record
+        return logger
 
     def _serve(self) -> None:
         while not self._node.stop.is_set():
