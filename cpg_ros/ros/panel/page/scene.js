@@ -20,9 +20,10 @@ const VIEWS = { quarter: [50, 18], front: [0, 10], side: [90, 8], top: [0.01, 89
 const PIXEL = new Uint8Array(4);
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
-// Vertices in the same cell of a grid become their mean; triangles without area go.
+// Vertices in the same cell of a grid become their mean; triangles without area, and all but one of
+// those between the same vertices, go.
 function coarse(points, triangles) {
-  const cells = new Map(), sums = [], merged = [];
+  const cells = new Map(), sums = [], merged = [], known = new Set();
   const cell = (k) => {
     const at = [0, 1, 2].map((axis) => points[3 * k + axis]);
     const key = at.map((value) => Math.round(value / COARSE)).join();
@@ -34,7 +35,9 @@ function coarse(points, triangles) {
   const of = Array.from({ length: points.length / 3 }, (_, k) => cell(k));
   for (let k = 0; k < triangles.length; k += 3) {
     const [a, b, c] = [0, 1, 2].map((corner) => of[triangles[k + corner]]);
-    if (a !== b && b !== c && c !== a) merged.push(a, b, c);
+    const key = [a, b, c].sort((one, other) => one - other).join();
+    if (a !== b && b !== c && c !== a && !known.has(key)) merged.push(a, b, c);
+    known.add(key);
   }
   return [sums.flatMap(([x, y, z, n]) => [x / n, y / n, z / n]), merged];
 }
@@ -187,14 +190,16 @@ export class Scene {
       geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
       geometry.setIndex(new BufferAttribute(new Uint32Array(faces), 1));
       // With sharp edges no vertex is shared: three times as many, for a graphics card.
-      if (this.software) geometry.computeVertexNormals();
-      else geometry = toCreasedNormals(geometry, CREASE);
+      if (!this.software) geometry = toCreasedNormals(geometry, CREASE);
     }
-    const shade = { side: DoubleSide, color: new Color().setRGB(...colour, SRGBColorSpace) };
+    // The sides of a thin wall are one when merged: their normals would cancel.
+    const shade = { side: DoubleSide, flatShading: this.software,
+      color: new Color().setRGB(...colour, SRGBColorSpace) };
     const material = this.software ? new MeshLambertMaterial(shade)
       : new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1, ...shade });
     const mesh = frame(new Mesh(geometry, material), place, pose);
-    mesh.castShadow = mesh.receiveShadow = true;
+    mesh.castShadow = true;
+    mesh.receiveShadow = !this.software;  // flat triangles would shade themselves in stripes
     return mesh;
   }
 
