@@ -108,8 +108,8 @@ def main() -> int:
     plan = SimpleNamespace(name='null', frequency=1.0, gain=1.0,
                               character='none', orbit=SimpleNamespace(
                                   period=1.0, network=SimpleNamespace(name='none')))
-    still = SimpleNamespace(plan=plan, robot=robot, body=None, faults=0, held=0, recovering=False,
-                            standing=True)
+    still = SimpleNamespace(plan=plan, robot=robot, body=SimpleNamespace(seated=False), faults=0,
+                            held=0, recovering=False, standing=True)
     deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
     diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf,
                               lambda: '', lambda: '')
