@@ -60,8 +60,9 @@ def walked(robot, model: str, gait: str, scenario: Scenario, duration: float, cl
            ) -> np.ndarray:
     """Return the poses of a four-legged robot, one a picture."""
     preset = PRESETS[robot.networks[0]][gait]
-    program = plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
-    batch = Filmed(model, program)
+    gait_plan = plan(robot, gait, preset, preset.network,
+                     robot.motion(gait, gait).frequency or 0.0)
+    batch = Filmed(model, gait_plan)
     batch.states = []
     if not batch.run([scenario], duration, robot_gains(robot) if closed else None).upright[0]:
         raise SystemExit(f'{robot.name} falls')

@@ -51,6 +51,14 @@ def fill_quaternion(roll: float, pitch: float, yaw: float, out: np.ndarray) -> N
     out[2], out[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
 
 
+def matrix_of(quaternion: np.ndarray) -> np.ndarray:
+    """Return the matrix of an orientation (w x y z, of length 1), shape (3, 3)."""
+    w, x, y, z = quaternion
+    return np.array([[1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+                     [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+                     [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)]])
+
+
 def rpy_of(quaternions: np.ndarray) -> np.ndarray:
     """Return roll, pitch and yaw of orientations (w x y z), rad, shape (..., 3)."""
     w, x, y, z = np.moveaxis(quaternions, -1, 0)

@@ -28,7 +28,7 @@ from xml.etree import ElementTree
 from cpg_ros.common import files
 from cpg_ros.motion.description import mesh_folder, numbers, read_tree
 from cpg_ros.motion.meshes import find_mesh, MeshError, read_mesh
-from cpg_ros.motion.rotations import rotation_about, rpy_of
+from cpg_ros.motion.rotations import matrix_of, rotation_about, rpy_of
 import numpy as np
 
 # Meshes that MuJoCo cannot read: the reasons, and the convex hulls that take their place.
@@ -378,7 +378,7 @@ def to_urdf(model: Any, name: str, frame: str, velocities: Mapping[str, float]) 
         first, count = model.body_jntadr[body], model.body_jntnum[body]
         joints = range(first, first + count) if above else ()
         parent, at = above or ('', np.zeros(3))
-        place, turn = model.body_pos[body] - at, _matrix(model.body_quat[body])
+        place, turn = model.body_pos[body] - at, matrix_of(model.body_quat[body])
         at = np.zeros(3)
         for k in joints:
             axis, angle = model.jnt_axis[k], float(model.qpos0[model.jnt_qposadr[k]])
@@ -421,13 +421,6 @@ def rooted(robot: ElementTree.Element, frame: str) -> str:
     return ElementTree.tostring(robot, encoding='unicode')
 
 
-def _matrix(quaternion: np.ndarray) -> np.ndarray:
-    import mujoco
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)
-
-
 def _text(numbers_: np.ndarray) -> str:
     return ' '.join(f'{number:.9g}' for number in numbers_)
 
@@ -459,7 +452,7 @@ def _fill(robot: ElementTree.Element, model: Any, body: int, link: tuple[str, np
     element = ElementTree.SubElement(robot, 'link', name=own)
     if model.body_mass[body]:
         inertial = ElementTree.SubElement(element, 'inertial')
-        _origin(inertial, model.body_ipos[body] - at, _matrix(model.body_iquat[body]))
+        _origin(inertial, model.body_ipos[body] - at, matrix_of(model.body_iquat[body]))
         ElementTree.SubElement(inertial, 'mass', value=f'{model.body_mass[body]:.9g}')
         x, y, z = (f'{value:.9g}' for value in model.body_inertia[body])
         ElementTree.SubElement(inertial, 'inertia', ixx=x, iyy=y, izz=z, ixy='0', ixz='0', iyz='0')
@@ -475,7 +468,7 @@ def _fill(robot: ElementTree.Element, model: Any, body: int, link: tuple[str, np
 def _solids(model: Any, k: int) -> list[tuple[np.ndarray, np.ndarray, str, dict[str, str]]]:
     """Return position, axes, kind and sizes of the URDF solids of a geom, in its body's frame."""
     import mujoco
-    kind, turn = mujoco.mjtGeom(model.geom_type[k]).name, _matrix(model.geom_quat[k])
+    kind, turn = mujoco.mjtGeom(model.geom_type[k]).name, matrix_of(model.geom_quat[k])
     place, size = model.geom_pos[k], model.geom_size[k]
     ball = {'radius': f'{size[0]:.6g}'}
     if kind == 'mjGEOM_SPHERE':

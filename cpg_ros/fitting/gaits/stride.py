@@ -29,6 +29,7 @@ from cpg_ros.fitting.gaits.foot_contacts import (
 )
 from cpg_ros.fitting.gaits.leg_names import Legs
 from cpg_ros.fitting.gaits.leg_phases import (
+    GaitMatch,
     leg_phases,
     match_gait,
     match_gait_by_cells,
@@ -323,16 +324,8 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
               *check_travel(usable, c, kind.girdles, opposite, _travel(body, inside, warp))]
     if warp.cycles < SURE:
         issues.append(QualityIssue('', FEW_CYCLES))
-    if cells is not None and gains is not None and len(gait.alike) > 1:
-        by_cells = _cell_signals(c, cells, gains, kind)
-        if by_cells is not None:
-            gait = match_gait_by_cells(by_cells, kind)
-    gait = walk_or_run(gait, contacts, None if body is None else falling_fraction(
-        phases, body[inside][:, 2], warp.frequency))
-    if known:
-        gait = replace(gait, probability=1.0)
-        if known in gait.alike:
-            gait = replace(gait, gait=known, nearest=known, alike=(known,))
+    gait = _decide(gait, kind, (c, cells, gains), contacts, None if body is None else
+                   falling_fraction(phases, body[inside][:, 2], warp.frequency), known)
     if len(gait.alike) > 1:
         # The odds of the gait have this already.
         issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
@@ -346,6 +339,33 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
                   tuple(issue.message for issue in issues if issue.message),
                   (*notes, *by_legs, *limping(usable, c), *gait.notes),
                   replace(warp, phases=warp.phases - average.zero), contacts)
+
+
+def _decide(gait: GaitMatch, kind: type[Network], signals: tuple[
+        dict[str, np.ndarray], Mapping[str, int] | None, Mapping[str, complex] | None],
+        contacts: FootContacts | None, falls: float | None, known: str) -> GaitMatch:
+    """Decide between gaits that move the legs alike.
+
+    Args:
+        gait: by the legs' phases.
+        kind: network.
+        signals: harmonics of the joints, and cells and gains as of find_stride.
+        contacts: of the feet.
+        falls: fraction of the stride in which the body falls freely.
+        known: the gait, if it is given.
+
+    """
+    coefficients, cells, gains = signals
+    if cells is not None and gains is not None and len(gait.alike) > 1:
+        by_cells = _cell_signals(coefficients, cells, gains, kind)
+        if by_cells is not None:
+            gait = match_gait_by_cells(by_cells, kind)
+    gait = walk_or_run(gait, contacts, falls)
+    if not known:
+        return gait
+    gait = replace(gait, probability=1.0)
+    return (replace(gait, gait=known, nearest=known, alike=(known,)) if known in gait.alike
+            else gait)
 
 
 def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> PhaseEstimate:

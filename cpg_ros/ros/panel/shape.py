@@ -40,7 +40,7 @@ from cpg_ros.motion.description import (
 from cpg_ros.motion.meshes import find_mesh, merged, Mesh, MeshError, read_mesh
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, RobotError
-from cpg_ros.motion.rotations import rotation
+from cpg_ros.motion.rotations import matrix_of, rotation
 from cpg_ros.ros.panel.pages import LONGEST
 from cpg_ros.simulation.robot_model import engine, load
 import numpy as np
@@ -277,7 +277,7 @@ def from_model(name: str, robot: Robot) -> Shape:
 
 def _links(mujoco: Any, model: Any, body: int, parent: int, shape: Shape) -> int:
     """Add a body, as a link for each of its joints; return the index of the last one."""
-    frame = _matrix(mujoco, model.body_quat[body])
+    frame = matrix_of(model.body_quat[body])
     position, last, name = model.body_pos[body], parent, model.body(body).name
     first = model.body_jntadr[body]
     for k in range(first, first + model.body_jntnum[body]) if parent >= 0 else ():
@@ -310,7 +310,7 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
         if colour[3] > 0.05 and kind in KINDS:
             link.parts.append(Part(
                 kind, model.geom_size[k].copy(), _mesh(model, k) if kind == 'mesh' else None,
-                tuple(colour[:3]), model.geom_pos[k].copy(), _matrix(mujoco, model.geom_quat[k])))
+                tuple(colour[:3]), model.geom_pos[k].copy(), matrix_of(model.geom_quat[k])))
 
 
 def _mesh(model: Any, k: int) -> Mesh:
@@ -319,12 +319,6 @@ def _mesh(model: Any, k: int) -> Mesh:
     start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
     return drawable(Mesh(model.mesh_vert[first:first + count].astype(float),
                          model.mesh_face[start:start + faces].astype(int)))
-
-
-def _matrix(mujoco: Any, quaternion: np.ndarray) -> np.ndarray:
-    matrix = np.zeros(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)
 
 
 # The shape of a robot from its URDF, a file or the text on ``robot_description``.
