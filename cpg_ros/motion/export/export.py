@@ -14,7 +14,7 @@
 
 """Executable ``export``: gaits of a robot as C, for microcontrollers and anything without Python.
 
-``export --robot my_robot.yaml --network delayed --gaits trot walk --out gait/`` writes network,
+``export --robot my_robot.yaml --network delayed --gait trot walk --out gait/`` writes network,
 readout and gait switching as C99, and a test against the generator.
 """
 
@@ -42,7 +42,7 @@ Write gaits of a robot as C99 without dependencies: the network's equations, or 
 gaits as tables; the joints' readout, cross-fades between gaits, the ramp and all limits as in the
 generator. With it come a test with golden vectors of the Python generator, and a README."""
 EPILOG = """\
-example: cpg export --robot quadruped --network delayed --gaits trot walk --out gait/
+example: cpg export --robot quadruped --network delayed --gait trot walk --out gait/
          cc -std=c99 gait/*.c -lm -o test_cpg && ./test_cpg
 
 exit codes: 0 written, 1 a gait cannot run on the robot, 2 invalid arguments."""
@@ -57,8 +57,9 @@ def _parser() -> Parser:
                         help='robot file, or the name of a shipped one')
     parser.add_argument('--network', metavar='NAME', help="network, or the path of a Python file "
                         "that defines one (default: the robot's first)")
-    parser.add_argument('--gaits', nargs='+', metavar='GAIT', help='gaits or presets of the '
-                        "network, the first one at the start (default: the network's usual gait)")
+    parser.add_argument('--gait', dest='gaits', nargs='+', metavar='GAIT', help='gaits or '
+                        "presets of the network, the first one at the start (default: the "
+                        "network's usual gait)")
     parser.add_argument('--target', choices=('c99', 'arduino'), default='c99',
                         help='plain files, or an Arduino library with an example sketch (default: '
                         '%(default)s)')
@@ -98,7 +99,7 @@ def _refuse_options(args: argparse.Namespace) -> None:
                              f'{high:g}')
     if args.steering and args.form != 'network':
         raise InputError('argument --steering: needs --form network')
-    refuse_repeated('argument --gaits', args.gaits or [])
+    refuse_repeated('argument --gait', args.gaits or [])
     if args.out.exists() and not args.out.is_dir():
         raise InputError(f'argument --out: {args.out} is not a directory')
 
@@ -112,7 +113,7 @@ def _plans(args: argparse.Namespace) -> list[GaitPlan]:
     presets, plans = network.presets(), []
     for name in args.gaits or [network.usual_gait]:
         if name not in presets:
-            raise InputError(f"argument --gaits: '{name}' is not one of {', '.join(presets)}")
+            raise InputError(f"argument --gait: '{name}' is not one of {', '.join(presets)}")
         preset = presets[name]
         own = robot.motion(name, preset.gait).frequency
         frequency = args.frequency or (1.0 if own is None else own)

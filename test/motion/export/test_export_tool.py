@@ -24,7 +24,7 @@ TUTORIAL = Path(__file__).parents[3] / 'docs' / 'tutorials' / 'own_network.md'
 CORE = Path('/usr/share/arduino/hardware/arduino/avr')
 #: Debian has the core, not the library of servos.
 SERVO = 'struct Servo { void attach(int pin); void write(int degrees); };\n'
-WORDS = ['--robot', 'goat', '--network', 'delayed', '--gaits', 'trot', 'walk']
+WORDS = ['--robot', 'goat', '--network', 'delayed', '--gait', 'trot', 'walk']
 
 
 def test_it_writes_c_with_a_test_that_passes(tmp_path, capsys):
@@ -48,7 +48,7 @@ def test_it_writes_c_with_a_test_that_passes(tmp_path, capsys):
     ['--form', 'table', '--rate', '50', '--substep', '0.02'],
     ['--step', '0.05', '--rate', '25', '--substep', '0.04']])
 def test_slow_boards_with_long_ticks_do_what_the_generator_does_with_such(tmp_path, words):
-    assert export.main(['--robot', 'quadruped', '--gaits', 'trot', 'walk', *words, '--out',
+    assert export.main(['--robot', 'quadruped', '--gait', 'trot', 'walk', *words, '--out',
                         str(tmp_path)]) == 0
     subprocess.run(['gcc', '-std=c99', 'cpg.c', 'gait_data.c', 'test_cpg.c', '-lm', '-o',
                     'test_cpg'], cwd=tmp_path, check=True)
@@ -71,8 +71,8 @@ def test_an_arduino_library(tmp_path):
 
 @pytest.mark.parametrize('words, message', [
     (['--steering', '--form', 'table'], 'argument --steering: needs --form network'),
-    (['--gaits', 'canter'], "argument --gaits: 'canter' is not one of"),
-    (['--gaits', 'trot', 'trot'], 'trot is given twice'),
+    (['--gait', 'canter'], "argument --gait: 'canter' is not one of"),
+    (['--gait', 'trot', 'trot'], 'trot is given twice'),
     (['--network', 'biped'], "'biped' does not drive goat"),
     (['--step', '0.5'], 'argument --step: 0.5 is not from'),
     (['--step', '-1'], 'argument --step: -1 is not above 0'),
@@ -117,7 +117,7 @@ def test_a_network_of_your_own(tmp_path):
             text.replace('two_legs', 'exported_legs'))
     out = tmp_path / 'gait'
     assert export.main(['--robot', str(tmp_path / 'exported_legs.yaml'), '--network',
-                        str(tmp_path / 'exported_legs.py'), '--gaits', 'walk', 'hop', '--real',
+                        str(tmp_path / 'exported_legs.py'), '--gait', 'walk', 'hop', '--real',
                         'float64', '--rate', '200', '--out', str(out)]) == 0
     if shutil.which('gcc'):
         subprocess.run(['gcc', '-std=c99', 'cpg.c', 'gait_data.c', 'test_cpg.c', '-lm', '-o',

@@ -67,7 +67,7 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
     check, trot, walk = steps.words
     assert check == ['check_robot', '--urdf', str(URDF), '--make', str(file), '--velocity', '8']
     for words, before, gait in ((trot, file, 'trot'), (walk, tuned, 'walk')):
-        assert words == ['tune', '--robot', str(before), '--model', str(URDF), '--gaits', gait,
+        assert words == ['tune', '--robot', str(before), '--model', str(URDF), '--gait', gait,
                          '--evaluations', '7', '--out', str(tuned)]
     # It says that its feedback helps.
     assert not robot.unjudged

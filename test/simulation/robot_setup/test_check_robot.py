@@ -65,7 +65,7 @@ def test_the_shipped_quadruped_matches_its_urdf(check):
      '<mimic joint="lf_calf_joint"/>', 'rf_calf_joint', "it follows 'lf_calf_joint' (mimic)")])
 def test_names_and_kinds(check, pattern, instead, joint, words):
     assert pattern in URDF
-    code, said = check(URDF.replace(pattern, instead), '--gaits', 'trot')
+    code, said = check(URDF.replace(pattern, instead), '--gait', 'trot')
     assert code == 1 and not said['matches']
     assert list(faults(said)) == [joint] and words in faults(said)[joint][0]
 
@@ -77,7 +77,7 @@ def test_names_and_kinds(check, pattern, instead, joint, words):
     ('upper="2.2"', 'upper="0.7"', "offset 0.8 rad is outside the URDF's limits -0.6 to 0.7")])
 def test_limits(check, old, new, words):
     head, name, tail = URDF.partition('name="lf_thigh_joint"')
-    code, said = check(head + name + tail.replace(old, new, 1), '--gaits', 'trot')
+    code, said = check(head + name + tail.replace(old, new, 1), '--gait', 'trot')
     assert code == 1 and list(faults(said)) == ['lf_thigh_joint']
     assert words in ' / '.join(faults(said)['lf_thigh_joint'])
 
@@ -95,7 +95,7 @@ def calves_in_mm(urdf):
 
 
 def test_lengths_in_mm(check):
-    code, said = check(calves_in_mm(URDF), '--gaits', 'trot')
+    code, said = check(calves_in_mm(URDF), '--gait', 'trot')
     assert code == 1 and not said['matches']
     assert any('the link below lh_calf_joint is 220 m long in the URDF' in line
                for line in said['shape'])
@@ -104,7 +104,7 @@ def test_lengths_in_mm(check):
 def test_axes_that_turn_the_other_way(check):
     urdf = URDF.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>').replace(
         '<axis xyz="1 0 0"/>', '<axis xyz="-1 0 0"/>')
-    code, said = check(urdf, '--gaits', 'trot')
+    code, said = check(urdf, '--gait', 'trot')
     assert code == 1 and not said['matches']
     assert len(said['shape']) == 4
     assert all('moves forward while it is low in the trot' in line for line in said['shape'])
@@ -112,7 +112,7 @@ def test_axes_that_turn_the_other_way(check):
 
 def test_a_mass_that_no_robot_has(check):
     urdf = re.sub(r'<mass value="[^"]*"/>', '<mass value="0.001"/>', URDF)
-    code, said = check(urdf, '--gaits', 'trot')
+    code, said = check(urdf, '--gait', 'trot')
     assert code == 1 and not said['matches']
     (line,) = said['shape']
     assert re.match(r'the URDF has a mass of 0\.0\d+ kg with legs of 0\.\d+ m', line)
@@ -132,11 +132,11 @@ def test_geometry_that_is_not_the_descriptions(check, tmp_path, capsys, change, 
     assert main(['--urdf', str(tmp_path / 'of.urdf'), '--make', str(made)]) == 0
     capsys.readouterr()
     tree = yaml.safe_load(made.read_text())
-    code, said = check(URDF, '--gaits', 'trot', robot=str(made))
+    code, said = check(URDF, '--gait', 'trot', robot=str(made))
     assert code == 0 and said['matches'], said['shape']
     tree['geometry'] = change(tree['geometry'])
     made.write_text(yaml.safe_dump(tree))
-    code, said = check(URDF, '--gaits', 'trot', robot=str(made))
+    code, said = check(URDF, '--gait', 'trot', robot=str(made))
     assert code == 1 and not said['matches']
     assert any(words in line for line in said['shape']), said['shape']
 
@@ -145,7 +145,7 @@ def test_continuous_joints_and_missing_velocities_limit_nothing(check):
     urdf = re.sub(r'revolute(">\s*<origin[^>]*>\s*<axis[^>]*>\s*<parent link=".._hip)',
                   r'continuous\1', URDF).replace(' velocity="20"', '')
     assert urdf.count('continuous') == 4
-    code, said = check(urdf, '--gaits', 'walk')
+    code, said = check(urdf, '--gait', 'walk')
     assert code == 0 and said['joints'][1]['urdf'] == {'lower': None, 'upper': None,
                                                        'velocity': None}
     assert said['notes'] == []
@@ -153,7 +153,7 @@ def test_continuous_joints_and_missing_velocities_limit_nothing(check):
 
 def test_joints_that_no_leg_drives_are_noted(check):
     code, said = check(URDF.replace('</robot>', joint_of('neck_joint') + joint_of('tail', 'fixed')
-                                    + '</robot>'), '--gaits', 'trot')
+                                    + '</robot>'), '--gait', 'trot')
     assert code == 0
     assert said['notes'] == ['moving joints of the URDF that no leg drives: neck_joint']
 
@@ -161,19 +161,19 @@ def test_joints_that_no_leg_drives_are_noted(check):
 def test_gaits_that_leave_the_limits_are_told(check):
     # The thigh swings by 0.25 x, x from -1 to 1: to 1.05 rad, and sin-like at 3 Hz.
     narrow = URDF.replace('upper="2.2"', 'upper="1"')
-    code, said = check(narrow, '--gaits', 'trot')
+    code, said = check(narrow, '--gait', 'trot')
     trot = said['gaits'][0]
     assert code == 1 and trot['network'] == 'delayed' and not trot['fits']
     assert trot['room'] == pytest.approx(-0.05, abs=1e-3) and 'thigh' in trot['room_at']
     assert 'lh_thigh_joint to 1.050 rad, above its limit 1' in trot['faults']
     assert len(trot['faults']) == 4
-    assert check(narrow, '--gaits', 'trot', '--amplitude', '0.7')[1]['gaits'][0]['fits']
+    assert check(narrow, '--gait', 'trot', '--amplitude', '0.7')[1]['gaits'][0]['fits']
     # Speeds are proportional to frequency and amplitude.
-    slow, fast = (check(URDF, '--gaits', 'trot', '--frequency', str(frequency), '--amplitude',
+    slow, fast = (check(URDF, '--gait', 'trot', '--frequency', str(frequency), '--amplitude',
                         str(amplitude))[1]['gaits'][0]['speed_share']
                   for frequency, amplitude in ((1.0, 1.0), (4.0, 1.5)))
     assert fast == pytest.approx(6.0 * slow, rel=1e-6)
-    fault = check(URDF, '--gaits', 'trot', '--frequency', '10')[1]['gaits'][0]['faults'][0]
+    fault = check(URDF, '--gait', 'trot', '--frequency', '10')[1]['gaits'][0]['faults'][0]
     assert re.search(r'calf_joint at 2\d\.\d\d rad/s, above its limit 20', fault)
 
 
@@ -182,7 +182,7 @@ def test_a_gait_that_the_parameters_of_the_robot_file_speed_up(check, tmp_path):
     tree['gaits'] = {'trot': {'frequency': 9.5}}
     path = tmp_path / 'fast.yaml'
     path.write_text(yaml.safe_dump(tree))
-    code, said = check(URDF, '--gaits', 'trot', 'walk', robot=str(path))
+    code, said = check(URDF, '--gait', 'trot', 'walk', robot=str(path))
     assert code == 1 and [gait['frequency'] for gait in said['gaits']] == (
         [9.5, 1.0] * len(load_robot('quadruped').networks))
     assert not said['gaits'][0]['fits'] and said['gaits'][1]['fits']
@@ -191,7 +191,7 @@ def test_a_gait_that_the_parameters_of_the_robot_file_speed_up(check, tmp_path):
 def test_as_text(tmp_path, capsys):
     path = tmp_path / 'my.urdf'
     path.write_text(URDF.replace('lf_thigh_joint', 'lf_thai_joint'))
-    assert main(['quadruped', '--urdf', str(path), '--gaits', 'trot']) == 1
+    assert main(['quadruped', '--urdf', str(path), '--gait', 'trot']) == 1
     said = capsys.readouterr().out
     for words in ("- lf_thigh_joint: the URDF has no such joint, did you mean 'lf_thai_joint'?",
                   'limits [rad]', '-0.8 to 0.8', 'nearest limit', 'fits',
@@ -207,7 +207,7 @@ def test_prefixes_and_foreign_blocks_do_not_matter(check):
                '</transmission><sensor:camera undeclared="yes"/><ros2_control><joint name="a">'
                '<limit lower="x"/></joint></ros2_control></robot>')
     prefixed = URDF.replace('<robot ', '<robot xmlns="http://somewhere" xmlns:xacro="http://x" ')
-    code, said = check(prefixed.replace('</robot>', foreign), '--gaits', 'trot')
+    code, said = check(prefixed.replace('</robot>', foreign), '--gait', 'trot')
     assert code == 0 and said['matches']
 
 
@@ -252,7 +252,7 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('quadruped', '--urdf', '.'), 'Is a directory'),
     (('octopod', '--urdf', 'URDF'), "robot 'octopod' is neither a .yaml file nor one of: biped"),
     (('nowhere.yaml', '--urdf', 'URDF'), 'nowhere.yaml: No such file'),
-    (('quadruped', '--urdf', 'URDF', '--gaits', 'canter'), "'canter' is not one of walk, trot"),
+    (('quadruped', '--urdf', 'URDF', '--gait', 'canter'), "'canter' is not one of walk, trot"),
     (('quadruped', '--urdf', 'URDF', '--frequency', 'nan'), '--frequency: nan is not from 0'),
     (('quadruped', '--urdf', 'URDF', '--amplitude', '-1'), '--amplitude: -1 is not from 0 to 3'),
     (('quadruped', '--urdf', 'URDF', '--velocity', '0'), '--velocity: 0 is not above 0'),
@@ -286,10 +286,10 @@ def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, wor
 def test_as_a_process(tmp_path):
     command = [sys.executable, '-P', '-m', 'cpg_ros.simulation.robot_setup.check_robot']
     urdf = SOURCE / 'resource' / 'urdf' / 'quadruped.urdf'
-    good = subprocess.run([*command, 'quadruped', '--urdf', urdf, '--gaits', 'trot', '--json'],
+    good = subprocess.run([*command, 'quadruped', '--urdf', urdf, '--gait', 'trot', '--json'],
                           capture_output=True, text=True, timeout=120)
     assert good.returncode == 0 and json.loads(good.stdout)['matches'] and not good.stderr
-    bad = subprocess.run([*command, 'biped', '--urdf', urdf, '--gaits', 'walk'],
+    bad = subprocess.run([*command, 'biped', '--urdf', urdf, '--gait', 'walk'],
                          capture_output=True, text=True, timeout=120)
     assert bad.returncode == 1 and 'the URDF has no such joint' in bad.stdout
     wrong = subprocess.run([*command, 'quadruped', '--urdf', tmp_path], capture_output=True,

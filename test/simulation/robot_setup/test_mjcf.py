@@ -36,7 +36,7 @@ def checked(capsys, *arguments):
 
 
 def test_the_shipped_hexapod_matches_its_model(capsys):
-    code, found = checked(capsys, 'hexapod', '--mjcf', 'hexapod', '--gaits', 'tripod')
+    code, found = checked(capsys, 'hexapod', '--mjcf', 'hexapod', '--gait', 'tripod')
     assert code == 0 and found['matches'] and found['mjcf'] == 'hexapod'
     assert found['notes'] == []
     for joint in found['joints']:

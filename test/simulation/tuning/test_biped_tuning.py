@@ -119,7 +119,7 @@ def test_the_file_says_what_it_was_found_by(tmp_path, capsys, monkeypatch):
     said = capsys.readouterr().out
     for text in (said, out.read_text()):
         assert 'fresh pushes survived: 40 of 72 before, 55 after; of 20 walks without' in text
-    assert tool.main([*given, '--gaits', 'walk', 'trot']) == 2
+    assert tool.main([*given, '--gait', 'walk', 'trot']) == 2
     assert "of a biped's feedback the walk is tuned, not trot" in capsys.readouterr().err
     assert tool.main([*given, '--kp', '80']) == 2
     assert 'biped.links' in capsys.readouterr().err

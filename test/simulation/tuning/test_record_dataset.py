@@ -32,7 +32,7 @@ from record_dataset import main  # noqa: E402
 
 KEPT = Path(__file__).parents[2] / 'data' / 'simulated_walks'
 WALKS = sorted(path.name for path in KEPT.glob('unitree_go2_*'))
-OF_THE_GO2 = ('--robot', 'unitree_go2', '--gaits', 'trot', '--seconds', '6', '--rate', '50')
+OF_THE_GO2 = ('--robot', 'unitree_go2', '--gait', 'trot', '--seconds', '6', '--rate', '50')
 
 
 def truth_of(folder):
@@ -98,7 +98,7 @@ def test_the_same_seed_makes_the_same_set(tmp_path):
 
 
 @pytest.mark.parametrize(('words', 'line'), [
-    (['--gaits', 'wlk'], "gait 'wlk' of unitree_go2: unknown; it has walk, trot"),
+    (['--gait', 'wlk'], "gait 'wlk' of unitree_go2: unknown; it has walk, trot"),
     (['--seconds', '5'], 'argument --seconds: 5 is not from 6 to 600'),
     (['--rate', '33'], 'argument --rate: 33 Hz is none of 20, 25, 50'),
     (['--seed', '-1'], 'argument --seed: -1 is less than 0'),

@@ -87,7 +87,7 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp
                                                        monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, gait_plan, update: None)
     out = tmp_path / 'my_go2.yaml'
-    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gait', 'trot', '--evaluations',
                       '7', '--seed', '2', '--jobs', '1', '--out', str(out)]) == 1
     made = read_robot(out)
     assert made.motions['walk'] == GO2.motions['walk'] != made.motions['trot']
@@ -113,7 +113,7 @@ def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_
     monkeypatch.setattr(tuning, 'measure', lambda batch, plan, update: None)
     monkeypatch.setattr(tuning, 'LONG', 3.0)
     monkeypatch.setattr(tuning, 'SHORT', 2.0)
-    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gait', 'trot', '--evaluations',
                       '1', '--kp', '80', '--kd', '3', '--out', str(tmp_path / 'a.yaml')]) == 0
     said = capsys.readouterr()
     assert re.search(r'^trot .* good: 0\.\d\d m/s$', said.out, re.MULTILINE)
@@ -140,7 +140,7 @@ def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, m
     assert re.search(r'without feedback 20 of 96 \(95 %: 14 to 30 %\), before 50 of .*, after 61 ',
                      capsys.readouterr().out)
     found = replace(found, pushes=replace(found.pushes, after=51))
-    assert tool.main([*given, '--gaits', 'walk']) == 1 and asked[1][0] == ['walk']
+    assert tool.main([*given, '--gait', 'walk']) == 1 and asked[1][0] == ['walk']
     assert 'nothing better was found: the gains stay' in capsys.readouterr().out
 
 
@@ -293,7 +293,7 @@ def refused(gait):
 
 
 def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
-    assert tool.main(['--robot', 'biped', '--model', 'go2', '--gaits', 'walk', '--out',
+    assert tool.main(['--robot', 'biped', '--model', 'go2', '--gait', 'walk', '--out',
                       str(tmp_path / 'a.yaml')]) == 2
     assert 'has 2 legs: bipeds are not tuned' in capsys.readouterr().err
 
@@ -301,9 +301,9 @@ def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
 @pytest.mark.parametrize('arguments, code, words', [
     (['--robot', 'nothing'], 2, "robot 'nothing'"),
     (['--model', 'nothing'], 2, "model 'nothing'"),
-    (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
+    (['--gait', 'trot', 'trot'], 2, 'trot is given twice'),
     (['--evaluations', '0'], 2, '0 is not positive'),
-    (['--feedback', '--gaits', 'jump'], 2, "'unitree_go2' has no efference copy of jump"),
+    (['--feedback', '--gait', 'jump'], 2, "'unitree_go2' has no efference copy of jump"),
     (['--feedback', '--robot', 'quadruped'], 2, 'tune its gaits first'),
     (['--kp', '0'], 2, '0 is not above 0'),
     (['--kd', 'much'], 2, "'much' is not a number"),
