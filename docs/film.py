@@ -14,21 +14,25 @@
 
 """Films the README's robots: a Go2 that is pushed, a robot of a URDF, a humanoid.
 
-    python docs/film.py --urdf my.urdf --robot my_robot_tuned.yaml --gait trot
+    python docs/film.py --urdf my.urdf
 
-writes docs/film.webp; the URDF and its tuned file are those that `demo --urdf` has made. Runs are
-simulated without ROS, at the speed of the machine, and drawn without a screen.
+tunes the robot of the URDF, as ``demo --urdf`` does, and writes docs/film.webp. Runs are simulated
+without ROS, at the speed of the machine, and drawn without a screen. The robot's files stay in the
+folder out/film, and are used again.
 """
 
 import argparse
 from collections.abc import Iterator
 from contextlib import closing
+from importlib.util import find_spec
 from pathlib import Path
+import subprocess
 
 from cpg_ros.feedback.gains import robot_gains
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import PRESETS
+from cpg_ros.ros.cli.executables import command
 from cpg_ros.simulation import recorder
 from cpg_ros.simulation.biped_run import BipedRun
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
@@ -39,6 +43,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 OUT = Path(__file__).with_name('film.webp')
+#: Folder for the files of the URDF's robot.
+FOLDER = Path('out', 'film')
 #: Pictures per second, their size, and the quality of WebP.
 RATE, SIZE, QUALITY = 12.5, (1280, 720), 60
 FONT = ImageFont.truetype(Path(get_data_path(), 'fonts', 'ttf', 'DejaVuSans.ttf'), 30)
@@ -54,6 +60,21 @@ class Filmed(ClosedLoopBatch):
         after = super().rollout(*args, **options)
         self.states.append(after[0][0, -1, 1:1 + self.body.model.nq].copy())
         return after
+
+
+def tuned(urdf: Path, gait: str) -> Path:
+    """Return the tuned robot file of a URDF, made by the package's tools where it is missing."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    made, best = (FOLDER / f'{urdf.stem}{end}.yaml' for end in ('', f'_{gait}'))
+    for file, words in (
+            (made, ['check_robot', '--urdf', urdf, '--make', made]),
+            (best, ['tune', '--robot', made, '--model', urdf, '--gait', gait, '--evaluations',
+                    '120', '--out', best])):
+        if not file.exists():
+            subprocess.run([*command(words[0]), *map(str, words[1:])], check=False)
+        if not file.exists():
+            raise SystemExit(f'{words[0]} has made no {file}')
+    return best
 
 
 def walked(robot, model: str, gait: str, scenario: Scenario, duration: float, closed: bool
@@ -86,7 +107,7 @@ def pictures(args: argparse.Namespace) -> Iterator[Image.Image]:
         poses = walked(go2, 'go2', gait, Scenario(speed=speed, pushes=(
             impulse(when, 0.0, push),)), duration, closed=True)
         yield from drawn(load('go2', go2, visual=True), poses, caption)
-    robot = load_robot(str(args.robot))
+    robot = load_robot(str(tuned(args.urdf, args.gait)))
     poses = walked(robot, str(args.urdf), args.gait, Scenario(speed=args.speed), 3.0, closed=False)
     yield from drawn(load(str(args.urdf), robot, visual=True), poses, args.caption)
     biped = load_robot(args.biped)
@@ -100,11 +121,10 @@ def main() -> None:
     """Draw the film."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--urdf', type=Path, required=True)
-    parser.add_argument('--robot', type=Path, required=True)
     parser.add_argument('--gait', default='trot')
     parser.add_argument('--speed', type=float, default=0.4)
     parser.add_argument('--caption', default='Your robot, from its URDF')
-    parser.add_argument('--biped', default='unitree_g1')
+    parser.add_argument('--biped', default='unitree_g1' if find_spec('mjlab') else 'humanoid')
     args = parser.parse_args()
     recorder.SHADOW, recorder.SAMPLES = 2048, 2
     first, *others = pictures(args)

@@ -65,7 +65,7 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     with opened(path) as file:
         head = list(takewhile(lambda line: line.strip() != 'MOTION', islice(file, LONGEST)))
         if ''.join(head[:1]).split()[:1] != ['HIERARCHY']:
-            raise RecordingError(f"{path}: no BVH file: it does not begin with 'HIERARCHY'")
+            raise RecordingError(f"{path}: not a BVH file: it does not begin with 'HIERARCHY'")
         count, interval, line = _motion(file, path, len(head) + 1)
         channels = _tree(''.join(head), path)
         rows, notes = number_rows(remaining_lines(file, path), [
@@ -128,7 +128,8 @@ def _motion(file: Iterator[str], path: Path, number: int) -> tuple[int, float, i
         if 'frame time' in values:
             break
     else:
-        raise RecordingError(f"{path}: no BVH file: no line 'MOTION' follows the tree of joints")
+        raise RecordingError(
+            f"{path}: not a BVH file: no line 'MOTION' follows the tree of joints")
     count, interval = values.get('frames', math.nan), values['frame time']
     if not (0.0 <= count < 1e9 and 1e-6 <= interval <= 10.0):
         raise RecordingError(f"{path}: after 'MOTION', 'Frames:' and 'Frame Time:' (1e-6 to 10 s) "

@@ -246,7 +246,7 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any],
         rate = float(point['RATE'][0])
     except (UnreadableFile, LookupError, TypeError, ValueError, OSError) as error:
         why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
-        raise RecordingError(f'{path}: no C3D file that can be read: {why[:200]}') from error
+        raise RecordingError(f'{path}: not a readable C3D file: {why[:200]}') from error
     labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
     units = [str(unit) for unit in point.get('ANGLE_UNITS', [])]
     count, frames = points.shape[1:]
@@ -306,13 +306,13 @@ def _stated(path: Path) -> int:
     """Return the number of frames that a file's first block states, mod 65536.
 
     Raises:
-        RecordingError: it is no C3D file.
+        RecordingError: it is not a C3D file.
 
     """
     with files.opened(path, RecordingError, largest=LARGEST) as file:
         data = file.read(BLOCK)
     if len(data) < BLOCK or data[1] != 0x50 or not data[0]:
-        raise RecordingError(f'{path}: no C3D file: it does not begin as one')
+        raise RecordingError(f'{path}: not a C3D file: its first bytes are not those of one')
     first, last = np.frombuffer(data, '<u2')[3:5].astype(int)
     return (last - first + 1) % 65536
 

@@ -72,7 +72,7 @@ def format_of(path: Path) -> RecordingFormat:
         return next((form for form in fitting if form.recognises and form.recognises(path)),
                     next((form for form in fitting if not form.recognises), fitting[0]))
     endings = [ending for form in FORMATS.values() for ending in form.endings]
-    raise RecordingError(f'{path}: no recording; the names of recordings end in '
+    raise RecordingError(f'{path}: not a recording: names of recordings end in '
                          f'{", ".join(endings)}')
 
 

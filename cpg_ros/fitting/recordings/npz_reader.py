@@ -95,7 +95,8 @@ def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
         # Neither zipfile nor numpy lists what damaged archives make them raise.
         except Exception as error:
             why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
-            raise RecordingError(f"{path}: no archive of numpy's arrays: {why[:200]}") from error
+            raise RecordingError(
+                f"{path}: not an archive of numpy's arrays: {why[:200]}") from error
 
 
 def _needed(packed: zipfile.ZipFile, name: str) -> int:

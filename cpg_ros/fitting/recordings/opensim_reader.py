@@ -81,7 +81,7 @@ def trc_markers(path: str | Path) -> Markers:
         head = [file.readline() for _ in range(5)]
         rest = remaining_lines(file, path)
     if not head[0].startswith('PathFileType'):
-        raise RecordingError(f"{path}: no TRC file: it does not begin with 'PathFileType'")
+        raise RecordingError(f"{path}: not a TRC file: it does not begin with 'PathFileType'")
     keys, values = (line.split() for line in head[1:3])
     facts = dict(zip(keys, values, strict=False))
     cells = [cell.strip() for cell in head[3].rstrip('\r\n').split('\t')]
@@ -193,7 +193,7 @@ def _header(path: Path) -> tuple[str | None, list[str], int | None]:
         first = file.readline()
         header = preamble(first, file) if first else None
     if header is None:
-        raise RecordingError(f"{path}: no file of OpenSim: it has no line 'endheader'")
+        raise RecordingError(f"{path}: not a file of OpenSim: it has no line 'endheader'")
     line, _, unit, stated = header
     columns = [name.strip() for name in re.split(r'[\t,;]' if '\t' in line else r'\s+', line)]
     columns = [name for name in columns if name]

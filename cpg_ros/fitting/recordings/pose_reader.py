@@ -154,7 +154,7 @@ def _poses_of_hdf5(path: Path) -> _Poses:
         arrays = read_apart(hdf5_arrays, path)
     except (UnreadableFile, OSError) as error:
         why = ' '.join(str(error).split()) or type(error).__name__
-        raise RecordingError(f'{path}: no HDF5 file of poses that can be read: {why[:200]}'
+        raise RecordingError(f'{path}: not a readable HDF5 file of poses: {why[:200]}'
                              ) from error
     columns = [tuple(column) for column in json.loads(str(arrays['columns']))]
     return _Poses(path, columns, arrays['rows'], arrays['frames'])
@@ -250,8 +250,8 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
         frames = [k for k, cell in enumerate(first) if cell in FRAMES]
         if len(frames) != 1:
             raise RecordingError(
-                f"{path}: no table of poses: its first line neither begins with 'scorer' nor has "
-                f'a column {" or ".join(map(repr, FRAMES))}; files of other kinds have to be '
+                f"{path}: not a table of poses: its first line neither begins with 'scorer' nor "
+                f'has a column {" or ".join(map(repr, FRAMES))}; files of other kinds have to be '
                 'exported as CSV')
         frame = frames[0]
         columns = [('', match[1], match[2]) if (match := COLUMN.fullmatch(cell))

@@ -81,8 +81,8 @@ def _parser() -> Parser:
                         '%(default)g)')
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second of all '
                         'gaits, Hz (default: as the robot file has it, or else 1)')
-    parser.add_argument('--tolerance', type=number, metavar='FRACTION', help='by which tables may '
-                        'differ from what they are of, over its half range (default: 1e-4 with '
+    parser.add_argument('--tolerance', type=number, metavar='FRACTION', help='largest error of '
+                        "a table, as a fraction of half its signal's range (default: 1e-4 with "
                         'float32, 1e-9 with float64)')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder to write to; made if it is not there')

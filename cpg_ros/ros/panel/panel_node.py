@@ -325,7 +325,7 @@ class Panel(StartedNode):
                 load_urdf(Path(urdf).expanduser())
             except CpgError as error:
                 raise StartError(f'urdf: {error}') from error
-        self._free()
+        self._socket, self._port = self._bound()
         # Its messages are taken, without callbacks: it is never spun.
         self._watch: Node = rclpy.create_node(
             f'{self.get_name()}_watch', namespace=self.get_namespace(), enable_rosout=False,
@@ -349,15 +349,16 @@ class Panel(StartedNode):
                                              'recording': self._recorder.running}))
         self._warn_of_unknown()
 
-    def _free(self) -> None:
-        """Check that the address is available."""
+    def _bound(self) -> tuple[socket.socket, int]:
+        """Return a socket at the address, and its port."""
         host, port = self._value('host'), self._value('port')
         try:
             family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-            socket.create_server(address, family=family).close()
+            bound = socket.create_server(address, family=family)
         except OSError as error:
             raise StartError(f'{host} port {port}: {error.strerror} (another port: '
                              '-p port:=N, 0 for a free one)') from error
+        return bound, bound.getsockname()[1]
 
     # -- the thread -------------------------------------------------------------------------
 
@@ -374,8 +375,8 @@ class Panel(StartedNode):
 
     async def _serve(self) -> None:
         self._pages.begin()
-        server, port = await self._server.start(self._value('host'), self._value('port'))
-        host = self._value('host')
+        server = await self._server.start(self._socket)
+        host, port = self._value('host'), self._port
         shown = socket.gethostname() if host in ('0.0.0.0', '::') else host
         shown = f'[{shown}]' if ':' in shown else shown
         self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/'

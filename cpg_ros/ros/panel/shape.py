@@ -43,6 +43,7 @@ from cpg_ros.motion.robot_file import load_robot, RobotError
 from cpg_ros.motion.rotations import matrix_of, rotation
 from cpg_ros.ros.panel.pages import LONGEST
 from cpg_ros.simulation.robot_model import engine, load
+from cpg_ros.simulation.urdf_model import to_urdf
 import numpy as np
 
 #: Colour of what has none.
@@ -90,8 +91,7 @@ class Part:
         """Return the part for a page; a mesh's points are in steps above the lowest ones."""
         message = {'kind': self.kind, 'size': np.round(self.size, 5).tolist(),
                    'colour': np.round(self.colour[:3], 3).tolist(),
-                   'place': np.round(self.position, 6).tolist(),
-                   'pose': np.round(self.pose.ravel(), 6).tolist()}
+                   'frame': _frame(self.position, self.pose)}
         if self.mesh is None:
             return message
         points = self.mesh.points
@@ -113,7 +113,6 @@ class Link:
         slides: whether the joint is prismatic, m, not revolute, rad.
         axis: of the joint, in the link's own frame.
         position, pose: of the link in its parent at angle 0: m, and a rotation matrix.
-        zero: angle of the joint at which the link is where ``pose`` has it, rad.
         parts: what is drawn of it.
 
     """
@@ -125,7 +124,6 @@ class Link:
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 1.0, 0.0]))
     position: np.ndarray = field(default_factory=lambda: np.zeros(3))
     pose: np.ndarray = field(default_factory=lambda: np.eye(3))
-    zero: float = 0.0
     parts: list[Part] = field(default_factory=list)
 
     @property
@@ -154,16 +152,19 @@ class Shape:
     def message(self) -> dict[str, Any]:
         """Return the message for a page."""
         links = [{'name': link.name, 'parent': link.parent, 'joint': link.joint,
-                  'slides': link.slides, 'zero': link.zero,
-                  'axis': np.round(link.axis, 6).tolist(),
-                  'place': np.round(link.position, 6).tolist(),
-                  'pose': np.round(link.pose.ravel(), 6).tolist(),
+                  'slides': link.slides, 'axis': np.round(link.axis, 6).tolist(),
+                  'frame': _frame(link.position, link.pose),
                   'parts': [part.message() for part in link.parts]} for link in self.links]
         limits = {joint: [value if math.isfinite(value) else None for value in span]
                   for joint, span in self.limits.items()}
         return {'type': 'shape', 'source': self.source, 'links': links, 'limits': limits,
                 'feet': {leg: [index, *np.round(position, 5).tolist()]
                          for leg, (index, position) in self.feet.items()}}
+
+
+def _frame(position: np.ndarray, pose: np.ndarray) -> list[float]:
+    """Return the 4 x 4 matrix of a frame, column by column."""
+    return np.round(np.r_[np.c_[pose, position], [[0.0, 0.0, 0.0, 1.0]]].T.ravel(), 6).tolist()
 
 
 def _base64(values: np.ndarray) -> str:
@@ -180,16 +181,11 @@ def drawable(mesh: Mesh) -> Mesh:
 
 
 def along(start: np.ndarray, end: np.ndarray, radius: float, colour: tuple[float, ...]) -> Part:
-    """Return a capsule between two points, m."""
-    way = np.asarray(end, float) - start
-    length, pose = float(np.linalg.norm(way)), np.eye(3)
-    if length > 0.0:
-        z = way / length
-        x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-        x /= np.linalg.norm(x)
-        pose = np.array([x, np.cross(z, x), z]).T
-    return Part('capsule', np.array([radius, 0.5 * length]), None, colour,
-                0.5 * (np.asarray(start) + end), pose)
+    """Return a capsule between two points, m, on a line along y or z."""
+    way = end - start
+    pose = rotation((0.5 * math.pi, 0.0, 0.0)) if way[1] else np.eye(3)
+    return Part('capsule', np.array([radius, 0.5 * np.linalg.norm(way)]), None, colour,
+                0.5 * (start + end), pose)
 
 
 # A stick figure for a robot of which only legs and joints are known.
@@ -201,8 +197,7 @@ BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
 
 
 def draw(name: str, legs: Mapping[str, Sequence[str]],
-         quarters: Mapping[str, tuple[float, float]],
-         limits: Mapping[str, tuple[float, float]] | None = None) -> Shape:
+         quarters: Mapping[str, tuple[float, float]]) -> Shape:
     """Return the shape.
 
     Args:
@@ -210,7 +205,6 @@ def draw(name: str, legs: Mapping[str, Sequence[str]],
         legs: leg -> its joints, from the body down. Of three the first turns about the axis that
             points ahead, all others turn about that to the left.
         quarters: leg -> 1 or -1 for ahead or behind (0 in between), and for left or right.
-        limits: joint -> lower and upper, rad.
 
     """
     base = Link('base', -1)
@@ -219,7 +213,7 @@ def draw(name: str, legs: Mapping[str, Sequence[str]],
     base.parts += [Part('box', np.array([long + 0.06, 0.7 * WIDE, 0.05]), None, BODY),
                    Part('box', np.array([0.02, 0.04, 0.02]), None, STICK,
                         np.array([long + 0.08, 0.0, 0.02]))]
-    shape = Shape(f"stick figure of '{name}'", [base], dict(limits or {}))
+    shape = Shape(f"stick figure of '{name}'", [base])
     for (leg, joints), end in zip(legs.items(), ends, strict=True):
         base.parts.append(along(np.array([end[0], 0.0, 0.0]), end, 0.025, BODY))
         parent, position = 0, end
@@ -262,43 +256,19 @@ def from_model(name: str, robot: Robot) -> Shape:
 
     """
     mujoco, model = engine(), load(name, robot, visual=True)
-    shape = Shape(f"model '{name}'", [])
-    free = next(k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE)
-    base = model.jnt_bodyid[free]
-    index: dict[int, int] = {}
-    for body in range(base, model.nbody):
-        parent = index.get(model.body_parentid[body], -1)
-        if parent < 0 and body != base:
-            continue
-        index[body] = _links(mujoco, model, body, parent, shape)
-        _draw(mujoco, model, body, shape.links[index[body]])
+    urdf = to_urdf(model, name, 'base_link', {})
+    shape = _skeleton(parse_tree(urdf.encode(), name), f"model '{name}'")
+    links = {link.name: link for link in shape.links}
+    for body in range(1, model.nbody):
+        if link := links.get(model.body(body).name or f'body_{body}'):
+            _draw(mujoco, model, body, link)
     return shape
 
 
-def _links(mujoco: Any, model: Any, body: int, parent: int, shape: Shape) -> int:
-    """Add a body, as a link for each of its joints; return the index of the last one."""
-    frame = matrix_of(model.body_quat[body])
-    position, last, name = model.body_pos[body], parent, model.body(body).name
-    first = model.body_jntadr[body]
-    for k in range(first, first + model.body_jntnum[body]) if parent >= 0 else ():
-        joint, anchor = model.joint(k), model.jnt_pos[k]
-        # To the joint's point; the next link goes back from there to the body's own frame.
-        shape.links.append(Link(name, last, joint.name,
-                                model.jnt_type[k] == mujoco.mjtJoint.mjJNT_SLIDE,
-                                model.jnt_axis[k].copy(), position + frame @ anchor, frame,
-                                float(model.qpos0[model.jnt_qposadr[k]])))
-        if model.jnt_limited[k]:
-            shape.limits[joint.name] = tuple(model.jnt_range[k])
-        last, frame, position = len(shape.links) - 1, np.eye(3), -anchor
-    if last == parent or np.any(position):
-        base = parent < 0
-        shape.links.append(Link(name, last, position=np.zeros(3) if base else position.copy(),
-                                pose=np.eye(3) if base else frame))
-    return len(shape.links) - 1
-
-
 def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
-    first = model.body_geomadr[body]
+    """Add a body's geoms to its link, whose origin is at the body's last joint."""
+    first, joints = model.body_geomadr[body], model.body_jntnum[body]
+    origin = model.jnt_pos[model.body_jntadr[body] + joints - 1] if joints else np.zeros(3)
     geoms = range(first, first + model.body_geomnum[body])
     seen = [k for k in geoms if model.geom_group[k] < COLLISION_GROUP
             and not (model.geom_contype[k] and model.geom_type[k] != mujoco.mjtGeom.mjGEOM_MESH
@@ -310,7 +280,7 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
         if colour[3] > 0.05 and kind in KINDS:
             link.parts.append(Part(
                 kind, model.geom_size[k].copy(), _mesh(model, k) if kind == 'mesh' else None,
-                tuple(colour[:3]), model.geom_pos[k].copy(), matrix_of(model.geom_quat[k])))
+                tuple(colour[:3]), model.geom_pos[k] - origin, matrix_of(model.geom_quat[k])))
 
 
 def _mesh(model: Any, k: int) -> Mesh:
@@ -360,33 +330,43 @@ def from_file(path: Path, report: Callable[[str], None]) -> Shape:
     return _shape(read_tree(path), path.name, path, report)
 
 
-def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[str], None]
-           ) -> Shape:
+def _skeleton(tree: Xml.Element, source: str) -> Shape:
+    """Return the links and limits of a URDF, with nothing to draw."""
     description = describe(tree, source)
-    joints, drawing = description.joints, _Drawing(tree, path)
-    parts = {link.get('name', ''): link for link in tree.findall('link')}
+    joints = description.joints.values()
     shape = Shape(source, [Link(description.root(), -1)])
-    shape.limits = {joint.name: (joint.lower, joint.upper) for joint in joints.values()
+    shape.limits = {joint.name: (joint.lower, joint.upper) for joint in joints
                     if joint.kind != 'fixed'}
     below: dict[str, list[JointDescription]] = {}
-    for joint in joints.values():
+    for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
-    errors, replaced = [], []
     for index, link in enumerate(shape.links):  # which grows
         if len(shape.links) > len(joints) + 1:
             raise DescriptionError(f'URDF {source}: the links form a loop')
         for joint in below.get(link.name, ()):
             shape.links.append(_held(joint, index))
-        part = parts.get(link.name, Xml.Element('link'))
-        failed = drawing.add_all(link, part.findall('visual'))
+    return shape
+
+
+def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[str], None]
+           ) -> Shape:
+    shape, drawing = _skeleton(tree, source), _Drawing(tree, path)
+    elements = {link.get('name', ''): link for link in tree.findall('link')}
+    ends: dict[int, list[np.ndarray]] = {}
+    for link in shape.links:
+        ends.setdefault(link.parent, []).append(link.position)
+    errors, replaced = [], []
+    for index, link in enumerate(shape.links):
+        element = elements.get(link.name, Xml.Element('link'))
+        failed = drawing.add_all(link, element.findall('visual'))
         if failed and not link.parts:
             replaced.append(link.name)
-            drawing.add_all(link, part.findall('collision'))
+            drawing.add_all(link, element.findall('collision'))
             if not link.parts:
-                ends = np.array([np.zeros(3), *(one.xyz for one in below.get(link.name, ()))])
-                half = np.maximum(0.5 * np.ptp(ends, axis=0), THIN)
-                link.parts.append(Part('box', half, None, GREY,
-                                       0.5 * (ends.min(axis=0) + ends.max(axis=0))))
+                points = np.array([np.zeros(3), *ends.get(index, ())])
+                low, high = points.min(axis=0), points.max(axis=0)
+                link.parts.append(Part('box', np.maximum(0.5 * (high - low), THIN), None, GREY,
+                                       0.5 * (low + high)))
         errors += failed
     if errors:
         more = f' (and {len(errors) - 1} more like it)' if len(errors) > 1 else ''
@@ -545,15 +525,18 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
             report(str(error))
             continue
         if shape:
-            # The generator respects the robot file's limits.
-            shape.limits.update(_limits(robot))
-            _with_feet(shape, info, robot)
-            return shape
-    if robot is None and info.robot:
-        report(one_line(f"drawn as a stick figure: '{info.robot[:200]}' is not one of the "
-                        'shipped robots, and the panel opens no file that a node names; publish '
-                        'robot_description, or start the panel with -p urdf:=FILE'))
-    return _sticks(info, robot)
+            break
+    else:
+        if robot is None and info.robot:
+            report(one_line(f"drawn as a stick figure: '{info.robot[:200]}' is not one of the "
+                            'shipped robots, and the panel opens no file that a node names; '
+                            'publish robot_description, or start the panel with -p urdf:=FILE'))
+        shape = _sticks(info, robot)
+    # The generator respects the robot file's limits.
+    for joint in robot.joints if robot else ():
+        shape.limits[joint.name] = joint.lower, joint.upper
+    _with_feet(shape, info, robot)
+    return shape
 
 
 def _is_file(model: str) -> bool:
@@ -571,10 +554,6 @@ def _from_model(info: RobotInfo, robot: Robot, report: Callable[[str], None]) ->
     if model.endswith('.urdf'):
         return from_file(resource_folder('urdf') / model, report)
     return from_model(model, robot) if model else None
-
-
-def _limits(robot: Robot | None) -> dict[str, tuple[float, float]]:
-    return {joint.name: (joint.lower, joint.upper) for joint in robot.joints} if robot else {}
 
 
 def _legs(info: RobotInfo, robot: Robot | None) -> dict[str, list[str]]:
@@ -608,4 +587,4 @@ def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
     else:
         quarters = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
                         -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
-    return draw(name, legs, quarters, _limits(robot))
+    return draw(name, legs, quarters)

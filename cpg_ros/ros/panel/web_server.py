@@ -21,6 +21,7 @@ from http import HTTPStatus
 import logging
 from pathlib import Path
 import secrets
+from socket import socket
 from urllib.parse import parse_qs, urlsplit
 
 from cpg_ros.common.errors import CpgError
@@ -134,19 +135,13 @@ class WebServer:
                        (file.read_bytes(), TYPES[file.suffix])
                        for file in FILES.iterdir() if file.suffix in TYPES}
 
-    async def start(self, host: str, port: int) -> tuple[Server, int]:
-        """Start serving; return the server and its port.
-
-        Raises:
-            OSError: the address is not available.
-
-        """
-        server = await serve(self._page, host, port, process_request=self._answer,
-                             compression=None, max_size=LONGEST, max_queue=8,
-                             write_limit=65536, open_timeout=5.0, ping_interval=10.0,
-                             ping_timeout=20.0, close_timeout=1.0, server_header=None,
-                             logger=_LOG)
-        return server, next(iter(server.sockets)).getsockname()[1]
+    async def start(self, bound: socket) -> Server:
+        """Serve at a socket; return the server."""
+        return await serve(self._page, sock=bound, process_request=self._answer,
+                           compression=None, max_size=LONGEST, max_queue=8,
+                           write_limit=65536, open_timeout=5.0, ping_interval=10.0,
+                           ping_timeout=20.0, close_timeout=1.0, server_header=None,
+                           logger=_LOG)
 
     async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         path = urlsplit(request.path).path

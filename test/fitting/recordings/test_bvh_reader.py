@@ -82,7 +82,7 @@ def test_a_cut_file_is_read_to_its_last_whole_frame(tmp_path):
 
 
 @pytest.mark.parametrize(('content', 'words'), [
-    ('', "no BVH file: it does not begin with 'HIERARCHY'"),
+    ('', "not a BVH file: it does not begin with 'HIERARCHY'"),
     (text()[:200], "no line 'MOTION' follows the tree"),
     (text().replace('3 Zrot', '4 Zrot', 1), "channels of 'LeftUpLeg', '4', 'Zrotation'"),
     (text().replace('Xrotation', 'Wrotation'), "channels of 'Hips'"),

@@ -56,7 +56,7 @@ def test_the_path_decides(table, bag, tmp_path):
     # A name that says nothing is read as what it is declared to be.
     other = table.rename(tmp_path / 'walk.txt')
     assert cpg_ros.read_recording(other, 'csv', progress=False).joints == ('hip', 'knee')
-    with pytest.raises(RecordingError, match=r'walk\.txt: no recording; .* \.mcap, .*\.csv'):
+    with pytest.raises(RecordingError, match=r'walk\.txt: not a recording: .* \.mcap, .*\.csv'):
         cpg_ros.read_recording(other)
 
 

@@ -68,7 +68,7 @@ def test_states_are_in_rad_and_named_by_their_coordinates(tmp_path):
 
 
 @pytest.mark.parametrize(('text', 'words'), [
-    ('', "no file of OpenSim: it has no line 'endheader'"),
+    ('', "not a file of OpenSim: it has no line 'endheader'"),
     ('time,hip\n0,1\n', "no line 'endheader'"),
     ('a\nendheader\n', "the first column has to be 'time', not missing"),
     ('a\nendheader\nhip\ttime\n1\t2\n', "the first column has to be 'time', not 'hip'"),

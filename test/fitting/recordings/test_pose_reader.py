@@ -122,8 +122,8 @@ GOOD = deeplabcut(POINTS, LIKELY, NAMES)
 
 
 @pytest.mark.parametrize(('text', 'words'), [
-    ('', 'no table of poses: its first line neither begins'),
-    ('time,hip\n0,1\n', 'no table of poses'),
+    ('', 'not a table of poses: its first line neither begins'),
+    ('time,hip\n0,1\n', 'not a table of poses'),
     (GOOD[:50], 'line 2: a row of headers has to begin with|not both there'),
     (GOOD.replace('coords', 'cords'), "line 3: a row of headers has to begin with one of 's"),
     (GOOD.replace('Ankle', 'Knee'), "two columns 'x' of marker 'Knee'"),
@@ -200,7 +200,7 @@ class Harmful:
 
 
 @pytest.mark.parametrize(('content', 'words'), [
-    (b'\x89HDF\r\n', r'no HDF5 file of poses that can be read: .*'),
+    (b'\x89HDF\r\n', r'not a readable HDF5 file of poses: .*'),
     ({'other': 1}, "neither poses of DeepLabCut nor an analysis of SLEAP: it has 'other'"),
     ([Harmful()], 'system among the names of columns'),
 ], ids=['damaged', 'other', 'harmful'])

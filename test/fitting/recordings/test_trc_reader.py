@@ -50,7 +50,7 @@ def test_a_cut_file_is_read_to_its_last_whole_row(tmp_path):
 
 
 @pytest.mark.parametrize(('change', 'words'), [
-    (lambda text: '', "no TRC file: it does not begin with 'PathFileType'"),
+    (lambda text: '', "not a TRC file: it does not begin with 'PathFileType'"),
     (lambda text: text[:200], 'no rows'),
     (lambda text: text.replace('RTOE', ''), 'columns, where the header has 35'),
     (lambda text: text.replace('Frame#', 'Frames'), "line 4: the columns have to be 'Frame#'"),

@@ -18,8 +18,9 @@ from contextlib import ExitStack
 import re
 import time
 
+from cpg_ros.ros.kernels import StartProgress
 from geometry_msgs.msg import Twist
-from graph import EXECUTABLE, Process, until, Watcher
+from graph import EXECUTABLE, free_domain, Process, until, Watcher
 from panel_client import Client, Delay, press, start_panel
 import pytest
 
@@ -85,6 +86,7 @@ def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
     assert page.locator('#gaits button').all_inner_texts()[:2] == ['walk1', 'trot2']
     assert page.locator('#gaits button.on').get_attribute('data-gait') == 'trot'
     assert page.evaluate('panel.scene.gl.getError()') == 0
+    assert not page.locator('#slow').is_visible()
     # Something is drawn: there are more colours than of a sky and a floor.
     colours = page.evaluate("""() => { panel.scene.draw({}); const gl = panel.scene.gl;
         const all = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
@@ -204,7 +206,7 @@ def test_control_is_taken_over_by_a_click_that_both_pages_see(rig, open_page):
     name = one.locator('#this-page').inner_text().removeprefix('this is ')
     until(lambda: holder(other) == f'P{name[1:]} has control. This page only watches.', 'whose')
     assert 'off' in other.locator('#pad').get_attribute('class')
-    assert other.locator('#steered').inner_text() == f'{name} has control'
+    assert other.locator('#steered').inner_text() == holder(other)
     take_over(other)  # while the key is down
     name = other.locator('#this-page').inner_text().removeprefix('this is ')
     until(lambda: holder(one) == f'P{name[1:]} took over. This page only watches.', 'the loss')
@@ -328,6 +330,33 @@ def test_gaits_and_presets_of_other_names_are_groups_of_their_own(open_page):
     # Of those that the Go2 can be steered in.
     assert names == [['walk', 'trot'],
                      ['liu2024_walk', 'liu2024_trot', 'goat_trot', 'goat_slope_walk']]
+    page.locator('#preset-group summary').click()
+    assert page.locator('#presets button').all_inner_texts() == [
+        'walk (Liu 2024)', 'trot (Liu 2024)', 'goat trot', 'goat slope walk']
+
+
+def test_a_bar_shows_how_far_the_tuning_of_a_robot_is(browser):
+    """Published by the demonstration while it tunes, before there is a generator."""
+    domain = free_domain()
+    with ExitStack() as ending:
+        panel, address = start_panel(domain)
+        ending.callback(panel.end)
+        watcher = Watcher(domain)
+        ending.callback(watcher.end)
+        page = browser.new_page()
+        ending.callback(page.close)
+        page.goto(address)
+        starting, bar = page.locator('#starting'), page.locator('#starting progress')
+        until(lambda: starting.inner_text() == 'waiting for a generator', 'an empty graph')
+        assert not bar.is_visible()
+        progress = StartProgress(watcher.node, 'tuning the trot in simulation', 60.0)
+        until(bar.is_visible, 'the bar')
+        text = r'/watcher is starting: tuning the trot in simulation, \d+ of about 60 s'
+        assert re.fullmatch(text, starting.inner_text().strip())
+        assert bar.evaluate('bar => bar.max') == 60
+        until(lambda: bar.evaluate('bar => bar.value') >= 2, 'progress')
+        progress.end()
+        until(lambda: starting.inner_text() == 'waiting for a generator', 'the end of it')
 
 
 def test_parameters_are_closed_groups_that_a_search_opens(open_page):
@@ -362,8 +391,12 @@ def test_a_held_key_drives_again_after_the_page_stood_still(rig, open_page):
     steered(rig, page)
     page.evaluate('() => { window.end = Date.now() + 1500; while (Date.now() < end); }')
     until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
-    page.keyboard.down('ArrowUp')  # again without a release: it repeats
-    until(lambda: rig[3][-1] == (0.5, 0.0), 'steering again')
+
+    def repeated():
+        page.keyboard.down('ArrowUp')  # without a release, as a keyboard repeats a key
+        return rig[3][-1] == (0.5, 0.0)
+
+    until(repeated, 'steering again')
     page.keyboard.up('ArrowUp')
     until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
 
@@ -496,7 +529,8 @@ def test_it_comes_back_after_the_panel_was_gone(rig, browser):
 def test_a_push_makes_a_simulated_robot_fall_and_a_reset_puts_it_up(browser):
     with ExitStack() as ending:
         # In turns, so that a slow machine makes a slow robot.
-        body = Process('-p', 'lockstep:=true', executable=EXECUTABLE.with_name('robot_sim'))
+        body = Process('-p', 'lockstep:=true', '-p', 'real_time_factor:=0.5',
+                       executable=EXECUTABLE.with_name('robot_sim'))
         ending.callback(body.end)
         generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0', '-p', 'robot:='
                             'unitree_go2', '-p', "combined_topic:=''", domain=body.domain)
@@ -510,6 +544,9 @@ def test_a_push_makes_a_simulated_robot_fall_and_a_reset_puts_it_up(browser):
         health = page.locator('#health')
         until(lambda: '/robot_sim' in health.text_content(), 'the health of the simulation')
         assert 'the robot has fallen' not in health.text_content()
+        slow = page.locator('#slow')
+        until(slow.is_visible, 'a warning of slow motion')
+        assert re.fullmatch(r'0\.[0-8]\d of real time', slow.inner_text())
         banner = page.locator('#fallen')
         assert not banner.is_visible()
         page.locator('#force').fill('300')

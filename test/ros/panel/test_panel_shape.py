@@ -36,7 +36,7 @@ def worlds(shape, angles):
         own[:3, :3], own[:3, 3] = link.pose, link.position
         x, y, z = link.axis
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        angle = angles.get(link.joint, link.zero) - link.zero
+        angle = angles.get(link.joint, 0.0)
         turn[:3, :3] = (np.eye(3) + np.sin(angle) * cross
                         + (1 - np.cos(angle)) * cross @ cross) if link.joint else np.eye(3)
         above = np.eye(4) if link.parent < 0 else found[link.parent]

@@ -5,11 +5,7 @@ const listed = (names) => names.length < 2 ? names.join('')
   : `${names.slice(0, -1).join(', ')} and ${names.at(-1)}`;
 
 export class Lease {
-  constructor(send) {
-    this.now = null;
-    at('take-over').onclick = () => send({ do: 'take_over' });
-    at('release').onclick = () => send({ do: 'release' });
-  }
+  now = null;
 
   // Whether this page may steer, or would by its first command.
   get steers() {
@@ -23,12 +19,7 @@ export class Lease {
 
   // Why the robot does not move as steered, '' if it does.
   get reason() {
-    const { now } = this;
-    if (!now || (this.steers && now.round_trip === null)) return '';
-    if (now.stop_only) return 'this page can only stop the robot';
-    if (this.watches) return `${now.holder} has control`;
-    if (now.round_trip !== null) return `link too slow to steer: ${now.round_trip.toFixed(1)} s`;
-    return `cmd_vel is also published by ${listed(now.others)}`;
+    return !this.now || (this.steers && this.now.round_trip === null) ? '' : this.text().at(-1);
   }
 
   text() {

@@ -43,7 +43,7 @@ const parameters = new Parameters((name, value) => {
   if (name === 'gait') tour.end();
   set(name, value);
 });
-const lease = new Lease(send);
+const lease = new Lease();
 const bridges = new Bridges(send);
 const steering = new Steering((held) => link.postMessage({ held }));
 paint();
@@ -130,16 +130,12 @@ const takes = {
     beside();
     remember();
   },
-  bridges(message) {
-    bridges.take(message);
-  },
+  bridges: (message) => bridges.take(message),
   controls(message) {
     parameters.show(message.controls);
     beside();
   },
-  values(message) {
-    parameters.take(message.values);
-  },
+  values: (message) => parameters.take(message.values),
   shape(message) {
     scene.show(message);
     plots.shaped(message);
@@ -147,9 +143,7 @@ const takes = {
     at('source').title = message.doubts.join('\n');
     fresh = true;
   },
-  names(message) {
-    plots.named(message);
-  },
+  names: (message) => plots.named(message),
   gait(message) {
     chip(at('now'), message.gait, 'ok');
     last.gait = message.gait;
@@ -308,11 +302,8 @@ const stop = () => {
 };
 at('generators').onchange = () => send({ do: 'choose', node: at('generators').value });
 at('stop').onclick = stop;
-at('enable').onclick = () => send({ do: 'enable', on: true });
-at('sit').onclick = () => send({ do: 'seat', on: true });
-at('stand').onclick = () => send({ do: 'seat', on: false });
-at('reset').onclick = at('stand-up').onclick = () => send({ do: 'reset' });
-at('fit').onclick = () => send({ do: 'fit' });
+for (const button of document.querySelectorAll('[data-request]'))
+  button.onclick = () => send(JSON.parse(button.dataset.request));
 at('record').onclick = () => send({ do: 'record', on: !state.recording });
 // The controls count from ahead of the robot, the command from the world's x.
 const aimed = () => [+at('force').value, +at('direction').value + scene.heading];

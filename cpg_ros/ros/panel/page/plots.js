@@ -131,29 +131,14 @@ export class Plots {
     if (this.frames.length > KEPT) this.frames.splice(0, this.frames.length - KEPT);
   }
 
-  // A component of the speed at each of some frames, averaged over the stride before it.
-  averages(shown, k) {
-    let from = 0, sum = 0, count = 0;
-    return shown.map((frame) => {
-      const value = frame.speed?.[k];
-      if (value != null) {
-        sum += value;
-        count++;
-      }
-      for (; shown[from].time < frame.time - this.stride; from++)
-        if (shown[from].speed?.[k] != null) {
-          sum -= shown[from].speed[k];
-          count--;
-        }
-      return count ? sum / count : null;
+  // Speed forward and to the left, m/s, and yaw rate, rad/s: means over the stride before a time.
+  speed(time = this.frames.at(-1)?.time) {
+    const own = this.frames.filter((frame) =>
+      frame.speed && frame.time >= time - this.stride && frame.time <= time);
+    return [0, 1, 2].map((k) => {
+      const values = known(own.map((frame) => frame.speed[k]));
+      return values.length ? values.reduce((sum, value) => sum + value) / values.length : null;
     });
-  }
-
-  // The averages at the newest frame: forward and to the left, m/s, and turning, rad/s.
-  speed() {
-    const end = this.frames.at(-1)?.time;
-    const stride = this.frames.filter((frame) => frame.time >= end - this.stride);
-    return [0, 1, 2].map((k) => this.averages(stride, k).at(-1));
   }
 
   draw() {
@@ -262,7 +247,9 @@ export class Plots {
 
   speeds(shown) {
     if (!shown.at(-1).speed) return { say: 'no node publishes odom' };
-    const lines = ['forward', 'to the left'].map((label, k) => [label, this.averages(shown, k)]);
+    const averages = shown.map((frame) => this.speed(frame.time));
+    const lines = ['forward', 'to the left'].map((label, k) =>
+      [label, averages.map((speed) => speed[k])]);
     const values = known(lines.flatMap(([, row]) => row));
     return { lines, y: 'speed [m/s]', up: [Math.min(-0.2, ...values), 0.1 + Math.max(1, ...values)] };
   }

@@ -1,6 +1,6 @@
 // The robot in three.js: its links, their shadow, the forces on its feet, and pushes.
 import { BasicShadowMap, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color,
-  CylinderGeometry, DirectionalLight, DoubleSide, Fog, Group, HemisphereLight, Matrix4,
+  CylinderGeometry, DirectionalLight, DoubleSide, Fog, Group, HemisphereLight, Matrix4, mergeVertices,
   Mesh, MeshLambertMaterial, MeshStandardMaterial, OrbitControls, PCFShadowMap, PerspectiveCamera,
   Plane, PlaneGeometry, Quaternion, Raycaster, Scene as World, SphereGeometry, SRGBColorSpace,
   toCreasedNormals, Vector2, Vector3, WebGLRenderer } from './three.min.js';
@@ -20,26 +20,14 @@ const VIEWS = { quarter: [50, 18], front: [0, 10], side: [90, 8], top: [0.01, 89
 const PIXEL = new Uint8Array(4);
 const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
-// Vertices in the same cell of a grid become their mean; triangles without area, and all but one of
-// those between the same vertices, go.
-function coarse(points, triangles) {
-  const cells = new Map(), sums = [], merged = [], known = new Set();
-  const cell = (k) => {
-    const at = [0, 1, 2].map((axis) => points[3 * k + axis]);
-    const key = at.map((value) => Math.round(value / COARSE)).join();
-    if (!cells.has(key)) cells.set(key, sums.push([0, 0, 0, 0]) - 1);
-    const sum = sums[cells.get(key)];
-    [...at, 1].forEach((value, axis) => { sum[axis] += value; });
-    return cells.get(key);
-  };
-  const of = Array.from({ length: points.length / 3 }, (_, k) => cell(k));
-  for (let k = 0; k < triangles.length; k += 3) {
-    const [a, b, c] = [0, 1, 2].map((corner) => of[triangles[k + corner]]);
-    const key = [a, b, c].sort((one, other) => one - other).join();
-    if (a !== b && b !== c && c !== a && !known.has(key)) merged.push(a, b, c);
-    known.add(key);
+// Close vertices become one; triangles without area go.
+function coarse(geometry) {
+  const made = mergeVertices(geometry, COARSE), { array } = made.index, whole = [];
+  for (let k = 0; k < array.length; k += 3) {
+    const corners = array.slice(k, k + 3);
+    if (new Set(corners).size === 3) whole.push(...corners);
   }
-  return [sums.flatMap(([x, y, z, n]) => [x / n, y / n, z / n]), merged];
+  return made.setIndex(whole);
 }
 
 // Sizes are those of a geom of MuJoCo; its cylinders and capsules are along z.
@@ -49,10 +37,8 @@ const SOLIDS = { box: ([x, y, z]) => new BoxGeometry(2 * x, 2 * y, 2 * z),
   cylinder: ([r, half]) => new CylinderGeometry(r, r, 2 * half, 24).rotateX(Math.PI / 2),
   capsule: ([r, half]) => new CapsuleGeometry(r, 2 * half, 8, 24).rotateX(Math.PI / 2) };
 
-function frame(object, place, [a, b, c, d, e, f, g, h, i]) {
-  object.position.set(...place);
-  object.quaternion.setFromRotationMatrix(
-    new Matrix4().set(a, b, c, 0, d, e, f, 0, g, h, i, 0, 0, 0, 0, 1));
+function framed(object, frame) {
+  object.applyMatrix4(new Matrix4().fromArray(frame));
   return object;
 }
 
@@ -171,7 +157,7 @@ export class Scene {
     this.robot.clear();
     Object.assign(this, { shape, links: [], arrows: {} });
     for (const link of shape.links) {
-      const group = frame(new Group(), link.place, link.pose);
+      const group = framed(new Group(), link.frame);
       group.userData = { rest: group.quaternion.clone(), place: group.position.clone(),
         axis: new Vector3(...link.axis) };
       for (const part of link.parts) group.add(this.part(part));
@@ -180,24 +166,23 @@ export class Scene {
     }
   }
 
-  part({ kind, size, colour, place, pose, low, step, points, triangles }) {
+  part({ kind, size, colour, frame, low, step, points, triangles }) {
     let geometry = SOLIDS[kind]?.(size);
     if (!geometry) {
-      let corners = Array.from(new Uint16Array(bytes(points)), (n, k) => low[k % 3] + step * n);
-      let faces = new Uint32Array(bytes(triangles));
-      if (this.software) [corners, faces] = coarse(corners, faces);
+      const corners = Float32Array.from(new Uint16Array(bytes(points)),
+        (n, k) => low[k % 3] + step * n);
       geometry = new BufferGeometry();
-      geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
-      geometry.setIndex(new BufferAttribute(new Uint32Array(faces), 1));
+      geometry.setAttribute('position', new BufferAttribute(corners, 3));
+      geometry.setIndex(new BufferAttribute(new Uint32Array(bytes(triangles)), 1));
       // With sharp edges no vertex is shared: three times as many, for a graphics card.
-      if (!this.software) geometry = toCreasedNormals(geometry, CREASE);
+      geometry = this.software ? coarse(geometry) : toCreasedNormals(geometry, CREASE);
     }
     // The sides of a thin wall are one when merged: their normals would cancel.
     const shade = { side: DoubleSide, flatShading: this.software,
       color: new Color().setRGB(...colour, SRGBColorSpace) };
     const material = this.software ? new MeshLambertMaterial(shade)
       : new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1, ...shade });
-    const mesh = frame(new Mesh(geometry, material), place, pose);
+    const mesh = framed(new Mesh(geometry, material), frame);
     mesh.castShadow = true;
     mesh.receiveShadow = !this.software;  // flat triangles would shade themselves in stripes
     return mesh;
@@ -208,7 +193,7 @@ export class Scene {
     this.shape?.links.forEach((link, k) => {
       if (!link.joint) return;
       const { rest, place, axis } = this.links[k].userData;
-      const angle = (angles[link.joint] ?? link.zero) - link.zero;
+      const angle = angles[link.joint] ?? 0;
       if (link.slides) this.links[k].position.copy(
         axis.clone().multiplyScalar(angle).applyQuaternion(rest).add(place));
       else this.links[k].quaternion.setFromAxisAngle(axis, angle).premultiply(rest);
