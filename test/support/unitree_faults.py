@@ -70,12 +70,15 @@ class Stranger:
 class Walk:
     """All three of them, with what has been seen of the bridge's phases."""
 
-    def __init__(self, *parameters, services=False, frequency=2.0):
-        self.domain, self._frequency = free_domain(), frequency
-        self.robot = StandIn(self.domain, services=services)
+    def __init__(self, *parameters, services=False, frequency=2.0, model='go2'):
+        self.domain = free_domain()
+        self.robot = StandIn(self.domain, services=services, model=model)
+        self._given = [f'robot:=unitree_{model}', *(
+            ['network:=biped', 'gait:=walk'] if model == 'g1' else
+            ['gait:=trot', f'frequency:={frequency}'])]
         self._parameters = [word for name in (
-            'command:=forward_position', f'motion_switcher:={str(services).lower()}',
-            'exclusive:=false', *parameters)
+            f'model:={model}', f'robot:=unitree_{model}', 'command:=forward_position',
+            f'motion_switcher:={str(services).lower()}', 'exclusive:=false', *parameters)
             for word in ('-p', name)]
         self.phases = []
         self.robot.start()
@@ -94,11 +97,9 @@ class Walk:
 
     def start_generator(self):
         self.generator = Process(*(word for name in (
-            'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
-            'feedback.enabled:=false', 'gait:=trot', f'frequency:={self._frequency}',
-            'command:=forward_position', 'exclusive:=false',
-            'assume_stand:=true') for word in ('-p', name)),
-            domain=self.domain)
+            *self._given, 'rate:=500.0', "combined_topic:=''", 'feedback.enabled:=false',
+            'command:=forward_position', 'exclusive:=false', 'assume_stand:=true')
+            for word in ('-p', name)), domain=self.domain)
 
     @property
     def phase(self):
@@ -122,12 +123,19 @@ class Walk:
             self.robot.lift = True
             until(lambda: not self.robot.lift, 'somebody who lifts it')
         if self.phase == 'damping':
-            answer = self.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
-            assert answer.success, answer.message
+            self.call('start')
+        if self.robot.humanoid and self.phase != 'following':
+            # It hangs in a rack, and is sent on.
+            self.wait_for('hanging').call('start')
         self.wait_for('following')
         time.sleep(1.2)
         assert self.phase == 'following', self.bridge.log
         return self
+
+    def call(self, service):
+        """Call a service of the bridge."""
+        answer = self.watcher.call(Trigger, f'/unitree_bridge/{service}', Trigger.Request())
+        assert answer.success, answer.message
 
     def publish(self, angles, seconds):
         """Publish targets beside the generator for some time."""
@@ -196,7 +204,7 @@ def nan_target(walk):
 
 def target_leaps(walk):
     began = generator_stopped(walk)
-    walk.publish(walk.robot.q + 1.0, 0.3)
+    walk.publish(walk.robot.q[:12] + 1.0, 0.3)
     return began
 
 
@@ -207,6 +215,12 @@ def state_frozen(walk):
 
 def tilt(walk):
     walk.robot.lean = 1.0
+    return time.monotonic()
+
+
+def motor_error(walk):
+    """Let a motor report an error; only humanoids do."""
+    walk.robot.error = 0x10
     return time.monotonic()
 
 
@@ -264,11 +278,13 @@ FAULTS = {generator_killed: (1.6 + 0.1, 0.1), generator_stopped: (1.6 + 0.1, 0.1
           interrupted: (0.5 + 1.5 + 0.1, 0.02)}
 if os.geteuid() == 0:
     FAULTS[fed_by_another_user] = (0.04, None)
+#: Model -> its faults.
+FAULTS_OF = {'go2': FAULTS, 'g1': {**FAULTS, motor_error: (0.02, None)}}
 
 
 def mend(walk):
     """Undo a fault."""
-    walk.robot.frozen, walk.robot.lean = False, 0.0
+    walk.robot.frozen, walk.robot.lean, walk.robot.error = False, 0.0, 0
     if walk.generator.alive:
         walk.generator.signal(signal.SIGCONT)
     if not walk.bridge.alive:

@@ -14,8 +14,8 @@
 
 """Our check sum and Unitree's library: run by Python 3.10 with cyclonedds 0.10.
 
-usage: python unitree_sdk_crc.py FOLDER COUNT    Prints JSON: how many commands, how many differ,
-and the median time in which a command is sealed with its sum, us.
+usage: python unitree_sdk_crc.py FOLDER COUNT    Prints JSON: how many commands of go2, g1 and h1_2
+each, how many differ, and the median time in which a command is sealed with its sum, us.
 """
 
 import ctypes
@@ -30,28 +30,34 @@ folder, count = Path(sys.argv[1]), int(sys.argv[2])
 sys.path.insert(0, str(folder / 'unitree_sdk2_python'))
 sys.path.append(str(Path(__file__).resolve().parents[2]))
 
-from cpg_ros.ros.bridges.unitree.messages import LowCmd  # noqa: E402
+from cpg_ros.ros.bridges.unitree.messages import LAYOUTS, LowCmd, MODELS  # noqa: E402
 import numpy as np  # noqa: E402
 from unitree_sdk2py.idl.unitree_go.msg.dds_ import LowCmd_  # noqa: E402
+from unitree_sdk2py.idl.unitree_hg.msg.dds_ import LowCmd_ as HGLowCmd_  # noqa: E402
 from unitree_sdk2py.utils.crc import CRC  # noqa: E402
 
-theirs, ours = CRC(), LowCmd()
-rng, wrong, whole = np.random.default_rng(1), 0, 0
+theirs = CRC()
 core, times = theirs.crc_lib.crc32_core, []
-for k in range(count):
-    for part in (ours.q, ours.dq, ours.tau, ours.kp, ours.kd):
-        part[:] = rng.normal(0.0, 30.0, 12)
-    began = time.perf_counter()
-    sealed = ours.encode()
-    times.append(1e6 * (time.perf_counter() - began))
-    if k % 50 == 0:
-        # Their own reader of the message, their own packing of the struct.
-        message = LowCmd_.deserialize(sealed)
-        wrong += theirs.Crc(message) != message.crc
-        whole += 1
-    body = sealed[4:]
-    words = body[:22] + b'\0\0' + body[22:24] + b'\0\0' + body[24:804]
-    wrong += core((ctypes.c_uint32 * 202).from_buffer_copy(words), 202) != struct.unpack(
-        '<I', body[804:])[0]
-print(json.dumps({'commands': count, 'read by their own reader': whole, 'wrong': wrong,
-                  'us': round(statistics.median(times), 1)}))
+rng, wrong, whole = np.random.default_rng(1), 0, 0
+for model, kind in (('go2', LowCmd_), ('g1', HGLowCmd_), ('h1_2', HGLowCmd_)):
+    ours = LowCmd(MODELS[model])
+    first = LAYOUTS[MODELS[model].package].first
+    for k in range(count):
+        for part in (ours.q, ours.dq, ours.tau, ours.kp, ours.kd):
+            part[:] = rng.normal(0.0, 30.0, len(part))
+        ours.echo[:] = k % 256
+        began = time.perf_counter()
+        sealed = ours.encode()
+        times.append(1e6 * (time.perf_counter() - began))
+        if k % 50 == 0:
+            # Their own reader of the message, their own packing of the struct.
+            message = kind.deserialize(sealed)
+            wrong += theirs.Crc(message) != message.crc
+            whole += 1
+        body = sealed[4:]
+        words = body[:first] + b'\0\0' + body[first:first + 2] + b'\0\0' + body[first + 2:-4]
+        n = len(words) // 4
+        wrong += core((ctypes.c_uint32 * n).from_buffer_copy(words), n) != struct.unpack(
+            '<I', body[-4:])[0]
+print(json.dumps({'commands of each model': count, 'read by their own reader': whole,
+                  'wrong': wrong, 'us': round(statistics.median(times), 1)}))

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generator and the bridge walk Unitree's simulated Go2, in a network namespace of its own.
+"""The generator and the bridge walk Unitree's simulated robot, in a network namespace of its own.
 
-usage: unshare --net python unitree_sdk_walk.py FOLDER [SECONDS_A_GAIT SECONDS_A_SWITCH]
-Prints JSON: what the robot saw.
+usage: unshare --net python unitree_sdk_walk.py FOLDER [SECONDS_A_GAIT SECONDS_A_SWITCH [ROBOT]]
+ROBOT is go2, or g1, which hangs in a rack and has one gait. Prints JSON: what the robot saw.
 """
 
 import json
@@ -30,6 +30,7 @@ import time
 
 folder = Path(sys.argv[1]).resolve()
 GAIT, SWITCH = map(float, sys.argv[2:4] or ('10', '3'))
+ROBOT = sys.argv[4] if len(sys.argv) > 4 else 'go2'
 os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET', ROS_DOMAIN_ID='1')
 os.environ.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
 for words in ('link set lo up', 'link set lo multicast on', 'route add 224.0.0.0/4 dev lo'):
@@ -38,8 +39,9 @@ for words in ('link set lo up', 'link set lo multicast on', 'route add 224.0.0.0
 from graph import EXECUTABLE, Process, until, Watcher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
 
-GAITS = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk')
+GAITS = ('walk',) if ROBOT == 'g1' else ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk')
 SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_PYTHON_CHECK_FIELDS': '0'}
 
 
@@ -61,9 +63,9 @@ def process(name, *parameters):
 
 
 clean = {key: value for key, value in os.environ.items() if key in ('HOME', 'PATH')}
-robot = subprocess.Popen([folder / 'venv/bin/python', Path(__file__).with_name(
-    'unitree_sdk_robot.py'), folder, '1', 'lo'], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-    text=True, env=clean)
+robot = subprocess.Popen(
+    [folder / 'venv/bin/python', Path(__file__).with_name('unitree_sdk_robot.py'), folder, '1',
+     'lo', ROBOT], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=clean)
 seen = []
 
 
@@ -74,11 +76,12 @@ def read():
 
 
 threading.Thread(target=read, daemon=True).start()
-generator = process('generator', 'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
-                    'feedback.enabled:=false',
+generator = process('generator', f'robot:=unitree_{ROBOT}',
+                    'network:=' + ('biped' if ROBOT == 'g1' else 'delayed'), 'rate:=500.0',
+                    "combined_topic:=''", 'feedback.enabled:=false',
                     'command:=forward_position', 'assume_stand:=true', f'gait:={GAITS[0]}')
-bridge = process('unitree_bridge', 'command:=forward_position', 'motion_switcher:=false',
-                 'state_timeout:=0.2')
+bridge = process('unitree_bridge', f'model:={ROBOT}', f'robot:=unitree_{ROBOT}',
+                 'command:=forward_position', 'motion_switcher:=false', 'state_timeout:=0.2')
 watcher = Watcher(1)
 states = []
 watcher.node.create_subscription(
@@ -86,6 +89,10 @@ watcher.node.create_subscription(
     QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
 result = {'gaits': {}}
 try:
+    if ROBOT == 'g1':
+        until(lambda: 'hanging' in states or 'damping' in states, 'hanging')
+        time.sleep(1.0)
+        watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
     until(lambda: 'following' in states or 'damping' in states, 'following')
     time.sleep(2.0)
     for gait in GAITS:
@@ -103,7 +110,7 @@ try:
     watcher.set(gait=GAITS[0])
     time.sleep(3.0)
     done = 0
-    for gait in switches():
+    for gait in switches() if len(GAITS) > 1 else ():
         done += watcher.set(gait=gait)[0].successful
         time.sleep(SWITCH)
         if states[-1] != 'following':
@@ -127,6 +134,7 @@ result |= {'states': states, 'last': seen[-1], 'wrong': seen[-1]['wrong'],
            'states a second': [f(row['rates']['states'] for row in walking) for f in (min, max)],
            'commands a second': [f(row['rates']['commands'] for row in walking)
                                  for f in (min, max)],
+           'largest swing': max(row['swing'] for row in rows),
            'largest torque': max(row['torque'] for row in seen), 'fallen': seen[-1]['fallen'],
            'log': bridge.log.splitlines()[-6:]}
 print(json.dumps(result))

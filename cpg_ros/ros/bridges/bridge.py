@@ -123,11 +123,11 @@ ONE_PRESS = 0.5
 class BridgeNode(StartedNode):
     """Starts, stops and monitors a thread that reads states and targets and sends commands.
 
-    A subclass sets ``interface`` and ``specs`` and overrides ``make_settings``. The other public
-    methods have defaults.
+    A subclass sets ``interface`` and ``specs`` and overrides ``make_state`` and ``make_settings``.
+    The other public methods have defaults.
 
     Attributes:
-        interface: topics and messages of the robot.
+        interface: topics and messages of the robot; ``make_state`` may set another one.
         specs: of all parameters, see ``bridge_specs``.
         state_hint: what to check if the robot sends no state, added to the message.
         robot: of the robot file.
@@ -140,32 +140,34 @@ class BridgeNode(StartedNode):
 
     """
 
-    interface: ClassVar[type[RobotInterface]]
+    interface: type[RobotInterface]
     specs: ClassVar[Mapping[str, Spec]]
     state_hint: ClassVar[str] = ''
 
-    def __init__(self, state: RobotState) -> None:
+    def __init__(self) -> None:
         """Declare the parameters, check them, and prepare to start.
-
-        Args:
-            state: into which the robot's states are read.
 
         Raises:
             CpgError: a parameter, the robot file or the messages cannot be used.
 
         """
-        interface = self.interface
         # A real robot has no simulated time.
-        super().__init__(interface.bridge_name(),
+        super().__init__(self.interface.bridge_name(),
                          parameter_overrides=[Parameter('use_sim_time', value=False)])
         self._declare(fixed(self.specs))
         self._one_of('command', KINDS)
         value, period = self._value, 1.0 / self._value('rate')
+        state = self.make_state()
+        interface = self.interface
         self.dry: bool = value('dry_run')
         command_type, state_type = interface.command_type(), interface.state_type()
         self.robot = load_robot(value('robot'))
         settings = self.make_settings(self.robot, self._common_settings())
-        self._order = np.array([self.robot.order.index(name) for name in settings.names])
+        order = self.robot.order
+        # Joints that belong to no leg stay at the stand.
+        self._targets = settings.stand.copy()
+        self._driven = [k for k, name in enumerate(settings.names) if name in order]
+        self._order = np.array([order.index(settings.names[k]) for k in self._driven])
         self._changes: deque[tuple[BridgeState, str]] = deque()
         self.supervisor = Supervisor(settings, state, self.make_command(),
                                      lambda *change: self._changes.append(change))
@@ -177,7 +179,7 @@ class BridgeNode(StartedNode):
         self._states = PolledSubscription(self, state_type, interface.state_topic,
                                           raw=interface.raw_states)
         self._commands = Commands(self, self.robot, value('command'), period,
-                                  settings.stand.take(self._order.argsort()))
+                                  settings.stand[self._driven].take(self._order.argsort()))
         self._kp_scale = KpScaleSubscription(self)
         self._every = (max(1, round(value('rate') / value('sensor_rate')))
                        if 'sensor_rate' in self.specs else 1)
@@ -228,6 +230,10 @@ class BridgeNode(StartedNode):
             self._value('watchdog_timeout') or self._value('state_timeout'))
 
     # -- what a bridge adds ---------------------------------------------------------------
+
+    def make_state(self) -> RobotState:
+        """Return the state into which the robot's messages are read; parameters are declared."""
+        raise NotImplementedError
 
     def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
         """Return joints, gains, torques and poses, with ``common`` as further settings.
@@ -299,7 +305,8 @@ class BridgeNode(StartedNode):
                 self._publisher.publish(message)
                 self.sent += 1
             if self.watchdog is not None and (
-                    fault := self.watchdog.tick(supervisor.damping, now)):
+                    fault := self.watchdog.tick(supervisor.damping, supervisor.command.echo,
+                                                now)):
                 supervisor.sit(now, fault)
         # The robot comes first.
         while self._changes:
@@ -318,6 +325,7 @@ class BridgeNode(StartedNode):
             self.received += 1
         if last is not None and self.supervisor.robot.read(last):
             self._new = True
+            self.supervisor.command.echo[:] = self.supervisor.robot.echo
             self.supervisor.state_received(now)
             if reason := self.stop_pressed():
                 self._halt(reason, now)
@@ -328,7 +336,8 @@ class BridgeNode(StartedNode):
             self.supervisor.reject_target(self._commands.refused, now)
         if complete:
             self._commands.expect(0)
-            self.supervisor.set_target(self._commands.angles[self._order], now)
+            self._targets[self._driven] = self._commands.angles[self._order]
+            self.supervisor.set_target(self._targets, now)
 
     def _report(self, state: BridgeState, reason: str) -> None:
         """Log and publish a new state."""
@@ -443,6 +452,10 @@ class BridgeNode(StartedNode):
     def _start_again(self, request: Trigger.Request, response: Trigger.Response
                      ) -> Trigger.Response:
         state = self.supervisor.state
+        if state is BridgeState.HANGING and not self._ending:
+            self._requests.append(self.supervisor.stand)
+            response.success, response.message = True, 'it follows targets from now on'
+            return response
         if state in ACTIVE or self._start is not None or self._ending:
             response.message = ('it is being started already' if self._start is not None else
                                 f'it is {state.value}')

@@ -73,10 +73,12 @@ class RobotState:
         q: angles, rad, shape (joints,), in the order of the robot's motors.
         dq: speeds, rad/s.
         temperature: of the motors, deg C, shape (joints,); empty if they are not measured.
+        echo: numbers that every command must repeat to the robot.
 
     """
 
     temperature: np.ndarray = np.zeros(0)
+    echo: np.ndarray = np.zeros(0)
 
     def __init__(self, joints: int) -> None:
         """Start with all angles and speeds at zero."""
@@ -115,8 +117,11 @@ class JointCommand:
         tau: torques added, N m.
         kp: N m / rad.
         kd: N m s / rad.
+        echo: numbers of the robot's state that it repeats.
 
     """
+
+    echo: np.ndarray = np.zeros(0)
 
     def __init__(self, joints: int) -> None:
         """Start with all numbers at zero: no torque."""
@@ -148,7 +153,8 @@ class BridgeSettings(ShortRepr):
         lying: pose to sit down to, rad.
         most_kp: limit to which a generator's feedback may scale kp, N m / rad.
         period: of commands, s.
-        damping: kd of joints that are only damped, N m s / rad.
+        damping: kd of joints that are only damped, N m s / rad, of all or shape (joints,).
+        rack: whether the robot hangs in a rack until it is released, see ``BridgeState.HANGING``.
         rise: time from the measured pose to the stand, s.
         approach: time from the stand to the first targets, s.
         late: time at the last target after which the legs gather at the stand, s.
@@ -179,7 +185,8 @@ class BridgeSettings(ShortRepr):
     lying: np.ndarray
     most_kp: float = math.inf
     period: float = 0.002
-    damping: float = 5.0
+    damping: float | np.ndarray = 5.0
+    rack: bool = False
     rise: float = 2.0
     approach: float = 1.0
     late: float = 0.03
@@ -196,34 +203,38 @@ class BridgeSettings(ShortRepr):
     tracking_time: float = 1.0
 
 
-def motor_indices(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:
-    """Return the position of each motor's joint in ``robot.order``, shape (joints,).
+#: HELD_SPEED: largest speed of the commanded angle of a joint that is held, rad/s.
+HELD_SPEED = 5.0
 
-    ``joints`` are in motor order; ``whose`` names the motors' owner in the message.
+
+def check_joints(robot: Robot, joints: tuple[str, ...], whose: str) -> None:
+    """Check that a robot file has the joints of the motors; ``whose`` names the motors' owner.
 
     Raises:
-        InputError: the robot file has other joints.
+        InputError: it lacks one, or drives a joint that has no motor.
 
     """
-    missing = [name for name in joints if name not in robot.order]
+    missing = [name for name in joints if name not in (*robot.order, *robot.held)]
     extra = [name for name in robot.order if name not in joints]
     if missing or extra:
         name = (missing or extra)[0]
         raise InputError(f"the robot file '{robot.name}' has {'no ' if missing else ''}joint "
                          f"'{name}'; {whose} have {', '.join(joints)}")
-    return np.array([robot.order.index(name) for name in joints])
 
 
-def settings_for(robot: Robot, indices: np.ndarray, *, kp: np.ndarray, kd: np.ndarray,
-                 torque: np.ndarray, lying: np.ndarray, **others: float) -> BridgeSettings:
+def settings_for(robot: Robot, joints: tuple[str, ...], *, kp: np.ndarray, kd: np.ndarray,
+                 torque: np.ndarray, lying: np.ndarray, **others: Any) -> BridgeSettings:
     """Return the settings of a robot file, which gives limits, speeds and the stand.
 
-    Arrays have shape (joints,), in motor order: gains ``kp`` (N m / rad) and ``kd`` (N m s / rad),
-    the largest ``torque`` (N m) and the pose ``lying`` (rad), clipped to the limits. ``indices``
-    are those of ``motor_indices``, ``others`` further attributes of ``BridgeSettings``.
+    Arrays have shape (joints,), as ``joints``, in motor order: gains ``kp`` (N m / rad) and ``kd``
+    (N m s / rad), the largest ``torque`` (N m) and the pose ``lying`` (rad), clipped to the
+    limits. Joints that the file holds have no limits. ``others`` are further attributes of
+    ``BridgeSettings``.
     """
-    order = robot.order_indices[indices]
-    lower, upper, velocity, stand = (robot.column(name)[order] for name in (
-        'lower', 'upper', 'velocity', 'offset'))
-    return BridgeSettings(tuple(robot.order[index] for index in indices), kp, kd, torque, lower,
-                          upper, velocity, stand, np.clip(lying, lower, upper), **others)
+    driven = {joint.name: joint for joint in robot.joints}
+    rows = [(-math.inf, math.inf, HELD_SPEED, robot.held[name]) if name in robot.held else
+            (driven[name].lower, driven[name].upper, driven[name].velocity, driven[name].offset)
+            for name in joints]
+    lower, upper, velocity, stand = np.array(rows, dtype=float).T
+    return BridgeSettings(joints, kp, kd, torque, lower, upper, velocity, stand,
+                          np.clip(lying, lower, upper), **others)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The state machine of a bridge: rise, stand, follow, sit, damp.
+"""The state machine of a bridge: rise, hang in a rack, stand, follow, sit, damp.
 
 Only a new start leaves ``damping``. docs/how_to/unitree.md lists all transitions to it and the
 times, in the section What the bridge does when something goes wrong.
@@ -204,10 +204,11 @@ class TrackingMonitor:
 
 
 class BridgeState(Enum):
-    """State of a bridge."""
+    """State of a bridge; HANGING holds the stand and follows no targets until ``stand``."""
 
     IDLE = 'idle'
     RISING = 'rising'
+    HANGING = 'hanging'
     STANDING = 'standing'
     FOLLOWING = 'following'
     SITTING = 'sitting'
@@ -215,7 +216,8 @@ class BridgeState(Enum):
 
 
 #: ACTIVE: states in which the bridge holds the joints at target angles.
-ACTIVE = (BridgeState.RISING, BridgeState.STANDING, BridgeState.FOLLOWING, BridgeState.SITTING)
+ACTIVE = (BridgeState.RISING, BridgeState.HANGING, BridgeState.STANDING, BridgeState.FOLLOWING,
+          BridgeState.SITTING)
 
 #: STALE: number of periods without a measurement after which the last command is held, as the
 #: torque that another angle would cause is unknown.
@@ -278,6 +280,13 @@ class Supervisor:
         self.targets.reset()
         self._enter(BridgeState.RISING, now, 'from the pose that it was found in')
         return ''
+
+    def stand(self, now: float) -> None:
+        """Follow targets from now on, if the robot hangs in its rack."""
+        if self.state is BridgeState.HANGING:
+            # An earlier target does not show that a generator is running.
+            self.targets.reset()
+            self._enter(BridgeState.STANDING, now, '~/start')
 
     def set_target(self, target: np.ndarray, now: float) -> None:
         """Add a target, rad, that arrived now; reject one with a value that is not a number."""
@@ -405,6 +414,8 @@ class Supervisor:
             if away[worst] > settings.astray:
                 self.damp(now, f'{settings.names[worst]} is {away[worst]:.2f} rad from the stand '
                           'after rising')
+            elif settings.rack:
+                self._enter(BridgeState.HANGING, now, 'it has risen; ~/start lets it go on')
             else:
                 # An earlier target does not show that a generator is running.
                 self.targets.reset()

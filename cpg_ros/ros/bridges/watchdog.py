@@ -114,7 +114,9 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
             return
         before = monitor.alarms
         if monitor.due(time.monotonic()):
-            command.damp(monitor.kd[:len(command.kd)])
+            joints, echo = len(command.kd), command.echo
+            command.damp(monitor.kd[:joints])
+            echo[:] = monitor.kd[joints:joints + len(echo)]
             publisher.publish(command.encode())
             if before != monitor.alarms:
                 tell(lines[1:])

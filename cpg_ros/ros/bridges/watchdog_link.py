@@ -169,7 +169,8 @@ class TickMonitor:
     """Measures the time since the last tick, and decides when to damp the joints.
 
     Attributes:
-        kd: gains for damping, N m s / rad, as sent with the last tick.
+        kd: gains for damping, N m s / rad, and ``echo`` of the command, as sent with the last
+            tick.
         alarms: number of times that ticks were missing.
         ended: whether the process has announced its end, with the robot at rest.
 
@@ -322,13 +323,14 @@ class WatchdogLink:
                 acted |= message == TickMonitor.ACTED
         return acted
 
-    def tick(self, kd: np.ndarray, now: float) -> str:
+    def tick(self, kd: np.ndarray, echo: np.ndarray, now: float) -> str:
         """Send a tick with the gains for damping, N m s / rad, if no other follows.
 
-        Returns what is wrong with the watchdog, or ''; ``now`` is in s.
+        ``echo`` is that of the command. Returns what is wrong with the watchdog, or ''; ``now`` is
+        in s.
         """
         try:
-            self._socket.send(TickMonitor.tick(kd))
+            self._socket.send(TickMonitor.tick(np.append(kd, echo)))
         except BlockingIOError:
             self._read = min(self._read, now)
             return 'the watchdog hangs' if now - self._read > HANGS else ''

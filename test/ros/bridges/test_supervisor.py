@@ -20,7 +20,7 @@ import math
 from cpg_ros.common.errors import CpgError
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.bridges.supervisor import BridgeState, Supervisor
-from cpg_ros.ros.bridges.unitree.messages import JOINTS, LowCmd, LowState, MODELS, settings_of
+from cpg_ros.ros.bridges.unitree.messages import LowCmd, LowState, MODELS, settings_of
 from cpg_ros.ros.bridges.watchdog_link import TickMonitor
 import numpy as np
 import pytest
@@ -33,10 +33,10 @@ LIE = np.tile([0.0, 1.36, -2.65], 4)
 class Rig:
     """A supervisor and joints that do at once what they are told."""
 
-    def __init__(self, q=LIE, settings=GO2):
+    def __init__(self, q=LIE, settings=GO2, model=MODELS['go2']):
         self.states = []
-        self.state, self.now, self.tick = LowState(), 10.0, 0
-        self.machine = Supervisor(settings, self.state, LowCmd(),
+        self.state, self.now, self.tick = LowState(model), 10.0, 0
+        self.machine = Supervisor(settings, self.state, LowCmd(model),
                                   lambda state, reason: self.states.append(state))
         self.state.q[:] = q
         self.state.quaternion[:] = 1.0, 0.0, 0.0, 0.0
@@ -293,7 +293,7 @@ def test_gains_are_limited(kp, words):
 
 def test_gains_for_each_kind_of_joint():
     settings = settings_of(load_robot('unitree_go2'), MODELS['go2'], [10.0, 20.0, 30.0], [2.0])
-    assert dict(zip(JOINTS, settings.kp, strict=True))['RL_thigh_joint'] == 20.0
+    assert dict(zip(settings.names, settings.kp, strict=True))['RL_thigh_joint'] == 20.0
 
 
 def test_another_robot_is_refused():
@@ -326,6 +326,66 @@ def test_a_joint_that_is_stuck_within_a_small_swing_makes_it_sit(swing, slack, s
         rig.run(DT)
     assert (rig.machine.state is BridgeState.FOLLOWING) != stuck
     assert ('FL_hip_joint is stuck at' in rig.machine.reason) == stuck
+
+
+# -- a humanoid ----------------------------------------------------------------------------------
+
+G1 = settings_of(load_robot('unitree_g1'), MODELS['g1'], [0.0], [0.0])
+
+
+def humanoid():
+    return Rig(np.zeros(29), G1, MODELS['g1'])
+
+
+def test_a_humanoid_hangs_in_its_rack_until_it_is_sent_on():
+    rig = humanoid().run(0.01)
+    rig.target = G1.stand + 0.01
+    assert not rig.machine.rise(rig.now)
+    rig.run(4.0)
+    assert rig.machine.state is BridgeState.HANGING
+    assert 'hanging already' in rig.machine.rise(rig.now)
+    assert np.allclose(rig.machine.command.q, G1.stand, atol=1e-6)
+    rig.machine.stand(rig.now)
+    rig.run(1.2)
+    assert rig.machine.state is BridgeState.FOLLOWING
+    assert np.allclose(rig.machine.command.q, G1.stand + 0.01, atol=1e-6)
+    rig.machine.sit(rig.now, '~/stop')
+    rig.run(2.1)
+    assert rig.states == [BridgeState.RISING, BridgeState.HANGING, BridgeState.STANDING,
+                          BridgeState.FOLLOWING, BridgeState.SITTING, BridgeState.DAMPING]
+    # Arms stay, legs crouch; every joint is damped as the robot file has it.
+    assert np.allclose(rig.state.q[15:], G1.stand[15:], atol=0.02)
+    assert rig.state.q[3] == pytest.approx(2.02, abs=0.02)
+    assert rig.machine.command.kd.tolist() == pytest.approx([*[5.0] * 4, 2.0, 2.0] * 2 + [
+        4.8, 4.0, 4.0] + [*[2.0] * 5, 0.4, 0.4] * 2)
+
+
+def test_stand_is_for_a_robot_in_a_rack_only():
+    rig = Rig().run(0.01)
+    assert not rig.machine.rise(rig.now)
+    rig.machine.stand(rig.now)
+    assert rig.machine.state is BridgeState.RISING
+
+
+@pytest.mark.parametrize(('bits', 'damps'), [(0x40000000, False), (0x40000010, True)])
+def test_a_new_error_of_a_motor_damps_at_once(bits, damps):
+    # What is set before anything is sent may be that nothing is.
+    rig = humanoid()
+    rig.state.error[7] = 0x40000000
+    rig.run(0.01)
+    assert not rig.machine.rise(rig.now)
+    rig.run(0.5)
+    rig.state.error[7] = bits
+    rig.run(DT)
+    assert (rig.machine.state is BridgeState.DAMPING) is damps
+    assert ('right_hip_roll_joint reports the error 0x10' in rig.machine.reason) is damps
+
+
+def test_a_humanoid_needs_all_its_joints_in_the_robot_file():
+    with pytest.raises(CpgError, match="'humanoid' has no joint 'waist_yaw_joint'"):
+        settings_of(load_robot('humanoid'), MODELS['g1'], [0.0], [0.0])
+    with pytest.raises(CpgError, match='kd has 3 numbers: give one for all joints, or 29, for'):
+        settings_of(load_robot('unitree_g1'), MODELS['g1'], [0.0], [1.0, 1.0, 1.0])
 
 
 # -- the watchdog ------------------------------------------------------------------------------

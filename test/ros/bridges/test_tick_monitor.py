@@ -14,9 +14,16 @@
 
 """When the watchdog damps a robot whose bridge is silent; 500 ticks a second, 20 ms."""
 
-from cpg_ros.ros.bridges.watchdog_link import TickMonitor
+import logging
+import os
+from types import SimpleNamespace
+
+from cpg_ros.ros.bridges.unitree.messages import LowCmd, MODELS
+from cpg_ros.ros.bridges.watchdog import watch
+from cpg_ros.ros.bridges.watchdog_link import address, listening, TickMonitor, unconnected
 import numpy as np
 import pytest
+from stand_in import HG_COMMAND, MACHINE
 
 TICK = TickMonitor.tick(np.full(12, 3.0))
 
@@ -55,3 +62,24 @@ def test_only_ticks_are_signs_of_life(monitor):
     assert monitor.due(1.0201) and not monitor.ended
     monitor.receive(TickMonitor.END, 1.021)
     assert monitor.ended
+
+
+def test_damping_of_a_humanoid_repeats_the_mode_machine_of_the_last_tick():
+    name = address('test', 'watchdog', os.getpid(), '/lowcmd')
+    sent = []
+    with listening(name) as listener, unconnected() as line:
+        line.connect(name)
+        line.send(TickMonitor.tick(np.append(np.full(29, 3.0), MACHINE)))
+
+        def publish(message):
+            sent.append(HG_COMMAND.unpack(message[4:]))
+            if len(sent) == 3:
+                line.send(TickMonitor.END)
+
+        watch(listener, SimpleNamespace(publish=publish), LowCmd(MODELS['g1']),
+              TickMonitor(0.002, 0.02), os.getpid(), logging.getLogger())
+    for fields in sent:
+        motors = np.array(fields[2:2 + 35 * 7]).reshape(35, 7)
+        assert fields[:2] == (0, MACHINE) and not motors[29:].any()
+        # Mode, angle, speed, torque, kp, kd.
+        assert (motors[:29, :6] == [1.0, 0.0, 0.0, 0.0, 0.0, 3.0]).all()

@@ -17,17 +17,28 @@
 import re
 
 from cpg_ros.ros.bridges.unitree.bridge import harmful
-from cpg_ros.ros.bridges.unitree.messages import BUTTONS, crc32, LowCmd, LowState
+from cpg_ros.ros.bridges.unitree.messages import BUTTONS, crc32, LowCmd, LowState, MODELS
 import numpy as np
 import pytest
-from stand_in import C_STRUCT, check_sum, COMMAND, mpeg2, STATE
+from stand_in import (
+    C_STRUCT,
+    check_sum,
+    COMMAND,
+    HG_C_STRUCT,
+    HG_COMMAND,
+    HG_STATE,
+    MACHINE,
+    mpeg2,
+    STATE,
+)
 
 
-def filled(seed):
+def filled(seed, model='go2'):
     """Return a command of random numbers."""
-    rng, command = np.random.default_rng(seed), LowCmd()
+    rng, command = np.random.default_rng(seed), LowCmd(MODELS[model])
     for part in (command.q, command.dq, command.tau, command.kp, command.kd):
-        part[:] = rng.normal(0.0, 30.0, 12)
+        part[:] = rng.normal(0.0, 30.0, len(part))
+    command.echo[:] = MACHINE
     return command
 
 
@@ -37,31 +48,53 @@ def test_crc_of_the_standard():
     assert crc32(b'43218765') == mpeg2(b'12345678')
 
 
-def test_crc_of_200_random_commands_is_the_table_driven_one():
+@pytest.mark.parametrize(('model', 'cdr', 'packed'), [
+    ('go2', COMMAND, C_STRUCT), ('g1', HG_COMMAND, HG_C_STRUCT),
+    ('h1_2', HG_COMMAND, HG_C_STRUCT)])
+def test_crc_of_200_random_commands_is_the_table_driven_one(model, cdr, packed):
     for seed in range(200):
-        fields = COMMAND.unpack(filled(seed).encode()[4:])
-        assert check_sum(C_STRUCT.pack(*fields)[:808]) == fields[-1]
+        fields = cdr.unpack(filled(seed, model).encode()[4:])
+        assert check_sum(packed.pack(*fields)[:-4]) == fields[-1]
 
 
-def test_a_command_is_what_rclpy_serialises():
-    messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
+#: Of ``filled`` by seed 0, 1, 2 for G1 and H1-2: what crc32_core and the struct of unitree_ros2
+#: (motor_crc_hg) give.
+HG_SUMS = {'g1': [3684546565, 3630007603, 2594431448],
+           'h1_2': [1450468110, 242326950, 1114928446]}
+
+
+@pytest.mark.parametrize('model', HG_SUMS)
+def test_crc_of_a_humanoids_commands_is_that_of_unitrees_code(model):
+    found = [filled(seed, model).encode()[-4:] for seed in range(3)]
+    assert [int.from_bytes(one, 'little') for one in found] == HG_SUMS[model]
+
+
+@pytest.mark.parametrize(('model', 'cdr', 'size'), [
+    ('go2', COMMAND, 808), ('g1', HG_COMMAND, 1000), ('h1_2', HG_COMMAND, 1000)])
+def test_a_command_is_what_rclpy_serialises(model, cdr, size):
+    humanoid, joints = model != 'go2', len(MODELS[model].joints)
+    messages = pytest.importorskip('unitree_hg.msg' if humanoid else 'unitree_go.msg',
+                                   reason='make messages has not been run')
     from rclpy.serialization import deserialize_message, serialize_message
-    command = filled(7)
+    command = filled(7, model)
     sealed = command.encode()
     message = deserialize_message(sealed, messages.LowCmd)
-    assert message.head.tolist() == [0xfe, 0xef] and message.level_flag == 0xff
+    if humanoid:
+        assert (message.mode_pr, message.mode_machine) == (0, MACHINE)
+    else:
+        assert message.head.tolist() == [0xfe, 0xef] and message.level_flag == 0xff
     for k, motor in enumerate(message.motor_cmd):
-        assert motor.mode == 1
+        assert motor.mode == int(k < joints or not humanoid)
         want = (tuple(float(part[k]) for part in (
-            command.q, command.dq, command.tau, command.kp, command.kd)) if k < 12
-            else (np.float32(2.146e9), 16000.0, 0.0, 0.0, 0.0))
+            command.q, command.dq, command.tau, command.kp, command.kd)) if k < joints
+            else (0.0,) * 5 if humanoid else (np.float32(2.146e9), 16000.0, 0.0, 0.0, 0.0))
         assert (motor.q, motor.dq, motor.tau, motor.kp, motor.kd) == want
     # rclpy leaves rubbish in the padding; everything else is the same, byte for byte.
-    pads = COMMAND.pack(*[0xff if code in 'BH' else 0xffffffff if code == 'I' else -1e30
-                          for code in codes(COMMAND.format)])
+    pads = cdr.pack(*[0xff if code in 'BH' else 0xffffffff if code == 'I' else -1e30
+                      for code in codes(cdr.format)])
     again = serialize_message(message)[4:]
     places = [k for k, byte in enumerate(pads) if byte]
-    assert len(again) == len(sealed) - 4 == 808
+    assert len(again) == len(sealed) - 4 == size
     assert [again[k] for k in places] == [sealed[4 + k] for k in places]
 
 
@@ -71,20 +104,40 @@ def codes(form):
             for _ in range(int(count or 1))]
 
 
-def state_bytes(**given):
+def state_bytes(form):
     """Return a state with random numbers, as struct packs it."""
     rng = np.random.default_rng(3)
     values = [float(np.float32(rng.normal())) if code == 'f' else int(rng.integers(0, 100))
-              for code in codes(STATE.format)]
-    for place, value in given.items():
-        values[int(place[1:])] = value
-    return values, b'\0\1\0\0' + STATE.pack(*values)
+              for code in codes(form.format)]
+    return b'\0\1\0\0' + form.pack(*values)
+
+
+def test_a_humanoids_state_is_read_as_rclpy_reads_it():
+    messages = pytest.importorskip('unitree_hg.msg', reason='make messages has not been run')
+    from rclpy.serialization import deserialize_message
+    data = state_bytes(HG_STATE)
+    message, state = deserialize_message(data, messages.LowState), LowState(MODELS['g1'])
+    assert state.read(data) and len(data) == 2092
+    motors = message.motor_state[:29]
+    for mine, name in ((state.q, 'q'), (state.dq, 'dq'), (state.torque, 'tau_est'),
+                       (state.error, 'motorstate')):
+        assert mine.tolist() == [getattr(motor, name) for motor in motors]
+    assert state.temperature.tolist() == [max(motor.temperature) for motor in motors]
+    assert state.modes == tuple(motor.mode for motor in motors)
+    imu = message.imu_state
+    assert state.quaternion.tolist() == imu.quaternion.tolist()
+    assert state.gyroscope.tolist() == imu.gyroscope.tolist()
+    assert state.accelerometer.tolist() == imu.accelerometer.tolist()
+    assert state.imu_temperature == imu.temperature and state.tick == message.tick
+    assert state.echo.tolist() == [message.mode_machine]
+    assert state.buttons == int.from_bytes(bytes(message.wireless_remote[2:4]), 'little')
+    assert not LowState(MODELS['g1']).read(data[:-1])
 
 
 def test_a_state_is_read_as_rclpy_reads_it():
     messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
     from rclpy.serialization import deserialize_message
-    _, data = state_bytes()
+    data = state_bytes(STATE)
     message, state = deserialize_message(data, messages.LowState), LowState()
     assert state.read(data)
     motors = message.motor_state[:12]

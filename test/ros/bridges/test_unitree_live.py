@@ -29,7 +29,7 @@ from std_srvs.srv import Trigger
 from unitree_faults import (
     BRIDGE,
     bridge_and_watchdog_killed,
-    FAULTS,
+    FAULTS_OF,
     inflict,
     mend,
     Stranger,
@@ -37,6 +37,7 @@ from unitree_faults import (
 )
 
 for name, how in (('unitree_go', "'make messages' has not been run"),
+                  ('unitree_hg', "'make messages' has not been run"),
                   ('mujoco', 'the extra [sim] is not installed')):
     if importlib.util.find_spec(name) is None:
         pytest.skip(how, allow_module_level=True)
@@ -54,6 +55,13 @@ needs_root = pytest.mark.skipif(os.geteuid() != 0, reason='only root can start w
 @pytest.fixture(scope='module')
 def walk():
     walk = Walk(*PATIENT)
+    yield walk
+    walk.end()
+
+
+@pytest.fixture(scope='module')
+def rack():
+    walk = Walk(*PATIENT, model='g1')
     yield walk
     walk.end()
 
@@ -92,16 +100,41 @@ def test_from_lying_in_its_own_mode_to_walking_and_back():
         walk.end()
 
 
-@pytest.mark.parametrize('fault', FAULTS, ids=lambda fault: fault.__name__)
-def test_what_happens_on_a_fault(walk, fault):
+def suffer(walk, fault, sits):
     walk.walking()
     try:
         _, sat, torque, step, upright = inflict(walk, fault)
         # Sitting down is done on the feet; who lets go in mid-stride may roll over.
-        assert bool(sat) == (FAULTS[fault][1] is not None) and (upright or not sat)
-        assert torque < 1.2 and step < 15.0
+        assert bool(sat) == sits and (upright or not sat)
+        assert torque < 1.2
+        return step
     finally:
         mend(walk)
+
+
+@pytest.mark.parametrize('fault', FAULTS_OF['go2'], ids=lambda fault: fault.__name__)
+def test_what_happens_on_a_fault(walk, fault):
+    assert suffer(walk, fault, FAULTS_OF['go2'][fault][1] is not None) < 15.0
+
+
+@pytest.mark.parametrize('fault', FAULTS_OF['g1'], ids=lambda fault: fault.__name__)
+def test_what_happens_on_a_fault_to_a_humanoid_in_its_rack(rack, fault):
+    suffer(rack, fault, FAULTS_OF['g1'][fault][1] is not None)
+    # Every command repeats mode_machine, the watchdog's, too.
+    assert not rack.robot.wrong
+
+
+def test_a_humanoid_follows_targets_only_once_it_is_sent_on(rack):
+    rack.walking()
+    rack.call('damp')
+    rack.wait_for('damping').call('start')
+    rack.wait_for('hanging')
+    first = len(rack.robot.commands)
+    until(lambda: len(rack.robot.commands) > first + 300, 'more commands')
+    # The generator walks all the while; the first joint, the left hip, stays at its stand.
+    assert np.ptp(rack.robot.commands[first:, 5]) < 1e-6 and rack.phase == 'hanging'
+    rack.call('start')
+    rack.wait_for('following')
 
 
 def test_bridge_and_watchdog_killed_together_leave_the_last_command(walk):
@@ -201,7 +234,7 @@ def test_without_a_robot_it_says_what_to_look_at():
 @pytest.mark.parametrize(('parameter', 'words'), [
     ('kp:=[200.0]', 'kp: 200 is not from 0 to 150'), ('robot:=goat', "no joint 'FR_hip_joint'"),
     ('kp:=high', "parameter kp must be a list of doubles, not 'high'"),
-    ('model:=spot', "model 'spot' is not one of go2, go1, b2")])
+    ('model:=spot', "model 'spot' is not one of go2, go1, b2, g1, h1_2")])
 def test_what_cannot_be_used_is_refused_in_one_line(parameter, words):
     process = alone(parameter)
     assert process.wait() == 1

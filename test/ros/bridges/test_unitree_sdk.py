@@ -42,14 +42,28 @@ def run(command, **options):
 def test_the_check_sum_is_that_of_unitrees_library():
     found = run([f'{FOLDER}/venv/bin/python', SUPPORT / 'unitree_sdk_crc.py', FOLDER, '20000'],
                 env={'PATH': os.environ['PATH']})
-    assert found['commands'] == 20000 and found['wrong'] == 0
+    assert found['commands of each model'] == 20000 and found['wrong'] == 0
 
 
-def test_unitrees_robot_stands_walks_and_sits():
+def alone(script, *words):
+    """Run a script in a network of its own."""
     name = ['unshare', '--map-root-user', '--net']
     if subprocess.run([*name, 'ip', 'link'], capture_output=True, check=False).returncode:
         pytest.skip('no network namespaces here: cyclonedds 0.10 must be alone on its network')
-    found = run([*name, sys.executable, SUPPORT / 'unitree_sdk_walk.py', FOLDER, '4', '2'])
+    return run([*name, sys.executable, SUPPORT / script, FOLDER, *words])
+
+
+def test_unitrees_humanoid_hangs_walks_in_its_rack_and_crouches():
+    found = alone('unitree_sdk_walk.py', '6', '0', 'g1')
+    assert found['wrong'] == 0 and found['commands'] > 3000
+    assert found['states'] == ['idle', 'rising', 'hanging', 'standing', 'following', 'sitting',
+                               'damping']
+    # The open-loop walk swings hips and knees by 0.3 rad.
+    assert found['largest swing'] > 0.25 and found['largest torque'] < 139.0
+
+
+def test_unitrees_robot_stands_walks_and_sits():
+    found = alone('unitree_sdk_walk.py', '4', '2')
     assert found['wrong'] == 0 and found['commands'] > 10000
     assert found['fallen'] == 0 and found['switches'] == 30
     assert found['states'] == ['idle', 'rising', 'standing', 'following', 'sitting', 'damping']

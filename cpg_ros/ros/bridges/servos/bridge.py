@@ -22,7 +22,7 @@ from cpg_ros.ros.bridges.bridge import BridgeNode
 from cpg_ros.ros.bridges.robot_state import (
     bridge_specs,
     BridgeSettings,
-    motor_indices,
+    check_joints,
     settings_for,
 )
 from cpg_ros.ros.bridges.servos.calibration import load_calibration
@@ -51,10 +51,10 @@ class ServoBridge(BridgeNode):
     interface, specs = Servos, SPECS
     state_hint = ': is servo_bus running, and do all servos answer?'
 
-    def __init__(self) -> None:
-        """Declare the parameters, check them, and prepare to start."""
+    def make_state(self) -> ServoState:
+        """Return a state without joints, which the calibration file names."""
         self._state = ServoState()
-        super().__init__(self._state)
+        return self._state
 
     def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
         """Return the settings of the robot file, in the order of the calibration file."""
@@ -63,10 +63,11 @@ class ServoBridge(BridgeNode):
         calibration = load_calibration(self._value('calibration'))
         joints = calibration.joints
         self._state.expect(joints)
+        check_joints(robot, joints, 'these servos')
         ones = np.ones(len(joints))
         # Infinite torque: a servo goes to its angle with what it has.
-        return settings_for(robot, motor_indices(robot, joints, 'these servos'), kp=ones,
-                            kd=0.0 * ones, torque=np.inf * ones, lying=calibration.rest, **common)
+        return settings_for(robot, joints, kp=ones, kd=0.0 * ones, torque=np.inf * ones,
+                            lying=calibration.rest, **common)
 
     def make_command(self) -> ServoCommand:
         """Return a command for the joints of the calibration file."""

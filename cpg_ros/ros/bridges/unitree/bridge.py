@@ -24,7 +24,7 @@ import socket
 import struct
 import sys
 import time
-from typing import Any
+from typing import Any, ClassVar
 
 from cpg_ros.common.errors import MissingLibraryError
 from cpg_ros.motion.robot import Robot
@@ -33,9 +33,9 @@ from cpg_ros.ros.bridges.robot_state import bridge_specs, BridgeSettings
 from cpg_ros.ros.bridges.unitree.messages import (
     BUTTONS,
     FootForces,
-    JOINTS,
     LowCmd,
     LowState,
+    Model,
     MODELS,
     PARTS,
     settings_of,
@@ -67,32 +67,54 @@ def message(name: str) -> type:
         raise MissingLibraryError(
             f'the messages of {package} are missing ({error}): ' + (
                 "'make messages' builds them" if wheels else
-                'build unitree_go and unitree_api of '
+                f'build {package} and unitree_api of '
                 'https://github.com/unitreerobotics/unitree_ros2 with colcon, and source that '
                 'workspace')) from error
 
 
 class Unitree(RobotInterface):
-    """Low-level commands and states of the robots that use ``unitree_go``."""
+    """Low-level commands and states of robots with four legs, by ``unitree_go``.
+
+    Attributes:
+        model: that the messages are for.
+
+    """
 
     maker = 'unitree'
     command_topic, state_topic = '/lowcmd', '/lowstate'
     raw_states = True
+    model: ClassVar[Model] = MODELS['go2']
 
-    @staticmethod
-    def command_type() -> type:
+    @classmethod
+    def command_type(cls) -> type:
         """Return ``LowCmd``; errors as of ``message``."""
-        return message('unitree_go/LowCmd')
+        return message(f'{cls.model.package}/LowCmd')
 
-    @staticmethod
-    def state_type() -> type:
+    @classmethod
+    def state_type(cls) -> type:
         """Return ``LowState``; errors as of ``message``."""
-        return message('unitree_go/LowState')
+        return message(f'{cls.model.package}/LowState')
 
-    @staticmethod
-    def make_command() -> LowCmd:
+    @classmethod
+    def make_command(cls) -> LowCmd:
         """Return a command in which no joint is driven."""
-        return LowCmd()
+        return LowCmd(cls.model)
+
+
+class UnitreeG1(Unitree):
+    """Those of the humanoid G1, by ``unitree_hg``."""
+
+    model = MODELS['g1']
+
+
+class UnitreeH12(Unitree):
+    """Those of the humanoid H1-2, by ``unitree_hg``."""
+
+    model = MODELS['h1_2']
+
+
+#: Model -> interface; Unitree for the others.
+INTERFACES: dict[str, type[Unitree]] = {'g1': UnitreeG1, 'h1_2': UnitreeH12}
 
 
 #: Vendor id of Eclipse Cyclone DDS in RTPS packets.
@@ -152,9 +174,11 @@ SPECS = fixed(bridge_specs(
     'unitree_go2',
     model=Spec('go2', 'robot model, which determines the torque limits',
                constraints=one_of(MODELS)),
-    kp=Spec([60.0], 'proportional gains [N m / rad]',
-            constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
-    kd=Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
+    kp=Spec([0.0], 'proportional gains [N m / rad]; 0 for 60, or, of a humanoid, those of the '
+            'robot file', constraints='one number, one for each joint in motor order, or, with '
+            'four legs, three for hip, thigh and calf'),
+    kd=Spec([0.0], 'damping gains [N m s / rad]; 0 for 2, or, of a humanoid, those of the robot '
+            'file', constraints='as kp'),
     foot_scale=Spec(1.0, 'force per unit of a foot sensor [N]', 0.001, 1000.0),
     foot_offset=Spec([0.0], "what a foot sensor reads in the air, in the robot's units",
                      constraints="one number, or one for each leg in the robot file's order"),
@@ -170,49 +194,58 @@ SPECS = fixed(bridge_specs(
 # The measurements of a Unitree robot, on the topics that robot_sim has.
 
 #: Unitree's feet are in the order of its legs.
-FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
+FEET = tuple(name.partition('_')[0] for name in MODELS['go2'].joints[::len(PARTS)])
 
 
 class Sensors:
-    """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
+    """Publishes ``joint_states``, ``imu``; of robots with four legs ``foot_contacts``, and, once a
+    second, ``battery``.
+    """
 
     def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces,
                  stamped: bool = False) -> None:
-        """Publish the contents of ``state``, joints in ``robot.order``.
+        """Publish the contents of ``state``, joints in ``robot.order``, then those that are held.
 
         ``stamped`` adds forces on the feet with stamps, in frames such as ``lh_foot``.
         """
-        self._state, self._forces, self._legs = state, feet, tuple(robot.legs)
-        names = robot.order
-        self._from = [JOINTS.index(name) for name in names]
-        self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
+        self._state, self._forces, joints_there = state, feet, state.model.joints
+        self._legs = () if state.model.humanoid else tuple(robot.legs)
+        names = (*robot.order, *(name for name in joints_there if name in robot.held))
+        self._from = [joints_there.index(name) for name in names]
+        self._feet = [FEET.index(robot.legs[leg][0].name.partition('_')[0]) for leg in self._legs]
         n = len(names)
         sizes = n, n, n, 4, 3, 3, len(self._feet)
         *joints, orientation, rates, acceleration, forces = indices(sizes)
         imu = Imu()
         imu.header.frame_id = 'imu'
-        self._block = MessageBlock(node, sizes, [
+        templates = [
             ('joint_states', joint_state(names, *joints)),
             ('imu', Template(imu, [imu.header.stamp], numbers=[
                 *each(imu.orientation, 'wxyz', orientation),
                 *each(imu.angular_velocity, 'xyz', rates),
-                *each(imu.linear_acceleration, 'xyz', acceleration)])),
-            ('foot_contacts', labelled(self._legs, forces)),
-            *(foot_wrenches(self._legs, forces, {leg: f'{leg}_foot' for leg in self._legs})
-              if stamped else [])])
-        self._battery = node.create_publisher(BatteryState, 'battery', QoSProfile(depth=100),
-                                              qos_overriding_options=OVERRIDABLE)
+                *each(imu.linear_acceleration, 'xyz', acceleration)]))]
+        if self._legs:
+            templates.append(('foot_contacts', labelled(self._legs, forces)))
+            if stamped:
+                templates += foot_wrenches(self._legs, forces,
+                                           {leg: f'{leg}_foot' for leg in self._legs})
+            self._battery = node.create_publisher(BatteryState, 'battery', QoSProfile(depth=100),
+                                                  qos_overriding_options=OVERRIDABLE)
+        self._block = MessageBlock(node, sizes, templates)
 
     def publish(self, stamp: int) -> None:
         """Publish the state; stamp in ns."""
         state, joints = self._state, self._from
-        self._block.publish(stamp, (
-            state.q[joints], state.dq[joints], state.torque[joints], state.quaternion,
-            state.gyroscope, state.accelerometer, self._forces.newtons(state.feet[self._feet])))
+        numbers = (state.q[joints], state.dq[joints], state.torque[joints], state.quaternion,
+                   state.gyroscope, state.accelerometer)
+        self._block.publish(stamp, (*numbers, self._forces.newtons(state.feet[self._feet]))
+                            if self._legs else (*numbers, state.feet))
 
     def publish_battery(self, stamp: int) -> None:
-        """Publish the battery's state; stamp in ns."""
+        """Publish the battery's state, if it is in LowState; stamp in ns."""
         state = self._state
+        if state.model.humanoid:
+            return
         message = BatteryState(
             voltage=state.voltage, current=state.current, percentage=state.charge,
             temperature=float('nan'), charge=float('nan'), capacity=float('nan'),
@@ -225,12 +258,12 @@ class Sensors:
     def values(self) -> dict[str, object]:
         """Return temperatures in deg C, charge in % and raw foot sensors, for /diagnostics."""
         state = self._state
-        heat = {f'{name} [deg C]': value
-                for name, value in zip(JOINTS, state.temperature.tolist(), strict=True)}
-        feet = {f'foot {leg} [raw]': raw for leg, raw in zip(
-            self._legs, state.feet[self._feet].tolist(), strict=True)}
-        return {**heat, **feet, 'imu [deg C]': state.imu_temperature,
-                'battery [%]': round(100.0 * state.charge)}
+        heat = {f'{name} [deg C]': value for name, value in zip(
+            state.model.joints, state.temperature.tolist(), strict=True)}
+        feet = {f'foot {leg} [raw]': state.feet[foot].item()
+                for leg, foot in zip(self._legs, self._feet, strict=True)}
+        battery = {} if state.model.humanoid else {'battery [%]': round(100.0 * state.charge)}
+        return {**heat, **feet, 'imu [deg C]': state.imu_temperature, **battery}
 
 
 # The motion modes of a Unitree robot, which must be off while a bridge commands it.
@@ -286,11 +319,12 @@ class RobotService:
         raise StartRefused(f"the robot's service '{self._name}' does not answer request {number}")
 
 
-def release(node: Node, wait: Wait, log: Callable[[str], None]) -> None:
+def release(node: Node, lies: bool, wait: Wait, log: Callable[[str], None]) -> None:
     """Make the robot lie down and release its motion modes.
 
     Args:
         node: the bridge.
+        lies: whether it lies down; a humanoid hangs in its rack instead.
         wait: sleeps for some seconds, or raises StartRefused.
         log: takes a line for each step.
 
@@ -303,7 +337,7 @@ def release(node: Node, wait: Wait, log: Callable[[str], None]) -> None:
     while name := switcher.call(CHECK_MODE).get('name', ''):
         if time.monotonic() > end:
             raise StartRefused(f"the robot does not release its motion mode '{name}'")
-        if sport is None:
+        if sport is None and lies:
             sport = RobotService(node, 'sport', wait)
             log(f"its motion mode '{name}' is active: it is asked to lie down")
             sport.call(STAND_DOWN)
@@ -332,18 +366,24 @@ class UnitreeBridge(BridgeNode):
             StartError: a parameter, the robot file or the messages cannot be used.
 
         """
-        self._state = LowState()
-        super().__init__(self._state)
+        super().__init__()
         self._button = BUTTONS[self._value('stop_button')]
         self._sensors = Sensors(self, self.robot, self._state, FootForces(
             len(self.robot.legs), self._value('foot_scale'), self._value('foot_offset'),
             self._value('foot_threshold')), self._value('stamped'))
         self._announcements = Announcements(self.context.get_domain_id())
 
+    def make_state(self) -> LowState:
+        """Return the state of a robot of the model."""
+        self._one_of('model', tuple(MODELS))
+        model = self._value('model')
+        self.interface = INTERFACES.get(model, Unitree)
+        self._state = LowState(MODELS[model])
+        return self._state
+
     def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:
         """Return the settings of the robot file and the model."""
         value = self._value
-        self._one_of('model', tuple(MODELS))
         self._one_of('stop_button', tuple(BUTTONS))
         message('unitree_api/Request')
         return settings_of(robot, MODELS[value('model')], list(value('kp')), list(value('kd')),
@@ -361,7 +401,7 @@ class UnitreeBridge(BridgeNode):
         if self.dry:
             self.get_logger().info('dry run: CheckMode, StandDown and ReleaseMode are not sent')
         else:
-            release(self, wait, self.log_step)
+            release(self, not self._state.model.humanoid, wait, self.log_step)
 
     def stop_pressed(self) -> str:
         """Return whether the stop button of the wireless remote is pressed."""
