@@ -34,6 +34,7 @@ function remember() {
 
 // -- its parts --------------------------------------------------------------------------------
 
+const REAL = 0.9;  // a simulation below this fraction of real time is said to be slow
 let opened = false, state = {}, frames = 0, counted = 0, fresh = true, scene = null;
 const last = {};
 const link = new Worker('link.js');
@@ -121,11 +122,10 @@ const takes = {
     view.node = message.node;
     at('generators').value = message.node;
     for (const key of Object.keys(last)) delete last[key];
-    rate = [];
     plots.clear();
     parameters.show([]);
     at('health').replaceChildren();
-    at('fallen').hidden = true;
+    at('fallen').hidden = at('slow').hidden = true;
     chip(at('now'), 'no gait');
     beside();
     remember();
@@ -166,8 +166,11 @@ const takes = {
       parts.some((part) => part.level === level)) || 'ok';
     chip(at('worst'), parts.filter((part) => part.level === worst).map((part) => part.text)
       .join(', '), worst);
+    const value = (name) => Number(parts.map((part) => part.values[name]).find(Boolean));
+    at('slow').hidden = !(value('real-time factor') < REAL);
+    at('slow').textContent = `${value('real-time factor').toFixed(2)} of real time`;
     at('fallen').hidden = !parts.some((part) => part.values.fallen === 'True');
-    plots.paced(Number(parts.map((part) => part.values['frequency [Hz]']).find(Boolean)));
+    plots.paced(value('frequency [Hz]'));
   },
   lease(message) {
     lease.take(message);
@@ -186,23 +189,12 @@ const takes = {
       frames++;
       Object.assign(last, frame);
       plots.take(frame);
-      if (frame.time === undefined) continue;
-      tour.take(frame.time);
-      paced(frame.time);
+      if (frame.time !== undefined) tour.take(frame.time);
     }
     fresh = true;
     link.postMessage({ drawn: true });
   },
 };
-
-// The robot's time and the page's, s, of the last seconds: how fast a simulation runs.
-let rate = [];
-function paced(time) {
-  const now = performance.now() / 1000;
-  if (rate.length && (time < rate.at(-1)[0] || now > rate.at(-1)[1] + 1)) rate = [];
-  rate.push([time, now]);
-  while (rate[0][1] < now - PACED) rate.shift();
-}
 
 function connect() {
   const where = new URL('socket', location.href);
@@ -233,8 +225,6 @@ setInterval(() => link.postMessage({}), 50);
 const SLOW = 150;
 // Longest pause after a picture, ms.
 const LONGEST = 300;
-// A simulation that takes longer than this much of real time is said to be slow; measured over s.
-const REAL = 0.9, PACED = 4;
 let slowest = 0, ended = 0, spent = 0;
 const pauses = () => !!steering.held && slowest > SLOW;
 
@@ -286,12 +276,6 @@ setInterval(() => {
 setInterval(() => {
   at('updates').textContent = `${((frames - counted) / 2).toFixed(0)} per second`;
   counted = frames;
-  const [first, end] = [rate[0], rate.at(-1)];
-  const factor = rate.length > 1 && end[1] - first[1] > PACED / 2
-    ? (end[0] - first[0]) / (end[1] - first[1]) : 1;
-  at('slow').hidden = !scene.pushable || factor >= REAL;
-  at('slow').textContent = `${factor.toFixed(2)} of real time`;
-  at('slow').title = 'the simulation is slower than real time';
 }, 2000);
 
 // -- what people do ---------------------------------------------------------------------------

@@ -7,6 +7,7 @@ const KEPT = 400;    // frames
 const USUAL = 1.7;   // times the usual time between two frames; after more, some were missed
 const CHORD = 0.1;   // fraction of a stride that a straight line may stand for
 const STRIDE = 1;    // s; what speeds are averaged over where the stride rate is not known
+const CROWDED = 8;   // rows with larger names
 const BAR = 12;      // width of a footfall, px
 
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -60,13 +61,14 @@ class Figure {
       scales: { x: { time: false, auto: false }, y: { auto: false } },
       axes: [{ ...axis, grid, label: x, size: 22, space: 60 },
         { ...axis, grid, label: y || null, size: rows ? 12 + 6.5 * longest : 40, space: 24,
+          ...rows?.length > CROWDED && { font: '8px system-ui, sans-serif' },
           ...rows && { splits: () => rows.map((_, k) => -k), values: () => rows } }],
       series: [{ label: x }, ...lines.map(([label, , more], k) => ({ label, width: 1.5,
         stroke: () => colour(k), points: { show: false },
         value: (_, value) => value == null ? '' : value.toFixed(2), ...more }))],
-      hooks: { draw: [(plot) => this.drawn?.(plot)] } },
+      // How high the legend is shows once the plot is as wide as its place.
+      hooks: { ready: [(plot) => plot.setSize(this.size)], draw: [(plot) => this.drawn?.(plot)] } },
     [[0], ...lines.map(() => [null])], this.place);
-    this.plot.setSize(this.size);
   }
 }
 
@@ -215,7 +217,7 @@ export class Plots {
     const limits = chosen.flatMap((k) => this.shape?.limits[joints[k]] || []);
     return { y: 'angle [rad]', up, lines: [...lines, ...known(limits)
       .filter((limit) => limit > up[0] && limit < up[1]).map((limit) => [`limit ${limit.toFixed(2)}`,
-        shown.map(() => limit), { stroke: () => ink('--danger'), dash: [4, 4], width: 1 }])] };
+        shown.map(() => limit), { class: 'limit', stroke: () => ink('--danger'), dash: [4, 4], width: 1 }])] };
   }
 
   // The range of each joint in the last seconds within its limits, and where it is.
