@@ -529,7 +529,7 @@ def test_it_comes_back_after_the_panel_was_gone(rig, browser):
 def test_a_push_makes_a_simulated_robot_fall_and_a_reset_puts_it_up(browser):
     with ExitStack() as ending:
         # In turns, so that a slow machine makes a slow robot.
-        body = Process('-p', 'lockstep:=true', '-p', 'real_time_factor:=0.5',
+        body = Process('-p', 'lockstep:=true', '-p', 'real_time_factor:=0.8',
                        executable=EXECUTABLE.with_name('robot_sim'))
         ending.callback(body.end)
         generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0', '-p', 'robot:='
