@@ -41,9 +41,9 @@ OFFLINE := -n auto --dist loadfile
 ONLINE := -n $(LIVE) --dist loadgroup
 # What make test-deep, make browser and make docs run.
 LEFT_OUT := deep or alone or browser or docs
-# A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
-# is listed with what failed. In depth, and without a graph, nothing does.
-AGAIN := --reruns 1 --rerun-show-tracebacks -r aR
+# A shared machine may stall for seconds: before a commit, a live test that fails runs up to twice
+# more, and is listed with what failed. In depth, and without a graph, nothing does.
+AGAIN := --reruns 2 --rerun-show-tracebacks -r aR
 # Compiled while linters run, before tests in several processes would at once; what a build has
 # compiled, and an earlier run, is there.
 KERNELS := feedback balance networks

@@ -22,6 +22,7 @@ import signal
 import subprocess
 import threading
 import time
+import weakref
 
 from ament_index_python.packages import get_package_prefix
 from diagnostic_msgs.msg import DiagnosticArray
@@ -60,6 +61,9 @@ DOMAINS = [domain for domain in range(1, 101) if domain != 42][WORKER::WORKERS]
 #: Those of nodes that outlive a test.
 OCCUPIED: set[int] = set()
 _domains = itertools.count()
+#: The processes of running tests, and how many of their last lines an error shows.
+_processes: weakref.WeakSet = weakref.WeakSet()
+SHOWN = 25
 
 
 def free_domain() -> int:
@@ -83,10 +87,11 @@ class Process:
         command = [str(executable), *(['--ros-args', *ros_args] if ros_args else [])]
         self._process = subprocess.Popen(command, env=variables, stdout=output,
                                          stderr=subprocess.STDOUT, text=True)
-        self.pid = self._process.pid
+        self.pid, self.name = self._process.pid, executable.name
         self.lines: list[str] = []
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
+        _processes.add(self)
 
     def _read(self) -> None:
         for line in self._process.stdout or ():
@@ -104,8 +109,7 @@ class Process:
 
     def wait_for(self, pattern: str) -> 'Process':
         """Wait for a line of its log."""
-        until(lambda: re.search(pattern, self.log) or not self.alive,
-              f"'{pattern}' in the log:\n{self.log}")
+        until(lambda: re.search(pattern, self.log) or not self.alive, f"'{pattern}' in a log")
         assert re.search(pattern, self.log), f"ended without '{pattern}':\n{self.log}"
         return self
 
@@ -140,7 +144,13 @@ def until(condition, what: str):
         if result:
             return result
         time.sleep(0.002)
-    raise AssertionError(f'waited {PATIENCE} s in vain for {what}')
+    raise AssertionError(f'waited {PATIENCE} s in vain for {what}{_logs()}')
+
+
+def _logs() -> str:
+    """Return the last lines of all processes that run."""
+    return ''.join(f'\n-- {one.name} in domain {one.domain}:\n' +
+                   '\n'.join(one.lines[-SHOWN:]) for one in _processes if one.alive)
 
 
 def off_grid(times, period: float) -> float:
@@ -294,15 +304,21 @@ class SimulatedTime:
             time.sleep(0.5 * step)
 
     def lead(self, start: float, end: float, step: float, *others: Watcher) -> None:
-        """Go on after run, each step once joint states of those before have come, others' too."""
+        """Go on after run, each step once joint states of those before have come, others' too.
+
+        Who has published nothing yet is waited for while time passes: without it, nothing comes.
+        """
         moving = [watcher.samples for watcher in (self._watcher, *others)]
         for now in np.arange(start, end, step):
             self._tell(now)
+            if not all(moving):
+                time.sleep(5.0 * step)
             ends, waits = time.monotonic() + PATIENCE, 0
-            while any(not samples or samples[-1][0] < now - 2.5 * step for samples in moving):
-                assert time.monotonic() < ends, f'waited {PATIENCE} s in vain for joint states'
+            while any(samples and samples[-1][0] < now - 2.5 * step for samples in moving):
+                assert time.monotonic() < ends, f'waited {PATIENCE} s for joint states{_logs()}'
                 time.sleep(0.0002)
                 waits += 1
                 if waits % 1000 == 0:
                     # It is sent best effort.
                     self._tell(now)
+        assert all(moving), f'no joint states{_logs()}'

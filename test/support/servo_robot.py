@@ -22,7 +22,7 @@ import time
 
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.bridges.watchdog_link import TickMonitor
-from graph import EXECUTABLE, Process
+from graph import EXECUTABLE, Process, until
 import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -81,8 +81,9 @@ class Sender:
     def __init__(self, domain, topic, angles, name='stranger'):
         self._context = rclpy.Context()
         rclpy.init(context=self._context, domain_id=domain)
-        node = rclpy.create_node(name, context=self._context, enable_rosout=False)
+        self._node = node = rclpy.create_node(name, context=self._context, enable_rosout=False)
         publisher = node.create_publisher(Float64MultiArray, topic, 10)
+        until(publisher.get_subscription_count, f'who listens to {topic}')
         given = angles if callable(angles) else lambda: angles
         node.create_timer(0.01, lambda: publisher.publish(
             Float64MultiArray(data=[float(angle) for angle in given()])))
@@ -97,6 +98,8 @@ class Sender:
     def __exit__(self, *_):
         self._executor.shutdown()
         self._thread.join()
+        # Left to the garbage collector, it stays in the graph of later tests.
+        self._node.destroy_node()
         rclpy.shutdown(context=self._context)
 
 
