@@ -81,7 +81,9 @@ generator = process('generator', f'robot:=unitree_{ROBOT}',
                     "combined_topic:=''", 'feedback.enabled:=false',
                     'command:=forward_position', 'assume_stand:=true', f'gait:={GAITS[0]}')
 bridge = process('unitree_bridge', f'model:={ROBOT}', f'robot:=unitree_{ROBOT}',
-                 'command:=forward_position', 'motion_switcher:=false', 'state_timeout:=0.2')
+                 'command:=forward_position', 'motion_switcher:=false', 'state_timeout:=0.2',
+                 # Their simulator keeps the last command's torque: light limbs need low gains.
+                 *(('kp:=[40.0]', 'kd:=[1.0]') if ROBOT == 'g1' else ()))
 watcher = Watcher(1)
 states = []
 watcher.node.create_subscription(

@@ -24,6 +24,8 @@ from pathlib import Path
 import subprocess
 import sys
 
+from cpg_ros.ros.bridges.unitree.messages import LowCmd, MODELS
+import numpy as np
 import pytest
 
 SUPPORT = Path(__file__).parents[2] / 'support'
@@ -34,15 +36,22 @@ pytestmark = [pytest.mark.unitree, pytest.mark.live, pytest.mark.skipif(
 
 
 def run(command, **options):
-    found = subprocess.run(command, text=True, capture_output=True, check=False, **options)
-    assert found.returncode == 0, found.stderr[-3000:]
+    found = subprocess.run(command, capture_output=True, check=False, **options)
+    assert found.returncode == 0, found.stderr[-3000:].decode()
     return json.loads(found.stdout.splitlines()[-1])
 
 
-def test_the_check_sum_is_that_of_unitrees_library():
-    found = run([f'{FOLDER}/venv/bin/python', SUPPORT / 'unitree_sdk_crc.py', FOLDER, '20000'],
-                env={'PATH': os.environ['PATH']})
-    assert found['commands of each model'] == 20000 and found['wrong'] == 0
+@pytest.mark.parametrize(('model', 'kind'), [('go2', 'go'), ('g1', 'hg'), ('h1_2', 'hg')])
+def test_the_check_sum_is_that_of_unitrees_library(model, kind):
+    rng, command, sealed = np.random.default_rng(1), LowCmd(MODELS[model]), []
+    for k in range(2000):
+        for part in (command.q, command.dq, command.tau, command.kp, command.kd):
+            part[:] = rng.normal(0.0, 30.0, len(part))
+        command.echo[:] = k % 256
+        sealed.append(command.encode())
+    found = run([f'{FOLDER}/venv/bin/python', SUPPORT / 'unitree_sdk_crc.py', FOLDER, kind],
+                input=b''.join(sealed), env={'PATH': os.environ['PATH']})
+    assert found == {'commands': 2000, 'wrong': 0}
 
 
 def alone(script, *words):
