@@ -339,7 +339,8 @@ class RobotSim(StartedNode):
         self._others: OtherPublishers | None = None
         if self._value('clock') or lockstep:
             self._tell_time = self.create_publisher(Clock, '/clock', 10)
-            self._others = OtherPublishers(self, [clock])
+            self._others = OtherPublishers(self, [clock], ': simulations need a clock each, as '
+                                           'with -r /clock:=clock in namespaces')
         self.ticker: Ticker | Lockstep
         if not lockstep:
             self.ticker = Ticker(self, self._rate * factor, self._tick, lambda: None, self._fail)
@@ -453,9 +454,7 @@ class RobotSim(StartedNode):
 
     def _find_other_clocks(self) -> str:
         """Return which other node publishes on the same clock, and the remedy, or ''."""
-        others = self._others.check() if self._others is not None else ''
-        return others and (f'{others}: simulations need a clock each, as with -r /clock:=clock in '
-                           'namespaces')
+        return self._others.check() if self._others is not None else ''
 
     def _find_lack(self, clock: str) -> str:
         """Return for what time waits on a clock of its own, or ''."""

@@ -47,8 +47,13 @@ def test_it_walks_all_gaits_at_1_khz(hidden, start):
             accepted.append(name)
             until(lambda name=name: name in watcher.gaits[-1:], name)
     assert {'trot', 'walk', 'pace', 'bound'} <= set(accepted)
-    phases = np.unwrap(watcher.next_phases(40), period=1.0, axis=0)
-    assert (np.diff(phases, axis=0) >= 0.0).all() and np.ptp(phases, axis=0).min() > 0.0
+
+    def advancing():
+        phases = np.unwrap(watcher.next_phases(40), period=1.0, axis=0)
+        return (np.diff(phases, axis=0) >= 0.0).all() and np.ptp(phases, axis=0).min() > 0.0
+
+    # A leg's phase may go back while gaits change.
+    until(advancing, 'phases that advance')
     assert process.alive and len(robot.joints) == 12
     # Feedback is off by default, which a calibrated robot's is not where there is numba.
     assert watcher.get('feedback.enabled') == [False]

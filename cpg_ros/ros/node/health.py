@@ -110,9 +110,12 @@ class OtherPublishers:
 
     """
 
-    def __init__(self, node: Node, topics: Sequence[str]) -> None:
-        """Monitor topics, by resolved names, on each of which the node has one publisher."""
-        self._node, self._topics = node, topics
+    def __init__(self, node: Node, topics: Sequence[str], remedy: str = '') -> None:
+        """Monitor topics, by resolved names, on each of which the node has one publisher.
+
+        ``remedy`` ends the warning.
+        """
+        self._node, self._topics, self._remedy = node, topics, remedy
         self.text = self._warned = ''
         self._since = 0.0
         self._timer = node.create_timer(LOOK, self.check, clock=STEADY)
@@ -131,6 +134,7 @@ class OtherPublishers:
         """Search now; return the text. The warning waits up to NAMING for a name."""
         text = '; '.join(f'{topic} is published by {names}, too'
                          for topic in self._topics if (names := others_on(self._node, topic)))
+        text += self._remedy * bool(text)
         if text != self.text:
             self.text, self._since = text, time.monotonic()
         if text != self._warned and (NAMELESS not in text
