@@ -95,6 +95,7 @@ class GaitTables(NamedTuple):
         swinging: whether each leg should swing, shape (SLOTS, POINTS, legs).
         progress: completed fraction of that swing or stance, the same.
         duty: fraction of the stride that each leg stands, shape (SLOTS, legs).
+        stance: mean duration of a stance, s, shape (SLOTS,).
         one_by_one: 1 where for most of the stride at most one leg swings, else 0, the same.
         alternates: 1 where left and right legs alternate, 0 where they hop, shape (SLOTS,).
         speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
@@ -103,6 +104,7 @@ class GaitTables(NamedTuple):
         at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
         turn: yaw rate, rad/s, for each unit by which right strides exceed left ones, the same.
         length: stride at these speeds, 1 for a full one, the same.
+        stiffness: factor of the servos' proportional gain at these speeds, the same.
         sides: -1/2 for left legs and 1/2 for right ones, shape (legs,); 0 until a gait with
             steering is known.
         copied: whether the robot file has an efference copy of the gait, shape (SLOTS,).
@@ -113,6 +115,7 @@ class GaitTables(NamedTuple):
     swinging: np.ndarray
     progress: np.ndarray
     duty: np.ndarray
+    stance: np.ndarray
     one_by_one: np.ndarray
     alternates: np.ndarray
     speeds: np.ndarray
@@ -121,6 +124,7 @@ class GaitTables(NamedTuple):
     at: np.ndarray
     turn: np.ndarray
     length: np.ndarray
+    stiffness: np.ndarray
     sides: np.ndarray
     copied: np.ndarray
     keys: np.ndarray
@@ -129,12 +133,11 @@ class GaitTables(NamedTuple):
     def empty(cls, legs: int) -> 'GaitTables':
         """Return tables with empty slots."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
-                   np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
+                   np.ones((SLOTS, legs)), np.ones(SLOTS), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
                    np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
-                   np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.zeros(legs),
-                   np.zeros(SLOTS, dtype=bool),
-                   np.zeros(SLOTS, dtype=np.int64))
+                   np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)),
+                   np.zeros(legs), np.zeros(SLOTS, dtype=bool), np.zeros(SLOTS, dtype=np.int64))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
@@ -146,6 +149,7 @@ class GaitTables(NamedTuple):
         """
         self.swinging[slot], self.progress[slot] = timetable.swinging, timetable.progress
         self.duty[slot] = 1.0 - timetable.swinging.mean(axis=0)
+        self.stance[slot] = self.duty[slot].mean() / plan.frequency
         self.one_by_one[slot] = (timetable.swinging.sum(axis=1) <= 1).mean() > 0.5
         self.alternates[slot] = not timetable.hops
         self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
@@ -154,10 +158,12 @@ class GaitTables(NamedTuple):
         self.keys[slot] = ctypes.addressof(plan.core.struct)
         steering = plan.motion.steering
         self.steered[slot] = steering is not None
+        self.stiffness[slot] = 1.0
         if steering is not None:
-            self.at[slot] = _filled(np.array(steering.speed), ROWS, 'a steering table')
-            self.turn[slot] = _filled(np.array(steering.turn), ROWS, 'a steering table')
-            self.length[slot] = _filled(np.array(steering.stride), ROWS, 'a steering table')
+            for part, column in ((self.at, steering.speed), (self.turn, steering.turn),
+                                 (self.length, steering.stride),
+                                 (self.stiffness, steering.stiffness or (1.0,))):
+                part[slot] = _filled(np.array(column), ROWS, 'a steering table')
             self.sides[:] = np.where(plan.robot.left, -0.5, 0.5)
 
 

@@ -21,7 +21,7 @@ from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.efference_copy import expect, SIGNALS
 from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.gait_tables import POINTS
-from cpg_ros.feedback.kinematics import foot_of, move_foot
+from cpg_ros.feedback.kinematics import foot_of, move_foot, wrapped
 from cpg_ros.feedback.laws import (
     clearance,
     heading,
@@ -102,6 +102,8 @@ class Intent(NamedTuple):
         yielded: speeds to which feet in stance yield, m/s, a pair.
         sideways: wanted speed to the left, m/s.
         strode: cycles since the last tick.
+        stiffness: factor of the servos' proportional gain at the wanted speed.
+        error: velocity error, as pace has it, m/s.
 
     """
 
@@ -113,6 +115,8 @@ class Intent(NamedTuple):
     yielded: tuple[float, float]
     sideways: float
     strode: float
+    stiffness: float
+    error: float
 
 
 @jit
@@ -146,8 +150,8 @@ def _deviation(tables, memory, sensors, planned, run, level):
 
 
 @jit
-def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
-    """Fill the changes of the strides; missing speed in m/s, headings in rad."""
+def _change_strides(tables, gains, memory, run, slot, missing, turned, step):
+    """Fill the changes of the strides; missing speed in m/s, missing heading in rad."""
     stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
@@ -160,13 +164,24 @@ def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
     if gains.heading:
         rate = heading.response(tables.at[slot], tables.turn[slot],
                                 memory.wanted_velocity[run, 0, 0])
-        uneven = fraction * heading.yaw_rate(headings[0], headings[1], gains) / rate
+        memory.heading_integral[run] = integral = heading.integrate(
+            memory.heading_integral[run], turned, gains, fraction * dt)
+        uneven = fraction * heading.yaw_rate(turned, integral, gains) / rate
         length = heading.response(tables.at[slot], tables.length[slot],
                                   memory.wanted_velocity[run, 0, 0])
         # No stride is longer than 1: turning back comes before speed.
         longer = limited(length + longer, max(1.0 - 0.5 * abs(uneven), 0.0)) - length
     for leg in range(stride.shape[0]):
         stride[leg] = longer + uneven * tables.sides[leg]
+
+
+@jit
+def _stiffness(tables, planned, run, speed):
+    """Return the factor of the servos' proportional gain at a forward speed, m/s."""
+    old, new = planned.gaits[run, 0], planned.gaits[run, 1]
+    before = heading.response(tables.at[old], tables.stiffness[old], speed)
+    after = heading.response(tables.at[new], tables.stiffness[new], speed)
+    return before + planned.mix[run] * (after - before)
 
 
 @jit
@@ -187,10 +202,14 @@ def _intend(tables, gains, memory, planned, run, off, step):
         singly = tables.one_by_one[old] + mix * (tables.one_by_one[new] - tables.one_by_one[old])
         uphill_x = alternates * slope.shift_ahead(ground[1], singly, gains)
         uphill_y = -alternates * slope.shift(ground[0], gains.slope_share, gains)
-    further = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
-               placement.step(off.vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
+    # A foot passes below the body in the duration of a stance.
+    stance = tables.stance[old] + mix * (tables.stance[new] - tables.stance[old])
+    brief = min(stance / gains.step_stance, 1.0)
+    vx, vy = brief * off.vx, brief * off.vy
+    further = (placement.step(vx, off.wy, gains.step, gains.step_pitch_rate, gains),
+               placement.step(vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
     yielded = placement.yielding(
-        off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
+        vx, vy, gains.stiffen and memory.stiff_for[run] > 0.0
         and tables.one_by_one[slot] > 0.0, gains)
     memory.commanded_turn[run] = low_passed(
         memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
@@ -201,7 +220,9 @@ def _intend(tables, gains, memory, planned, run, off, step):
     memory.last_phase[run] = phase
     return slot, Intent(alternates, off.roll - ground[0], off.pitch - ground[1],
                         (uphill_x, uphill_y), further, yielded,
-                        left + memory.sidestep_correction[run], strode)
+                        left + memory.sidestep_correction[run], strode,
+                        _stiffness(tables, planned, run, memory.wanted_velocity[run, 0, 0]),
+                        alternates * pace.velocity_error(vx, vy, gains))
 
 
 @jit
@@ -229,9 +250,10 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
             # A hop lands on legs that a falling nose would draw in.
             z = alternates * posture.in_swing(foot[0], foot[1], intent.roll, intent.pitch, gains)
         else:
-            # About the middle of the feet that stand: the body is tilted, not raised.
+            # About the middle of the feet that stand: the body is tilted, not raised. Its
+            # torque goes with the servos' stiffness.
             z = posture.in_stance(foot[0] - middle[0], foot[1] - middle[1], off.roll, off.pitch,
-                                  off.wx, off.wy, gains)
+                                  off.wx, off.wy, gains) / intent.stiffness
     if gains.placement:
         placed = memory.placement_displacement[run, leg]
         placement.advance(placed, swinging, intent.further, intent.yielded, gains, dt)
@@ -296,15 +318,15 @@ def _move_feet(legs, tables, gains, memory, sensors, planned, run, slot, off, in
 
 
 @jit
-def _stiffen(gains, memory, run, error, step):
-    """Make the servos stiff for a while after a velocity error, m/s."""
+def _stiffen(gains, memory, run, intent, step):
+    """Make the servos as stiff as the gait wants, and stiffer after a velocity error."""
     dt, fraction, _, delay = step
-    memory.kp_scale[run], memory.stiff[run] = 1.0, False
+    memory.kp_scale[run], memory.stiff[run] = intent.stiffness, False
     if not gains.stiffen:
         return
     # Before the full gait is reached the body is not yet where the efference copy has it.
     memory.stiff_for[run] = stiffen.remaining(
-        memory.stiff_for[run], error if fraction == 1.0 else 0.0, gains, dt)
+        memory.stiff_for[run], intent.error if fraction == 1.0 else 0.0, gains, dt)
     memory.stiff[run] = memory.stiff_for[run] > 0.0
     if gains.virtual_stiffness:
         # Measurements of which the feedback lets go may be old.
@@ -313,21 +335,21 @@ def _stiffen(gains, memory, run, error, step):
             spent, memory.stiff[run] and fraction == 1.0, delay, gains)
         memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run], gains, dt)
     elif memory.stiff[run]:
-        memory.kp_scale[run] = gains.stiffen_kp
+        memory.kp_scale[run] = max(intent.stiffness, gains.stiffen_kp)
 
 
 @jit
-def _change_frequency(gains, memory, run, steered, error, phase_rate, strode, step):
+def _change_frequency(gains, memory, run, steered, intent, phase_rate, step):
     """Fill the factor of the stride frequency; phase_rate is the legs' sum, rad/s."""
     scale, (dt, fraction, _, _) = 1.0, step
-    frequency = max(strode / dt, 0.1)
+    frequency = max(intent.strode / dt, 0.1)
     if gains.pace and steered:
-        scale += fraction * pace.frequency_change(error, memory.fatigue[run], gains)
+        scale += fraction * pace.frequency_change(intent.error, memory.fatigue[run], gains)
     memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
     scale += fraction * phase_rate / (2.0 * math.pi * frequency * memory.stride.shape[1])
     if gains.touchdown:
         change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
-        memory.phase_correction[run] -= change * strode
+        memory.phase_correction[run] -= change * intent.strode
         scale += change
     memory.frequency_scale[run] = max(scale, SLOWEST)
 
@@ -362,9 +384,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
                                            slot, off, intent, step, out[run])
         memory.clearance_share[run] = clearance.update(
             memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
-        error = intent.alternates * pace.velocity_error(off.vx, off.vy, gains)
-        _stiffen(gains, memory, run, error, step)
-        _change_frequency(gains, memory, run, tables.steered[slot], error, phase_rate,
-                          intent.strode, step)
+        _stiffen(gains, memory, run, intent, step)
+        _change_frequency(gains, memory, run, tables.steered[slot], intent, phase_rate, step)
         _change_strides(tables, gains, memory, run, slot, -off.vx,
-                        (planned.heading[run], sensors.rpy[run, 2] - planned.lean[run, 2]), step)
+                        wrapped(planned.heading[run] - sensors.rpy[run, 2]
+                                + planned.lean[run, 2]), step)

@@ -213,6 +213,12 @@ class GaitPlan(ShortRepr):
         # The table is for the gait's own frequency; a wanted one scales it, as far as joints go.
         return strides, min(frequency / (self.motion.frequency or frequency), self.most_pace)
 
+    def stiffness(self, speed: float) -> float:
+        """Return the factor of the servos' proportional gain at a forward speed, m/s."""
+        table = self.motion.steering
+        return 1.0 if table is None or not table.stiffness else float(
+            np.interp(speed, table.speed, table.stiffness))
+
     @cached_property
     def most_pace(self) -> float:
         """Largest factor of the frequency within the joints' speed limits."""

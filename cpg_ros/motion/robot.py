@@ -67,6 +67,7 @@ class SteeringTable:
         stride: factor of all legs' strides, -1 to 1.
         frequency: of the strides, Hz.
         turn: yaw rate, rad/s, for each unit by which the right stride exceeds the left one.
+        stiffness: factor of the servos' proportional gain; empty for 1 at all speeds.
 
     """
 
@@ -74,6 +75,7 @@ class SteeringTable:
     stride: Annotated[tuple[float, ...], None, within(-1.0, 1.0, '-1 to 1')]
     frequency: tuple[float, ...]
     turn: Annotated[tuple[float, ...], None, within(1e-3, 1e3, '0.001 to 1000 rad/s')]
+    stiffness: Annotated[tuple[float, ...], None, within(1.0, 4.0, '1 to 4')] = ()
 
     def ask(self, speed: float, turn: float) -> tuple[float, float, float]:
         """Return the strides of the left and right legs, and the frequency in Hz.

@@ -152,7 +152,7 @@ class _Reader(YamlReader):
         if fastest is None:
             raise self.fail(where, "needs the gait's 'frequency', too")
         table = self.record(SteeringTable, tree, where)
-        for key, column in vars(table).items():
+        for key, column in plain(table).items():
             if len(column) != len(table.speed):
                 raise self.fail(f'{where}.{key}', f'has {len(column)} numbers, and speed has '
                                 f'{len(table.speed)}')

@@ -261,6 +261,8 @@ class Generator(StartedNode):
         self._one_of('gait', tuple(presets))
         self._one_of('command', COMMANDS)
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
+        if self._value('faster_gait'):
+            self._one_of('faster_gait', tuple(self._planner.offered))
         # Its descriptor lists those of the file, too.
         descriptor = gait_spec(network, self._planner.offered).descriptor()
         descriptor.type = ParameterType.PARAMETER_STRING
@@ -289,7 +291,8 @@ class Generator(StartedNode):
         self._cmd_vel = CmdVel(self, self.pattern, plan, autostart,
                                lambda: self._value('cmd_vel_timeout'),
                                lambda: self._value('ramp'),
-                               lambda: self._feedback.active) if steered else None
+                               lambda: self._feedback.active, self._value('faster_gait'),
+                               self._change_gait) if steered else None
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                 self._value('command'), self._value('stamped'))
         self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
@@ -297,6 +300,13 @@ class Generator(StartedNode):
                                   self._value('stamped'))
 
     # -- parameters -----------------------------------------------------------------------
+
+    def _change_gait(self, name: str) -> None:
+        """Change the gait as a request would; log why not."""
+        def answer(result: SetParametersResult) -> None:
+            if not result.successful:
+                self.get_logger().warning(f'no change to the gait {name}: {result.reason}')
+        self.parameter_service.change(Parameter('gait', value=name), answer)
 
     def _values(self, changes: list[Parameter] | None = None) -> dict:
         values = {name: self._value(name) for name in self._planner.names}

@@ -206,6 +206,8 @@ QUIET = 5.0
 BASES = '', 'base', 'base_link', 'base_footprint'
 #: Largest speed to the side, m/s, which needs feedback.
 ASIDE = 0.2
+#: BACK: fraction of a gait's fastest speed below which the faster gait is left for it.
+BACK = 0.9
 
 
 class CmdVel:
@@ -213,7 +215,7 @@ class CmdVel:
 
     def __init__(self, node: Node, pattern: Pattern, plan: GaitPlan, enabled: bool,
                  timeout: Callable[[], float], ramp: Callable[[], float],
-                 closed: Callable[[], bool]) -> None:
+                 closed: Callable[[], bool], faster: str, change: Callable[[str], None]) -> None:
         """Subscribe to ``cmd_vel``.
 
         Args:
@@ -224,9 +226,14 @@ class CmdVel:
             timeout: returns how long a command is valid, s.
             ramp: returns the duration of the ramp between stand and gait, s.
             closed: returns whether feedback is active.
+            faster: gait for speeds beyond those of the others, or ''.
+            change: requests a gait, which ``set_plan`` then gives.
 
         """
         self._plan, self._enabled = plan, enabled
+        self._faster, self._change, self._requested = faster, change, ''
+        #: The gait that was left for the faster one.
+        self._slower: GaitPlan | None = None
         self._deciding = threading.Lock()
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
         self._closed = closed
@@ -336,7 +343,9 @@ class CmdVel:
     def set_plan(self, plan: GaitPlan) -> None:
         """Steer a new gait."""
         with self._deciding:
-            self._plan = plan
+            if self._plan.name != self._faster:
+                self._slower = self._plan
+            self._plan, self._requested = plan, ''
             self._act()
 
     def enable(self, enabled: bool) -> None:
@@ -350,7 +359,10 @@ class CmdVel:
         if walking:
             speed, _, turn = self._target
             slowest, fastest = self._plan.speeds
-            if not slowest <= speed <= fastest:
+            if wanted := self._gait_for(speed):
+                self._requested = wanted
+                self._change(wanted)
+            elif not slowest <= speed <= fastest and not self._requested:
                 self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._plan.name}'s "
                                   f'range is {slowest:g} to {fastest:g} m/s',
                                   throttle_duration_sec=QUIET)
@@ -358,6 +370,16 @@ class CmdVel:
         if walking != self._up:
             self._up = walking
             self._pattern.enable(walking, self._ramp())
+
+    def _gait_for(self, speed: float) -> str:
+        """Return the gait to change to for a speed, m/s, or '' to stay; each is tried once."""
+        if self._plan.name == self._faster:
+            slower = self._slower
+            wanted = (slower.name if slower is not None and speed < BACK * slower.speeds[1]
+                      else '')
+        else:
+            wanted = self._faster if speed > self._plan.speeds[1] else ''
+        return '' if wanted == self._requested else wanted
 
     def end(self) -> None:
         """Stop steering: the pattern ramps down for the last time."""

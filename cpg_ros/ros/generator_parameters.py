@@ -98,6 +98,9 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                                 'geometry_msgs/Twist', read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'the robot stops if no cmd_vel arrives for this time [s]',
                                 0.05, 60.0),
+        'faster_gait': Spec('', 'gait to which the generator changes while cmd_vel asks for more '
+                            "than the gait's fastest speed, and from which it changes back; empty "
+                            'for none', read_only=True),
         **posture.SPECS, **ticker.SPECS}
 
 

@@ -39,6 +39,7 @@ GENERATOR: Arguments = {
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
     'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
+    'faster_gait': ('', str, 'gait for speeds beyond those of the others; empty for none'),
 }
 #: Arguments that have been renamed; launch itself says nothing of one that it does not know.
 RENAMED = {'feedback': 'feedback.enabled'}

@@ -33,6 +33,9 @@ from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.terrain import lay, set_friction, Terrain
 import numpy as np
 
+#: KP_DIGITS: decimals of a changing factor of the servos' gains, each value of which is a model.
+KP_DIGITS = 1
+
 
 class BatchPhysics:
     """Bodies of one robot, all of which begin in the stand.
@@ -54,7 +57,7 @@ class BatchPhysics:
                               else os.cpu_count() or 1)
         self._data = [mujoco.MjData(body.model) for _ in range(threads)]
         self._pool = rollout.Rollout(nthread=threads)
-        self._models: dict[tuple[float, float, float, Terrain | None, float], Any] = {}
+        self._models: dict[tuple[float | Terrain | None, ...], Any] = {}
         self._spec = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED)
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS
         body.reset()
@@ -83,12 +86,14 @@ class BatchPhysics:
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
         """Return the model of a body in a scenario, with the servos' kp scaled."""
-        key = (scenario.friction, scenario.mass, scenario.payload, scenario.terrain, kp_scale)
+        kp = scenario.kp * round(kp_scale, KP_DIGITS)
+        key = (scenario.friction, scenario.mass, scenario.payload, scenario.terrain, kp,
+               scenario.kd)
         if key not in self._models:
             mujoco, model = engine(), copy.copy(self.body.model)
             set_friction(model, scenario.friction)
-            model.actuator_gainprm[:, 0] *= kp_scale
-            model.actuator_biasprm[:, 1] *= kp_scale
+            model.actuator_gainprm[:, 0] *= kp
+            model.actuator_biasprm[:, 1:3] *= kp, scenario.kd
             if scenario.mass != 1.0:
                 model.body_mass[:] *= scenario.mass
                 model.body_inertia[:] *= scenario.mass
@@ -165,9 +170,9 @@ class OpenLoopBatch(BatchPhysics):
             control, joints, force = self.controls(len(part), len(part[0][0]))
             for k, (angles, scenario) in enumerate(part):
                 joints[k], force[k] = angles, scenario.forces(len(angles), self.timestep)
-            state, sensors = self.rollout([self.model(scenario) for _, scenario in part],
-                                          np.tile(self.start, (len(part), 1)), control)
-            outcomes += [metrics_of(self.body, self.parts, angles, scenario.mass, run, sensed)
-                      for (angles, scenario), run, sensed
-                      in zip(part, state, sensors, strict=True)]
+            models = [self.model(scenario) for _, scenario in part]
+            state, sensors = self.rollout(models, np.tile(self.start, (len(part), 1)), control)
+            outcomes += [metrics_of(self.body, self.parts, angles, model, run, sensed)
+                         for (angles, _), model, run, sensed
+                         in zip(part, models, state, sensors, strict=True)]
         return outcomes

@@ -135,14 +135,12 @@ class _Bodies:
 
     """
 
-    def __init__(self, physics: BatchPhysics, scenarios: Sequence[Scenario], gains: Gains | None,
-                 order: np.ndarray) -> None:
+    def __init__(self, physics: BatchPhysics, scenarios: Sequence[Scenario], order: np.ndarray
+                 ) -> None:
         """Stand; order: indices in ``Robot.order`` of the joints as sensors have them."""
         model, parts, runs = physics.body.model, physics.parts, len(scenarios)
         self._physics, self._legs = physics, len(physics.body.robot.legs)
-        self._models = [physics.model(scenario) for scenario in scenarios]
-        self._stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
-            physics.model(scenario, gains.stiffen_kp) for scenario in scenarios]
+        self._scenarios = scenarios
         self._control, self._joints, self._force = physics.controls(runs, 1)
         self._state = np.tile(physics.start, (runs, 1))
         self._sensors = np.zeros((runs, model.nsensordata))
@@ -183,8 +181,8 @@ class _Bodies:
         self._joints[:, 0], self._force[:, 0] = targets, force
         self._earlier[:] = state[:, self._base]
         before = state[some, self._moving]
-        models = [(self._stiff if self._stiff and kp_scale[run] > 1.0 else self._models)[run]
-                  for run in self._going]
+        models = [self._physics.model(self._scenarios[run], kp_scale[run])
+                  for run in self._going.tolist()]
         after, sensed = self._physics.rollout(models, state[some], self._control[some],
                                               self._warm[some])
         state[some], self._sensors[some] = after[:, 0], sensed[:, 0]
@@ -270,7 +268,7 @@ class ClosedLoopBatch(BatchPhysics):
         limits = np.stack([self._robot.column('lower'), self._robot.column('upper')])
         indices = self._robot.order_indices
         order, steps = np.argsort(indices), round(duration / dt)
-        bodies = _Bodies(self, scenarios, gains, order)
+        bodies = _Bodies(self, scenarios, order)
         senses = SensorData.zeros(runs, legs, len(order))
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         forces = np.stack([scenario.forces(steps, dt) for scenario in scenarios], axis=1)
@@ -280,6 +278,7 @@ class ClosedLoopBatch(BatchPhysics):
                    'kp_scale': memory.kp_scale, 'stiff': memory.stiff}
         record = {key: np.zeros((steps, *value.shape)) for key, value in signals.items()}
         work, delay = np.zeros((steps, runs)), 0.0 if noise is None else noise.delay
+        kp, kd = np.array([(scenario.kp, scenario.kd) for scenario in scenarios]).T
         for k in range(steps):
             pattern.plan()
             bodies.measure(senses)
@@ -296,7 +295,8 @@ class ClosedLoopBatch(BatchPhysics):
                 record[key][k] = value
             speeds = senses.joint_velocities[:, indices]
             _, applied = torques(self.body.model, angles[:, indices],
-                                 senses.joint_positions[:, indices], speeds, memory.kp_scale)
+                                 senses.joint_positions[:, indices], speeds,
+                                 memory.kp_scale * kp, kd)
             work[k] = motor_power(applied, speeds)
             observe(noticed, applied[:, order])
             bodies.step(angles[:, indices], forces[k], memory.kp_scale)

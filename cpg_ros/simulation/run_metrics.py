@@ -81,15 +81,15 @@ class RunMetrics:
         return math.isinf(self.fell)
 
 
-def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, mass: float, states: np.ndarray,
-          sensors: np.ndarray) -> RunMetrics:
+def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, own: Any,
+               states: np.ndarray, sensors: np.ndarray) -> RunMetrics:
     """Return the metrics of a run.
 
     Args:
-        body: for its model.
-        parts: of that model.
+        body: of the robot.
+        parts: of its model.
         target: target angles of the joints, rad, shape (steps, joints).
-        mass: factor of the model's.
+        own: model of the run, with its masses and servos' gains.
         states: after each step, as of mjSTATE_FULLPHYSICS, shape (steps, states).
         sensors: after each step, as of ``model.load``, shape (steps, sensors).
 
@@ -115,7 +115,7 @@ def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, mass: float, stat
     way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
     time = dt * len(path)
     speeds = moving[:, rates]
-    torque, applied = torques(model, target, position[:, angles], speeds)
+    torque, applied = torques(own, target, position[:, angles], speeds)
     work = float(motor_power(applied, speeds)[later].sum()) * dt
     return RunMetrics(
         distance=float(pose[-1, 0]), drift=float(pose[-1, 1]),
@@ -126,7 +126,7 @@ def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, mass: float, stat
         pitch=math.degrees(np.abs(pitch[later]).max()),
         sway=math.degrees(math.sqrt(float((roll[later]**2 + pitch[later]**2).mean()))),
         fell=fell, hops=_hops(np.any(touching, axis=1), dt), duty=float(touching[later].mean()),
-        cost=float(cost_of_transport(work, GRAVITY * mass * body.mass, way)),
+        cost=float(cost_of_transport(work, GRAVITY * float(own.body_mass.sum()), way)),
         saturation=float((torque != applied).mean()),
         slip=_slide(feet, touching[later][::every]) / max(abs(way), 1e-3),
         lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
@@ -144,7 +144,8 @@ def cost_of_transport(work: float | np.ndarray, weight: float, distance: float |
 
 
 def torques(model: Any, target: np.ndarray, angles: np.ndarray, speeds: np.ndarray,
-            kp_scale: float | np.ndarray = 1.0) -> tuple[np.ndarray, np.ndarray]:
+            kp_scale: float | np.ndarray = 1.0, kd_scale: float | np.ndarray = 1.0
+            ) -> tuple[np.ndarray, np.ndarray]:
     """Return the torques that servos request, and those within their limits, N m.
 
     Args:
@@ -153,10 +154,12 @@ def torques(model: Any, target: np.ndarray, angles: np.ndarray, speeds: np.ndarr
         angles: of the joints, rad, the same shape.
         speeds: of the joints, rad/s, the same shape.
         kp_scale: factor of the proportional gains, for each row if an array, shape (n,).
+        kd_scale: the same of the damping gains.
 
     """
     stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
-    torque = stiffness * np.reshape(kp_scale, (-1, 1)) * (target - angles) - damping * speeds
+    torque = (stiffness * np.reshape(kp_scale, (-1, 1)) * (target - angles)
+              - damping * np.reshape(kd_scale, (-1, 1)) * speeds)
     limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
                       model.actuator_forcerange, [-np.inf, np.inf])
     return torque, np.clip(torque, *limits.T)

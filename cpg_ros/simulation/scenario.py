@@ -40,6 +40,7 @@ class Scenario:
         switches: later gaits, each (s, name).
         payload: mass on the base at its centre of mass, kg; negative for a lighter base.
         pose: of the body above its feet: height, m, roll, pitch and yaw, rad.
+        kp, kd: factors of the servos' proportional and damping gains.
 
     """
 
@@ -53,6 +54,8 @@ class Scenario:
     switches: tuple[tuple[float, str], ...] = ()
     payload: float = 0.0
     pose: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    kp: float = 1.0
+    kd: float = 1.0
 
     def forces(self, steps: int, timestep: float) -> np.ndarray:
         """Return the forces of the pushes in each step, N, shape (steps, 2)."""
@@ -78,6 +81,7 @@ class SensorNoise:
         orientation_bias: of roll and pitch, rad; each run draws the signs once.
         gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
         accelerometer_noise, accelerometer_bias: likewise, m/s^2.
+        stuck: what the sensor of the first foot shows all the time, N; None if it works.
         seed: of the random numbers.
 
     """
@@ -90,6 +94,7 @@ class SensorNoise:
     gyroscope_bias: float = 0.0
     accelerometer_noise: float = 0.0
     accelerometer_bias: float = 0.0
+    stuck: float | None = None
     seed: int = 0
 
 

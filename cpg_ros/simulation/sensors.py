@@ -119,6 +119,8 @@ class NoisySenses:
         rng, noise = self._rng, self._noise
         loads = true.foot_forces * (self._factor + noise.force_noise * rng.normal(
             size=true.foot_forces.shape))
+        if noise.stuck is not None:
+            loads[:, 0] = noise.stuck
         rpy = true.rpy.copy()
         rpy[:, :2] += self._tilt
         angular_velocity = (true.angular_velocity + noise.gyroscope_bias

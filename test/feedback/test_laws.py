@@ -17,6 +17,7 @@
 import math
 
 from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.kinematics import wrapped
 from cpg_ros.feedback.laws import (
     clearance,
     heading,
@@ -181,10 +182,21 @@ def test_feet_are_moved_less_uphill_than_downhill():
 
 
 def test_heading_turns_back_by_the_shorter_way():
-    found = [heading.yaw_rate(wanted, yaw, GAINS) for wanted, yaw in
+    found = [heading.yaw_rate(wrapped(wanted - yaw), 0.0, GAINS) for wanted, yaw in
              ((0.0, 0.1), (3.1, -3.1), (0.0, -2.0))]
     assert found == pytest.approx(
         [-0.1 * GAINS.turn, -GAINS.turn * (2 * math.pi - 6.2), GAINS.turn_most])
+
+
+def test_a_gait_that_turns_by_itself_keeps_no_heading_error():
+    """With the law alone, a drift of 0.1 rad/s would leave 0.1 / turn rad."""
+    off = integral = 0.0
+    for _ in range(round(20.0 / DT)):
+        integral = heading.integrate(integral, off, GAINS, DT)
+        off -= DT * (0.1 + heading.yaw_rate(off, integral, GAINS))
+    assert off == pytest.approx(0.0, abs=2e-3) and integral == pytest.approx(-0.1, abs=2e-3)
+    # A push that turns the robot far is no drift.
+    assert heading.integrate(0.05, 0.5, GAINS, DT) == 0.05
 
 
 def test_strides_lengthen_while_speed_is_missing():

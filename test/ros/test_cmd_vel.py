@@ -23,6 +23,7 @@ import pytest
 from std_srvs.srv import SetBool
 import steered
 from stepped import refused
+import yaml
 
 RATE = 100.0
 
@@ -153,6 +154,43 @@ def test_gaits_bring_their_frequency_and_must_be_steerable(walker):
     _, frequency = swings(0.4)
     assert frequency == pytest.approx(1.0, rel=0.01)
     until(lambda: shown(watcher) == ['0.4 m/s, 0 rad/s'], 'its diagnostics')
+
+
+def test_one_cmd_vel_changes_to_a_faster_gait_and_back(stepped, tmp_path):
+    tree = steered.tree()
+    tree['gaits']['run'] = dict(tree['gaits']['trot'], steering=dict(
+        steered.STEERING, speed=[-0.4, 0.0, 0.8]))
+    path = tmp_path / 'runner.yaml'
+    path.write_text(yaml.safe_dump(tree))
+    generator, watcher = stepped(
+        '-p', f'robot:={path}', '-p', 'cmd_vel:=true', '-p', f'rate:={RATE}', '-p', 'ramp:=0.3',
+        '-p', 'cmd_vel_timeout:=60.0', '-p', 'transition:=0.3', '-p', 'faster_gait:=run',
+        running=False)
+    publisher = watcher.node.create_publisher(Twist, 'cmd_vel', 10)
+    until(publisher.get_subscription_count, 'the generator listening')
+
+    def gait_at(speed):
+        message = Twist()
+        message.linear.x = speed
+        publisher.publish(message)
+        generator.run(0.5)
+        return watcher.get('gait')[0]
+
+    assert gait_at(0.3) == 'trot'
+    for _ in range(3):
+        until(lambda: gait_at(0.7) == 'run', 'the faster gait')
+        # Nine tenths of the trot's 0.4 m/s are left to it.
+        assert gait_at(0.38) == 'run'
+        until(lambda: gait_at(0.3) == 'trot', 'the gait that was left')
+    assert "the trot's range" not in generator.log
+    until(lambda: gait_at(0.9) == 'run', 'the faster gait')
+    gait_at(0.9)
+    generator.wait_for("cmd_vel asks for 0.9 m/s: the run's range is -0.4 to 0.8 m/s")
+
+
+def test_a_faster_gait_must_be_steerable(robot):
+    assert refused('-p', f'robot:={robot}', '-p', 'cmd_vel:=true', '-p', 'faster_gait:=pace'
+                   ).startswith("faster_gait 'pace' is not one of walk, trot")
 
 
 def test_frequencies_without_cmd_vel(stepped, robot):

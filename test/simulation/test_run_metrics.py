@@ -43,7 +43,7 @@ def test_work_that_joints_give_back_is_not_regained():
     turned = 2.0 * math.pi * time / period
     place[:, batch.parts.angles] += swing * np.sin(turned)[:, None]
     moving[:, batch.parts.speeds] = (swing * 2.0 * math.pi / period * np.cos(turned))[:, None]
-    found = metrics_of(batch.body, batch.parts, np.tile(stand, (len(time), 1)), 1.0, states,
+    found = metrics_of(batch.body, batch.parts, np.tile(stand, (len(time), 1)), model, states,
                   np.zeros((len(time), 3 * len(batch.body.robot.legs) + 1)))
     joints = len(stand)
     power = joints * 2.0 * (0.5 * kp * swing**2) / period

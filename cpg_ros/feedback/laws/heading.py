@@ -16,20 +16,34 @@
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.efference_copy import between_speeds
-from cpg_ros.feedback.kinematics import wrapped
-from cpg_ros.feedback.laws.law import Gain, Law, limited
+from cpg_ros.feedback.laws.law import Gain, Law, limited, StateVariable
 
 LAW = Law(
     'heading', 'hold the heading, by strides that differ between left and right', True,
     gains={
         'turn': Gain(1.0, 10.0, '1/s', 'yaw rate asked for per rad of heading error'),
-        'turn_most': Gain(0.6, 6.0, 'rad/s', 'the largest yaw rate asked for')})
+        'turn_rate': Gain(0.5, 5.0, '1/s^2',
+                          'yaw rate asked for per rad s of heading error, against gaits that '
+                          'turn by themselves'),
+        'turn_most': Gain(0.6, 6.0, 'rad/s', 'the largest yaw rate asked for')},
+    memory={
+        'heading_integral': StateVariable('yaw rate against a heading error that lasts [rad/s]')})
+#: LASTS: heading error beyond which none lasts, but comes of a push or a turn, rad; DRIFT: the
+#: largest integral, as a fraction of turn_most.
+LASTS, DRIFT = 0.2, 0.25
 
 
 @jit
-def yaw_rate(target, yaw, gains):
-    """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
-    return limited(gains.turn * wrapped(target - yaw), gains.turn_most)
+def integrate(integral, off, gains, dt):
+    """Return the integral for a heading error in rad, rad/s."""
+    return limited(integral + dt * gains.turn_rate * off if abs(off) < LASTS else integral,
+                   DRIFT * gains.turn_most)
+
+
+@jit
+def yaw_rate(off, integral, gains):
+    """Return the yaw rate that corrects a heading error in rad, rad/s."""
+    return limited(gains.turn * off + integral, gains.turn_most)
 
 
 @jit

@@ -36,6 +36,9 @@ LAW = Law(
                                'rate error'),
         'step_filter': Gain(0.032, 0.32, 's',
                             'time constant with which a foot in swing is moved'),
+        'step_stance': Gain(0.32, 3.2, 's',
+                            'duration of a stance up to which placement, pace and stiffen count '
+                            'velocity errors in proportion to it', low=1e-3),
         'step_most': Gain(0.17, 1.7, 'm', 'the most that placement moves a foot'),
         'step_decay': Gain(3.1, 31.0, '1/s',
                            "rate at which placement's displacement decays in stance"),

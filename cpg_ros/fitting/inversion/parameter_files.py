@@ -15,7 +15,7 @@
 """A fit as files that the generator loads: its parameters, and a robot file."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -147,8 +147,8 @@ def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | No
     """Return those rows of a table whose frequencies this gait allows."""
     if table is None:
         return None
-    rows = [row for row in zip(table.speed, table.stride, table.frequency, table.turn,
-                               strict=True) if row[2] <= HASTE * frequency]
+    rows = [row for row in zip(*filter(None, astuple(table)), strict=True)
+            if row[2] <= HASTE * frequency]
     return SteeringTable(*zip(*rows, strict=True)) if rows else None
 
 

@@ -181,6 +181,8 @@ PRESETS = {
     'bound': Preset('bound', Delayed(-4.5, 1.0, -6.5, -2.0, 0.4)),
     'jump': Preset('jump', Delayed(-4.5, 1.0, -6.5, 2.0, 0.4)),
     'pronk': Preset('pronk', Delayed(-4.5, 1.0, -6.5, 2.0, 0.4)),
+    # The trot's orbit, for robots with a motion of its own for it.
+    'run': Preset('trot', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)),
     'liu2024_walk': Preset('walk', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)),
     'liu2024_trot': Preset('trot', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)),
     'liu2024_pace': Preset('pace', Delayed(-3.0, 0.1, 4.0, 1.0, 0.7)),

@@ -208,8 +208,8 @@ class StrictParameterService(ParameterService):
                      srv.ListParameters, srv.SetParameters, srv.SetParametersAtomically):
             self._serve(kind)
         self._ending = False
-        #: Service, request and header; None at the end.
-        self._requests: SimpleQueue[tuple[Any, Any, Any] | None] = SimpleQueue()
+        #: Service, request and header, or a change by the node itself; None at the end.
+        self._requests: SimpleQueue[tuple[Any, Any, Any] | _Change | None] = SimpleQueue()
         self.thread = threading.Thread(target=self._work, name='parameters', daemon=True)
 
     def _serve(self, kind: Any) -> None:
@@ -252,8 +252,9 @@ class StrictParameterService(ParameterService):
 
     def _next(self) -> list[_Change]:
         """Wait for a request; return its changes, each of which gets a response."""
-        if (received := self._requests.get()) is None:
-            return []
+        received = self._requests.get()
+        if received is None or isinstance(received, _Change):
+            return [] if received is None else [received]
         service, request, header = received
         response = service.srv_type.Response()
         together = hasattr(response, 'result')
@@ -284,6 +285,11 @@ class StrictParameterService(ParameterService):
             except ValueError as error:
                 answer(k, _rejected(str(error)))
         return changes
+
+    def change(self, parameter: Parameter,
+               answer: Callable[[SetParametersResult], None]) -> None:
+        """Set a parameter in the thread, as if a request had come; ``answer`` takes the result."""
+        self._requests.put(_Change([parameter], answer))
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
         """Read parameters that the node has and that can be set while it runs.

@@ -56,7 +56,7 @@ def measure_efference(loop: ClosedLoopBatch,
     commanded: Sequence[float] | np.ndarray = [0.0]
     if loop.plan.motion.steering is not None:
         commanded = np.linspace(*loop.plan.speeds, SPEEDS) if speeds is None else speeds
-    ran = loop.run([Scenario(friction, speed=speed)
+    ran = loop.run([Scenario(friction, speed=speed, kp=loop.plan.stiffness(speed))
                     for speed in commanded for friction in FRICTIONS], DURATION)
     upright = ran.upright.reshape(-1, len(FRICTIONS)).all(axis=1)
     if not upright.any():

@@ -55,6 +55,8 @@ def centre_ahead(body: Body, parts: Anatomy) -> float:
 POINTS = 128
 #: OWN: fraction of the cycle that a leg stands by the weights alone, without a duty factor.
 OWN = 0.5
+#: SLOPE: weight of the curves' slopes in a fit, in units of half of the distance of two points.
+SLOPE = 6.4
 #: DIGITS: decimals of weights and offsets, rad, in the file.
 DIGITS = 4
 
@@ -175,6 +177,8 @@ def basis(orbit: Orbit, cell: int, harmonics: int, path: FootTrajectory) -> np.n
 def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
     """Fit a common offset and the weights of several curves, by least squares.
 
+    Their slopes are fitted, too, so that joints are not faster than a foot's path needs.
+
     Args:
         curves: of one joint, at full stride and in place, rad, shape (2, POINTS).
         psi: the monomials, shape (6, POINTS).
@@ -185,7 +189,9 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
     """
     ones, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
     table = np.block([[ones, psi.T, none], [ones, none, psi.T]])
-    terms = np.linalg.lstsq(table, curves.ravel(), rcond=None)[0]
+    both = [np.stack([columns, SLOPE * (np.roll(columns, -1, -2) - np.roll(columns, 1, -2))])
+            for columns in (table.reshape(2, -1, 13), curves[:, :, None])]
+    terms = np.linalg.lstsq(both[0].reshape(-1, 13), both[1].ravel(), rcond=None)[0]
     rest = (table @ terms - curves.ravel()).reshape(curves.shape)
     return float(terms[0]), terms[1:].reshape(2, 6), rest
 

@@ -24,7 +24,7 @@ import math
 
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.robot import SteeringTable
-from cpg_ros.simulation.bodies import OpenLoopBatch, targets
+from cpg_ros.simulation.bodies import KP_DIGITS, OpenLoopBatch, targets
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.tuning.foot_path import FootTrajectory
@@ -44,6 +44,8 @@ ROWS = len(STRIDES) + len(FASTER)
 DIFFERENCE = 0.5
 #: DURATION: of a run, s.
 DURATION = 8.0
+#: SOFT: stride up to which a gait with stiff servos leaves them as they are.
+SOFT = 0.4
 #: FLOORS: floors over which speeds and yaw rates are averaged.
 FLOORS = (Scenario(), Scenario(0.7))
 #: A gait counts as steered if its speed rises by RISE per row, m/s, and its yaw rate is at least
@@ -53,12 +55,19 @@ RISE, TURN = 0.01, 0.1
 RISE_FRACTION, TURN_FRACTION = 0.05, 0.5
 
 
-def measure(batch: OpenLoopBatch, plan: GaitPlan,
+def measure(batch: OpenLoopBatch, plan: GaitPlan, stiffness: float = 1.0,
             update: Callable[[int], None] = lambda done: None) -> SteeringTable | None:
     """Measure a gait at several strides; None if its speed does not increase with them.
 
-    Rows are dropped at the ends where the robot falls or its speed does not increase. ``update``
-    takes the number of strides measured so far.
+    Rows are dropped at the ends where the robot falls or its speed does not increase.
+
+    Args:
+        batch: bodies.
+        plan: of the gait.
+        stiffness: factor of the servos' proportional gain at a stride of 1; shorter ones need
+            less, and those up to SOFT none.
+        update: takes the number of strides measured so far.
+
     """
     left = plan.robot.left
     tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
@@ -71,25 +80,26 @@ def measure(batch: OpenLoopBatch, plan: GaitPlan,
         commands = [np.full(left.size, stride),
                     *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
                       for sign in (1.0, -1.0))]
+        kp = round(1.0 + (stiffness - 1.0) * max(stride - SOFT, 0.0) / (1.0 - SOFT), KP_DIGITS)
         trials = batch.run([(targets(plan, DURATION, batch.timestep, command.tolist(), pace),
-                             floor) for command in commands for floor in FLOORS])
+                             replace(floor, kp=kp)) for command in commands for floor in FLOORS])
         speeds = [trial.speed for trial in trials]
         turns = [trial.turn for trial in trials]
         n = len(FLOORS)
         turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * DIFFERENCE)
-        rows.append((float(np.mean(speeds[:n])), stride, pace * plan.frequency, float(turn),
+        rows.append((float(np.mean(speeds[:n])), stride, pace * plan.frequency, float(turn), kp,
                      all(trial.upright for trial in trials)))
         update(done + 1)
     return _rising(rows)
 
 
-def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTable | None:
+def _rising(rows: list[tuple[float, float, float, float, float, bool]]) -> SteeringTable | None:
     """Keep the rows around the stride of 0 as far as speeds increase."""
     zero = STRIDES.index(0.0)
     first = last = zero
     top = max(rows[len(STRIDES) - 1][0], 0.0)
     rise, turning = min(RISE, RISE_FRACTION * top), min(TURN, TURN_FRACTION * top)
-    good = [upright and turn >= turning for *_, turn, upright in rows]
+    good = [upright and turn >= turning for *_, turn, _, upright in rows]
     while last + 1 < len(rows) and good[last + 1] and (
             rows[last + 1][0] >= rows[last][0] + rise):
         last += 1
@@ -97,9 +107,11 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
         first -= 1
     if not good[zero] or last == zero:
         return None
-    speed, stride, frequency, turn = zip(*(row[:4] for row in rows[first:last + 1]), strict=True)
-    return SteeringTable(*(tuple(round(value, 4) for value in column)
-                           for column in (speed, stride, frequency, turn)))
+    speed, stride, frequency, turn, stiffness = (
+        tuple(round(value, 4) for value in column)
+        for column in zip(*(row[:5] for row in rows[first:last + 1]), strict=True))
+    return SteeringTable(speed, stride, frequency, turn,
+                         stiffness if max(stiffness) > 1.0 else ())
 
 
 #: LENGTH: of a leg in the stand, m.
@@ -153,6 +165,7 @@ class GaitTarget:
         speed: steady, m/s; more has no value, and much more counts as a fault.
         hops: per second; 0 if the robot need not leave the floor.
         low, start, high: designs.
+        stiffness: factor of the servos' proportional gain at full strides.
 
     """
 
@@ -161,6 +174,7 @@ class GaitTarget:
     low: Design
     start: Design
     high: Design
+    stiffness: float = 1.0
 
     def design(self, point: np.ndarray) -> Design:
         """Return the design at a point of the unit cube between low and high."""
@@ -182,7 +196,7 @@ class GaitTarget:
         """Return the same with this fraction of all frequencies, and of the resulting speed."""
         low, start, high = (replace(design, frequency=fraction * design.frequency)
                             for design in (self.low, self.start, self.high))
-        return GaitTarget(fraction * self.speed, self.hops, low, start, high)
+        return replace(self, speed=fraction * self.speed, low=low, start=start, high=high)
 
     @property
     def start_point(self) -> np.ndarray:
@@ -191,8 +205,9 @@ class GaitTarget:
         return (np.array(astuple(self.start)) - low) / (high - low)
 
 
-def _aim(speed: float, hops: float, low: tuple, start: tuple, high: tuple) -> GaitTarget:
-    return GaitTarget(speed, hops, Design(*low), Design(*start), Design(*high))
+def _aim(speed: float, hops: float, low: tuple, start: tuple, high: tuple,
+         stiffness: float = 1.0) -> GaitTarget:
+    return GaitTarget(speed, hops, Design(*low), Design(*start), Design(*high), stiffness)
 
 
 #: AIMS: gait -> its target; columns are those of Design.
@@ -205,6 +220,10 @@ AIMS = {
                  (1.8, 0.10, 0.45, 0.05, 0.25, 0.0, -0.06, -0.06, -0.02, -0.02, 0.7),
                  (2.2, 0.26, 0.65, 0.06, 0.275, 0.08, -0.01, -0.04, 0.01, 0.01, 1.1),
                  (3.0, 0.32, 0.70, 0.12, 0.29, 0.25, 0.06, 0.06, 0.04, 0.04, 2.0)),
+    'run': _aim(2.0, 0.0,
+                (2.0, 0.20, 0.40, 0.035, 0.24, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                (3.1, 0.322, 0.459, 0.055, 0.269, 0.096, -0.011, -0.022, 0.035, 0.043, 1.40),
+                (3.4, 0.42, 0.62, 0.10, 0.32, 0.30, 0.06, 0.06, 0.08, 0.08, 2.2), 1.4),
     'pace': _aim(0.60, 0.0,
                  (1.8, 0.10, 0.45, 0.04, 0.23, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
                  (2.9, 0.16, 0.52, 0.065, 0.265, 0.13, -0.03, -0.06, -0.01, -0.01, 0.9),

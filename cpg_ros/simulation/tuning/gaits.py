@@ -252,7 +252,8 @@ class Tuner:
                                                   worst)
                 continue
             angles = [targets(plan, SHORT, self.batch.timestep) for plan in plans]
-            runs += list(zip(cycle(angles), self.scenarios, strict=False))
+            scenarios = [replace(scenario, kp=aim.stiffness) for scenario in self.scenarios]
+            runs += list(zip(cycle(angles), scenarios, strict=False))
             runnable.append(k)
         prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
                   for trial in self.batch.run(runs)]
@@ -295,9 +296,9 @@ class Tuner:
                            + (f'; {self._nearest}' if self._nearest else ''))
         motion = self.motion(gait, best)
         angles = targets(self.plan(gait, motion), LONG, self.batch.timestep)
-        return Tuned(gait, best, cheapest, first, motion,
-                     self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale),
-                     aim.speed / AIMS[gait].speed)
+        trial = self.batch.run([(angles, Scenario(kp=aim.stiffness))])[0]
+        return Tuned(gait, best, cheapest, first, motion, trial,
+                     aim.speed * math.sqrt(self.scale), aim.speed / AIMS[gait].speed)
 
     def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
         """Return initial designs, gentler ones and, if joints cannot follow any, slower ones."""
@@ -324,23 +325,21 @@ class DesignTrial:
     kd: float | None
     threads: int
 
-    def search(self, tuner: Tuner, update: Callable[[int], None]) -> Tuned | NoDesign:
-        """Search for the design of a gait, and measure its steering table."""
-        try:
-            design = tuner.tune(self.gait, self.evaluations, self.seed, update)
-        except NoDesign as error:
-            return error
-        if AIMS[self.gait].hops:
-            return design
-        steering = measure(tuner.batch, tuner.plan(self.gait, design.motion),
-                           lambda done: update(self.evaluations + done))
-        return replace(design, motion=replace(design.motion, steering=steering))
 
-
-def search(trial: DesignTrial) -> Tuned | NoDesign:
-    """Run a search as a job."""
-    tuner = Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
-    return trial.search(tuner, lambda done: None)
+def search(trial: DesignTrial, tuner: Tuner | None = None,
+           update: Callable[[int], None] = lambda done: None) -> Tuned | NoDesign:
+    """Search for the design of a gait, and measure its steering table."""
+    tuner = tuner or Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
+    aim = AIMS[trial.gait]
+    try:
+        design = tuner.tune(trial.gait, trial.evaluations, trial.seed, update)
+    except NoDesign as error:
+        return error
+    if aim.hops:
+        return design
+    steering = measure(tuner.batch, tuner.plan(trial.gait, design.motion), aim.stiffness,
+                       lambda done: update(trial.evaluations + done))
+    return replace(design, motion=replace(design.motion, steering=steering))
 
 
 def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
@@ -348,7 +347,7 @@ def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDes
     each = trials[0].evaluations + ROWS
     with progress_bar('tuning', each * len(trials)) as bar:
         for k, trial in enumerate(trials):
-            yield trial.search(tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
+            yield search(trial, tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
 
 
 def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,

@@ -19,10 +19,11 @@ and upright, measures steering tables, and writes the robot file with its part `
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 import sys
+from typing import Any
 
 from cpg_ros.common.command_line import (
     note,
@@ -115,24 +116,21 @@ def _refuse_options(args: argparse.Namespace) -> None:
     refuse_repeated('argument --gait', args.gaits or [])
 
 
-def _tune_biped(args: argparse.Namespace, robot: Robot) -> int:
+def _biped_search(args: argparse.Namespace) -> Callable[..., Any]:
+    """Return what tunes a biped's feedback; raise InputError for options of other robots."""
     if others := [gait for gait in args.gaits or [] if gait != 'walk']:
         raise InputError("argument --gait: of a biped's feedback the walk is tuned, not "
                          f'{" and ".join(others)}')
     if args.kp is not None or args.kd is not None:
         raise InputError("arguments --kp and --kd: a biped's servos are those of its robot file, "
                          'biped.links')
-    _refuse_out(args)
-    with (executor_for(2, args, 'walks', partial(note, 'tune')) as executor,
-          progress_bar("tuning the biped's walk", args.evaluations) as bar):
-        robot, result = tune_biped(robot, args.model, args.evaluations, args.seed,
-                                  executor=executor, update=bar)
-    return _written(args, robot, result.better, str(result))
+    return tune_biped
 
 
-def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
+def _feedback_search(args: argparse.Namespace, robot: Robot) -> Callable[..., Any]:
+    """Return what tunes the feedback of a robot; raise InputError if nothing can."""
     if robot.biped is not None:
-        return _tune_biped(args, robot)
+        return _biped_search(args)
     gaits_evaluated = evaluated_gaits(robot)
     if lacking := [gait for gait in args.gaits or [] if gait not in gaits_evaluated]:
         raise InputError(f"argument --gait: robot file '{robot.name}' has no efference copy of "
@@ -141,17 +139,17 @@ def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
     if not gaits:
         raise InputError(f"argument --feedback: robot file '{robot.name}' has no gait with an "
                          'efference copy and legs with a geometry: tune its gaits first')
+    return partial(tune_feedback, gaits=gaits, kp=args.kp, kd=args.kd)
+
+
+def _tune_feedback(args: argparse.Namespace, robot: Robot) -> int:
+    search = _feedback_search(args, robot)
     _refuse_out(args)
-    report = partial(note, 'tune')
-    with (executor_for(2, args, 'prices of gains', report) as executor,
+    with (executor_for(2, args, 'prices of gains', partial(note, 'tune')) as executor,
           progress_bar('tuning the feedback', args.evaluations) as bar):
-        robot, result = tune_feedback(robot, args.model, gaits, args.evaluations, args.seed,
-                                     executor=executor, kp=args.kp, kd=args.kd, update=bar)
-    return _written(args, robot, result.better, _verdict(robot))
-
-
-def _written(args: argparse.Namespace, robot: Robot, better: bool, verdict: str) -> int:
-    """Write a robot with tuned feedback; return the exit code."""
+        robot, result = search(robot, args.model, evaluations=args.evaluations, seed=args.seed,
+                               executor=executor, update=bar)
+    better, verdict = result.better, _verdict(robot) if robot.biped is None else str(result)
     lines = ['better gains were found' if better else
              'nothing better was found: the gains stay', verdict]
     write_robot(args.out, robot, '\n'.join([f'Feedback made by: ros2 run cpg_ros '

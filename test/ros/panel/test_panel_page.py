@@ -329,10 +329,11 @@ def test_gaits_and_presets_of_other_names_are_groups_of_their_own(open_page):
              for group in ('#gaits', '#presets')]
     # Of those that the Go2 can be steered in.
     assert names == [['walk', 'trot'],
-                     ['liu2024_walk', 'liu2024_trot', 'goat_trot', 'goat_slope_walk']]
+                     ['run', 'liu2024_walk', 'liu2024_trot', 'goat_trot',
+                      'goat_slope_walk']]
     page.locator('#preset-group summary').click()
     assert page.locator('#presets button').all_inner_texts() == [
-        'walk (Liu 2024)', 'trot (Liu 2024)', 'goat trot', 'goat slope walk']
+        'run', 'walk (Liu 2024)', 'trot (Liu 2024)', 'goat trot', 'goat slope walk']
 
 
 def test_a_bar_shows_how_far_the_tuning_of_a_robot_is(browser):

@@ -203,8 +203,9 @@ def test_the_fit_finds_weights_again():
     np.testing.assert_allclose(psi[1], slope, atol=1e-6)
 
 
-@pytest.mark.parametrize('network', ['delayed', 'quadruped'])
-@pytest.mark.parametrize('gait', sorted(gait for gait in AIMS if gait in GO2.motions))
+@pytest.mark.parametrize(('gait', 'network'), sorted(
+    (gait, network) for gait in AIMS if gait in GO2.motions
+    for network in GO2.networks_with(gait)))
 def test_shipped_feet_go_where_a_foot_should(gait, network):
     """What is published, through MuJoCo's kinematics: lifted, and both sides alike."""
     feet, ways = _feet(), {}
