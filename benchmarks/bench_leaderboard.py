@@ -94,7 +94,7 @@ def measure(entrant: str, row: str, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def main() -> int:
-    usual = ['go2 trot', 'go2 walk', 'go1 trot', *entries()]
+    usual = ['go2 trot', 'go2 walk', 'go2 run', 'go1 trot', *entries()]
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--entrants', nargs='+', default=usual, choices=usual, metavar='NAME',
                         help=', '.join(usual))

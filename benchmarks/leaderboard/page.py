@@ -31,7 +31,8 @@ from rules import ROWS, WISHES  # noqa: E402
 
 #: Of the picture on a dark ground, NAME_dark.png.
 DARK = Path(__file__).resolve().parents[2] / 'docs' / 'static' / 'dark.matplotlibrc'
-COLORS = {'go2 trot': '#1f6fb4', 'go2 walk': '#5fa8e0', 'go1 trot': '#17a398'}
+COLORS = {'go2 trot': '#1f6fb4', 'go2 walk': '#5fa8e0', 'go2 run': '#0b3d66',
+          'go1 trot': '#17a398'}
 OTHERS = ('#c44e35', '#e0974a', '#8c6bb1', '#b0679b', '#9a8f45')
 Found = dict[str, dict[str, Any]]
 

@@ -35,7 +35,7 @@ import pytest
 LENGTH = leg_length(geometry_of(GO2))
 #: Powers of the length by Froude's scaling: 1 of lengths, 1/2 of times.
 POWERS = {'m': 1.0, 's': 0.5, 'm/s': 0.5, 's/m': -0.5, '1/s': -0.5, '1/m': -1.0, 's/rad': 0.5,
-          '1/rad': 0.0, 'rad/s': -0.5, 'm s/rad': 1.5, '': 0.0}
+          '1/rad': 0.0, 'rad/s': -0.5, 'm s/rad': 1.5, '1/s^2': -1.0, '': 0.0}
 
 
 def of_size(ratio):
