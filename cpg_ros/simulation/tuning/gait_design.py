@@ -55,21 +55,15 @@ RISE, TURN = 0.01, 0.1
 RISE_FRACTION, TURN_FRACTION = 0.05, 0.5
 
 
-def measure(batch: OpenLoopBatch, plan: GaitPlan, stiffness: float = 1.0,
+def measure(batch: OpenLoopBatch, plan: GaitPlan,
             update: Callable[[int], None] = lambda done: None) -> SteeringTable | None:
     """Measure a gait at several strides; None if its speed does not increase with them.
 
-    Rows are dropped at the ends where the robot falls or its speed does not increase.
-
-    Args:
-        batch: bodies.
-        plan: of the gait.
-        stiffness: factor of the servos' proportional gain at a stride of 1; shorter ones need
-            less, and those up to SOFT none.
-        update: takes the number of strides measured so far.
-
+    Rows are dropped at the ends where the robot falls or its speed does not increase. Strides
+    above SOFT are measured with servos as stiff as the gait's target has them. ``update`` takes
+    the number of strides measured so far.
     """
-    left = plan.robot.left
+    left, stiffness = plan.robot.left, AIMS[plan.name].stiffness
     tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
              *((1.0, pace) for pace in FASTER
                if pace <= (1.0 - ROOM) * plan.most_pace)]

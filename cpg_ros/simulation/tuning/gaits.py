@@ -330,14 +330,13 @@ def search(trial: DesignTrial, tuner: Tuner | None = None,
            update: Callable[[int], None] = lambda done: None) -> Tuned | NoDesign:
     """Search for the design of a gait, and measure its steering table."""
     tuner = tuner or Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
-    aim = AIMS[trial.gait]
     try:
         design = tuner.tune(trial.gait, trial.evaluations, trial.seed, update)
     except NoDesign as error:
         return error
-    if aim.hops:
+    if AIMS[trial.gait].hops:
         return design
-    steering = measure(tuner.batch, tuner.plan(trial.gait, design.motion), aim.stiffness,
+    steering = measure(tuner.batch, tuner.plan(trial.gait, design.motion),
                        lambda done: update(trial.evaluations + done))
     return replace(design, motion=replace(design.motion, steering=steering))
 
