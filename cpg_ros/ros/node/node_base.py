@@ -38,6 +38,7 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 import rclpy
 from rclpy.exceptions import (
+    InvalidHandle,
     InvalidParameterTypeException,
     InvalidParameterValueException,
     NameValidationException,
@@ -111,7 +112,7 @@ def leave_shared_memory() -> None:
 
 # ROS's life cycle beside a node that is no LifecycleNode: a step for each transition.
 
-class Lifecycle(LifecycleNodeMixin):
+class Lifecycle(LifecycleNodeMixin, Node):
     """States and services of https://design.ros2.org/articles/node_lifecycle.html.
 
     A parameter decides whether a node is managed, which rclpy would have to know earlier.
@@ -126,11 +127,10 @@ class Lifecycle(LifecycleNodeMixin):
                 it out, and returns why it cannot, or ''. The state then stays.
 
         """
+        # The mixin takes itself for the node, of which this has the fields.
+        vars(self).update(vars(node))
         self._logger, self._steps = node.get_logger(), steps
-        self.handle = node.handle
-        self.default_callback_group = node.default_callback_group
-        self._services = node._services
-        super().__init__()
+        LifecycleNodeMixin.__init__(self)
         service: Any = self._service_change_state
         self._change, service.callback = service.callback, self._answered_change
 
@@ -143,19 +143,20 @@ class Lifecycle(LifecycleNodeMixin):
                          ) -> ChangeState.Response:
         """Change the state; refuse a transition that the state does not have.
 
-        rclpy would raise an exception, and the client would wait for ever.
+        rclpy of Jazzy would raise an exception, and the client would wait for ever.
         """
-        try:
-            return self._change(request, response)
-        except rclpy_implementation.RCLError:
+        self._stepped = response.success = False
+        with contextlib.suppress(rclpy_implementation.RCLError):
+            response = self._change(request, response)
+        if not (self._stepped or response.success):
             transition, state = request.transition, self._state_machine.current_state[1]
             name = transition.label or f'transition {transition.id}'
             self._logger.warning(f"{name}: refused: the state '{state}' does not have it")
-            response.success = False
-            return response
+        return response
 
     def _step(self, name: str, state: LifecycleState) -> TransitionCallbackReturn:
         """Carry out a transition's step."""
+        self._stepped = True
         if reason := self._steps[name]():
             self._logger.warning(f'{name}: refused: {reason}')
             return TransitionCallbackReturn.FAILURE
@@ -291,7 +292,9 @@ class StartedNode(Node):
     def end(self) -> None:
         """End all threads, as ``finish`` does; do nothing if they have been ended."""
         self.stop.set()
-        self._turns.cancel()
+        # From Kilted on, rclpy.shutdown destroys the timer.
+        with contextlib.suppress(InvalidHandle):
+            self._turns.cancel()
         if self._begun and not self._over:
             self._over = True
             self.parameter_service.end()
