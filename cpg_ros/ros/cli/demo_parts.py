@@ -368,9 +368,14 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
 
 
 def _ranked(motions: dict[str, Motion]) -> tuple[tuple[str, ...], bool]:
-    """Return gaits, good ones first, then by speed, and whether the first can be steered."""
+    """Return gaits, good ones first, then by speed, and whether the first can be steered.
+
+    Those that need stiffer servos than the robot stands on come last.
+    """
     fastest = {gait: motion.steering.speed[-1] if motion.steering is not None else 0.0
                for gait, motion in motions.items()}
+    stiff = [gait for gait, motion in motions.items() if motion.steering is not None
+             and motion.steering.stiffness]
     gaits = sorted(fastest, key=lambda gait: (motions[gait].verdict.startswith('poor'),
-                                              -fastest[gait]))
+                                              gait in stiff, -fastest[gait]))
     return tuple(gaits), bool(gaits) and fastest[gaits[0]] > 0.0
