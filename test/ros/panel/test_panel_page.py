@@ -82,7 +82,8 @@ def take_over(page):
 
 def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
     page = open_page()
-    assert page.locator('#source').inner_text() == "shape: model 'go2'"
+    assert page.locator('#source').inner_text() == (
+        "shape: model 'go2'; drawn coarsely: this browser has no graphics card")
     assert page.locator('#gaits button').all_inner_texts()[:2] == ['walk1', 'trot2']
     assert page.locator('#gaits button.on').get_attribute('data-gait') == 'trot'
     assert page.evaluate('panel.scene.gl.getError()') == 0

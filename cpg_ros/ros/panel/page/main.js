@@ -139,7 +139,8 @@ const takes = {
   shape(message) {
     scene.show(message);
     plots.shaped(message);
-    at('source').textContent = [`shape: ${message.source}`, ...message.doubts.slice(0, 1)].join('; ');
+    at('source').textContent = [`shape: ${message.source}`, ...scene.software
+      ? ['drawn coarsely: this browser has no graphics card'] : [], ...message.doubts.slice(0, 1)].join('; ');
     at('source').title = message.doubts.join('\n');
     fresh = true;
   },
