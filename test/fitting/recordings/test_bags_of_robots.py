@@ -21,14 +21,14 @@ from cpg_ros.fitting.recordings.bag_reader import read_bag
 from cpg_ros.fitting.recordings.formats import read_recording
 from cpg_ros.fitting.recordings.recording import RecordingError
 from cpg_ros.fitting.recordings.rosbags_library import ZSTD
-from cpg_ros.ros.bridges.unitree.messages import JOINTS as MOTORS
-from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
+from cpg_ros.ros.bridges.unitree.messages import LowState, MODELS
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 LOW_STATE = 'unitree_go/msg/LowState'
+MOTORS = MODELS['go2'].joints
 
 
 def low_states(path, topics, count=50):
@@ -41,7 +41,7 @@ def low_states(path, topics, count=50):
         places = [writer.add_connection(topic, LOW_STATE, typestore=store) for topic in topics]
         for k, row in enumerate(angles):
             state.q[:], state.dq[:], state.torque[:] = row, 2.0 * row, 10.0
-            message = b'\0\1\0\0' + bytes(state._buffer[4:STATE_SIZE])
+            message = b'\0\1\0\0' + bytes(state._buffer[4:])
             for each, place in enumerate(places):
                 if k % (each + 1) == 0:
                     writer.write(place, START + STEP * k, message)

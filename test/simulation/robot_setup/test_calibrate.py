@@ -34,8 +34,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.motion.strides import StrideCommand
-from cpg_ros.ros.bridges.unitree.messages import JOINTS as MOTORS
-from cpg_ros.ros.bridges.unitree.messages import LowState, STATE_SIZE
+from cpg_ros.ros.bridges.unitree.messages import LowState, MODELS
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.robot_setup import calibrate
@@ -117,14 +116,14 @@ def test_a_bag_of_unitrees_own_state_gives_the_copy(tmp_path, messages):
                                                                     strict=True):
             joints, imu, feet = (STORE.deserialize_cdr(data, TYPES[topic]) for topic, data in (
                 ('/joint_states', joints), ('/imu', imu), ('/foot_contacts', feet)))
-            order = [names.index(name) for name in MOTORS]
+            order = [names.index(name) for name in MODELS['go2'].joints]
             state.q[:], state.dq[:] = joints.position[order], joints.velocity[order]
             turned, rates, felt = imu.orientation, imu.angular_velocity, imu.linear_acceleration
             state.quaternion[:] = turned.w, turned.x, turned.y, turned.z
             state.gyroscope[:] = rates.x, rates.y, rates.z
             state.accelerometer[:] = felt.x, felt.y, felt.z
             state.feet[:] = [feet.data[legs.index(leg)] for leg in codes.values()]
-            writer.write(place, stamp, b'\0\1\0\0' + bytes(state._buffer[4:STATE_SIZE]))
+            writer.write(place, stamp, b'\0\1\0\0' + bytes(state._buffer[4:]))
     robot = without_copies(tmp_path / 'robot.yaml')
     assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
     made = EfferenceCopy.of(read_robot(robot).motions['trot'].efference)
