@@ -135,7 +135,7 @@ NEWTON = 8
 NEGLIGIBLE = 1e-4 * TOLERANCE
 #: FIRST, SHORTEST, LONGEST: lengths of steps along the curve, each unknown relative to its scale.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
-#: Once the period has grown by this factor, steps grow with it.
+#: Once the period or the amplitude has grown by this factor, steps grow with it.
 GROWN = 3.0
 #: Least cosine of the angle between the tangents at neighbouring points.
 ALIGNED = 0.9
@@ -277,7 +277,7 @@ class SolutionCurve(Protocol):
         """
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Return half the range of the orbit or state; 0 at a bifurcation from rest."""
+        """Half the range of the orbit or state over the curve's size; 0 at a birth from rest."""
 
     def orbit(self, z: np.ndarray) -> Any:
         """Make an orbit of a solution."""
@@ -325,7 +325,7 @@ class CurvePoint(ShortRepr):
 
     @property
     def amplitude(self) -> float:
-        """Half the range of the continued orbit or state."""
+        """Half the range of the continued orbit or state over the curve's size."""
         return self.curve.amplitude(self.z)
 
     def reversed(self) -> 'CurvePoint':  # noqa: A003
@@ -499,7 +499,7 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
     count, point, step = 0, start, first_step
     while count < most:
         # Towards a homoclinic orbit only the period changes, ever faster.
-        longer = max(1.0, float(point.z[-2] / start.z[-2]) / GROWN)
+        longer = max(1.0, float(point.z[-2] / start.z[-2]) / GROWN, point.amplitude / GROWN)
         step = min(step, longest_step * longer, _longest_step(point))
         if step < SHORTEST:
             return folds, 'lost'

@@ -97,7 +97,8 @@ FIRST = 9
 
 def rightmost_first(values: np.ndarray) -> np.ndarray:
     """Sort roots by descending real part; of a pair, positive imaginary part first."""
-    return values[np.lexsort((-values.imag, -np.round(values.real, 12)))]
+    scale = np.abs(values[np.isfinite(values)]).max(initial=0.0) or 1.0
+    return values[np.lexsort((-values.imag, -np.round(values.real / scale, 12)))]
 
 
 def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count: int,

@@ -145,8 +145,9 @@ def _winds(slopes: np.ndarray) -> bool:
     return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
 
 
-#: REST: amplitude below which an orbit counts as its Hopf point.
-REST = 2e-3
+#: REST: amplitude, over the curve's sizes, below which an orbit counts as its Hopf point; POINTS:
+#: of a cycle over which these are taken.
+REST, POINTS = 1e-3, 256
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -244,8 +245,8 @@ class StepLimits(TypedDict, total=False):
     """Limits of a continuation.
 
     Attributes:
-        first_step: arclength of the first step. States count as they are, the period against
-            the first one's, the value against high - low.
+        first_step: arclength of the first step. States count against half the range of the first
+            orbit, the period against the first one's, the value against high - low.
         longest_step: arclength of any step.
         most: points in each direction.
         longest: period at which the branch ends, over the first one's; by default 20.
@@ -279,7 +280,8 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     along = ParameterLine.of(along, type(orbit.network))
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
-    curve, z = orbit_method(orbit.network).solve.through(orbit, along, scales)
+    curve, z = orbit_method(orbit.network).solve.through(orbit, along, scales, _sizes(
+        np.abs(orbit.levels[..., 1]).max(axis=0)))
     # At a fold the value cannot be held, but the period can.
     start = (arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -1))
              or arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -2)))
@@ -312,7 +314,7 @@ def continue_from_hopf(point: HopfPoint, along: ParameterLine, low: float, high:
         along: the line.
         low: least value.
         high: greatest value.
-        amplitude: of the first orbit.
+        amplitude: of the first orbit, over the point's natural one.
         **limits: as in continue_orbit.
 
     Raises:
@@ -323,11 +325,13 @@ def continue_from_hopf(point: HopfPoint, along: ParameterLine, low: float, high:
     """
     # Cell 1 peaks at phase 0.
     vector, period = point.eigenvector / point.eigenvector[0], float(2.0 * np.pi / point.omega)
+    vector = point.natural_amplitude * vector
+    sizes = _sizes(np.abs(vector).reshape(-1, point.network.cells).max(axis=1))
     branch = continue_from_disturbance(
         point.network, point.block.symmetry, along, low, high,
         lambda theta: np.tile(point.state, (theta.size, 1)),
         lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
-        amplitude=amplitude, **limits)
+        amplitude=amplitude, sizes=sizes, **limits)
     begin = BranchEnd('rest', along.value(point.network), period)
     return replace(branch, ends=(begin, branch.ends[1]))
 
@@ -335,7 +339,8 @@ def continue_from_hopf(point: HopfPoint, along: ParameterLine, low: float, high:
 def continue_from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine,
                               low: float, high: float, path: Callable[[np.ndarray], np.ndarray],
                               disturbance: Callable[[np.ndarray], np.ndarray], period: float, *,
-                              amplitude: float = 0.02, **limits: Unpack[StepLimits]) -> Branch:
+                              amplitude: float = 0.02, sizes: np.ndarray | None = None,
+                              **limits: Unpack[StepLimits]) -> Branch:
     """Follow the orbits that branch off a state or another orbit, on whichever side they are.
 
     Args:
@@ -348,6 +353,8 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
         disturbance: critical disturbance of it, the same.
         period: at the bifurcation, model time.
         amplitude: factor of the disturbance in the first orbit.
+        sizes: of the variables, against which states count; by default half the old solution's
+            ranges.
         **limits: as in continue_orbit.
 
     Raises:
@@ -358,14 +365,23 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     """
     _check(network, symmetry, along, low, high)
     value = along.value(network)
+    if sizes is None:
+        ranges = np.ptp(path(np.linspace(0.0, 1.0, POINTS, endpoint=False)), axis=0)
+        sizes = _sizes(0.5 * ranges.reshape(-1, network.cells).max(axis=1))
     curve, still, border = orbit_method(network).solve.curve_beside(
-        network, symmetry, along, (period, high - low), path, disturbance, period)
+        network, symmetry, along, (period, high - low), sizes, path, disturbance, period)
     start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, folds, end = _run(start, low, high, period, limits)
     return Branch(along, (_point(start), *points), tuple(1 + k for k in folds),
                   (BranchEnd('start', value, period), end))
+
+
+def _sizes(ranges: np.ndarray) -> np.ndarray:
+    """Return the sizes of variables, the largest one for those that do not move."""
+    largest = ranges.max() or 1.0
+    return np.where(ranges > ROUNDING * largest, ranges, largest)
 
 
 def _point(located: CurvePoint) -> BranchPoint:
@@ -479,7 +495,7 @@ def bifurcations(branch: Branch, spectra: Sequence[Multipliers] | None = None,
         # Both of a pair cross, and symmetry may make multipliers of several subspaces equal.
         if crossing is not None and not any(
                 crossing.kind == other.kind
-                and np.isclose(crossing.value, other.value, 1e-7, max(1e-9, exact * width))
+                and np.isclose(crossing.value, other.value, 1e-7, exact * width)
                 and np.isclose(crossing.point.orbit.period, other.point.orbit.period,
                                max(1e-5, exact))
                 for other in crossings):

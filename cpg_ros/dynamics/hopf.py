@@ -109,7 +109,7 @@ class NormalForm:
         return self.k1.imag * mu + self.k2.imag * self.radius(mu)**2
 
 
-#: Distance from the imaginary axis below which a root lies on it, 1/model time or over omega.
+#: Distance from the imaginary axis, over omega, below which a root lies on it.
 ON_AXIS = 1e-8
 
 
@@ -229,6 +229,18 @@ class HopfPoint(ShortRepr):
         return NormalForm(1j * self.omega + delay * form.k1, scale * form.k2, scale * form.size)
 
     @property
+    def natural_amplitude(self) -> float:
+        """Size of cell 1's first variable at which the cubic term is as fast as omega.
+
+        It is half the amplitude there, or the size of the equilibrium, or 1, where the normal form
+        is degenerate.
+        """
+        form = self.normal_form
+        if form.degenerate:
+            return float(np.abs(self.rest).max()) or 1.0
+        return abs(self.vector[0]) * math.sqrt(self.omega / abs(form.k2))
+
+    @property
     def slopes(self) -> dict[str, float]:
         """Derivatives of the value at the Hopf point by the other parameters, by name."""
         back = -self._speed(self.line).real
@@ -262,7 +274,7 @@ class HopfPoint(ShortRepr):
     @cached_property
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
         """All blocks with their other roots on the axis and to the right of it."""
-        close = ON_AXIS * max(1.0, self.omega)
+        close = ON_AXIS * self.omega
         return tuple((block, self.but_critical(block, block.right_of(-close)))
                      for block in blocks(self.network, self.rest))
 
@@ -274,7 +286,7 @@ class HopfPoint(ShortRepr):
             for block in blocks(self.network, self.rest)]))[0])
 
     def _right(self, within: bool) -> int:
-        close = ON_AXIS * max(1.0, self.omega)
+        close = ON_AXIS * self.omega
         return int(sum((roots.real > close).sum() for other, roots in self._others
                        if within or not other.within(self.block)))
 
@@ -291,7 +303,7 @@ class HopfPoint(ShortRepr):
     @property
     def simple(self) -> bool:
         """Whether no other root lies on the imaginary axis."""
-        return all((roots.real > ON_AXIS * max(1.0, self.omega)).all()
+        return all((roots.real > ON_AXIS * self.omega).all()
                    for _, roots in self._others)
 
     @property
@@ -438,7 +450,7 @@ def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega:
     rest = equilibrium(network)
     block = block_at(network, rest, mode)
     # The real part is zero up to rounding.
-    roots = block.right_of(-1e-3)
+    roots = block.right_of(-1e-3 * omega)
     root = roots[np.abs(roots - 1j * omega).argmin()]
     return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
 
@@ -488,13 +500,14 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                 # Two roots of a block may cross together; each then appears twice.
                 for root in roots(value, which, count):
                     omega = float(root.imag)
-                    if (abs(root.real) <= ON_AXIS < omega
+                    if (omega > 0.0 and abs(root.real) <= ON_AXIS * omega
                             and not any(np.allclose((value, omega), pair) for pair in pairs)):
                         pairs.append((value, omega))
                         points.append(hopf_at(line.at(network, value), line,
                                               split(value)[which].mode, omega))
     # Equal values, by symmetry, differ by rounding.
-    return sorted(points, key=lambda point: (round(point.value, 9), point.omega, point.mode))
+    return sorted(points, key=lambda point: (round((point.value - low) / (high - low), 9),
+                                             point.omega, point.mode))
 
 
 def tracked_roots(along: list[Block], spare: int = SPARE) -> int:

@@ -87,7 +87,8 @@ class Expansion:
         self._higher: dict[int, Mapping[Any, float]] = {}
 
     @cached_property
-    def _slopes(self) -> Mapping[tuple[int, int], float]:
+    def slopes(self) -> Mapping[tuple[int, int], float]:
+        """Return (variable, argument) -> derivative of the rate."""
         return self._equations.slopes(self._x, self._p)[1]
 
     def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +98,7 @@ class Expansion:
             chi: the class's character for every cell, 1 for the first, shape (cells,).
 
         """
-        return self._split(chi, self._slopes)
+        return self._split(chi, self.slopes)
 
     def _split(self, chi: np.ndarray, slopes: Mapping[tuple[int, int], float]
                ) -> tuple[np.ndarray, np.ndarray]:
@@ -126,14 +127,15 @@ class Expansion:
 
     def multilinear(self, *sets: np.ndarray) -> np.ndarray:
         """Derivative of the rates, B(a, b) or C(a, b, c), at sets of arguments, (variables,)."""
-        return self._summed(self._derivatives(len(sets)), sets)
+        return self._summed(self.derivatives(len(sets)), sets)
 
     def bound(self, *sets: np.ndarray) -> np.ndarray:
         """Return the sum of the moduli of the terms of ``multilinear``, shape (variables,)."""
-        sizes = {key: abs(value) for key, value in self._derivatives(len(sets)).items()}
+        sizes = {key: abs(value) for key, value in self.derivatives(len(sets)).items()}
         return self._summed(sizes, [np.abs(vectors) for vectors in sets]).real
 
-    def _derivatives(self, order: int) -> Mapping[Any, float]:
+    def derivatives(self, order: int) -> Mapping[Any, float]:
+        """Return (variable, arguments) -> derivative of order 2 or 3; arguments ascend."""
         if order not in self._higher:
             self._higher[order] = self._equations.higher(order, self._x, self._p)
         return self._higher[order]
@@ -276,6 +278,14 @@ def power(symmetry: Symmetry, n: int) -> Symmetry:
     """Return the n-th power of a character; -1 for the conjugate."""
     return Symmetry.of(symmetry.group, {name: n * shift % 1 for name, shift in symmetry.shifts},
                        symmetry.variables, symmetry.odd)
+
+
+def waves_of(network: Network, gait: str) -> list[Symmetry]:
+    """Return a gait's symmetry, and that of the wave in the other direction if it has no name."""
+    symmetry = network.symmetry(gait)
+    other = power(symmetry, -1)
+    named = [network.symmetry(name) for name in network.gaits()]
+    return [symmetry] if other in named else [symmetry, other]
 
 
 def block_of(expansion: Expansion, symmetry: Symmetry) -> Block:

@@ -22,6 +22,7 @@ import math
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.isotypic import power
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network, other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
@@ -125,8 +126,8 @@ class Orbit(ShortRepr, ABC):
         """Name of the gait that the parameters state, or else that has this symmetry."""
         network = self.network
         return stated_gait(network) or next(
-            (gait for gait in network.gaits() if network.symmetry(gait) == self.symmetry),
-            'unnamed orbit')
+            (gait for reverse in (1, -1) for gait in network.gaits()
+             if network.symmetry(gait) == power(self.symmetry, reverse)), 'unnamed orbit')
 
     @property
     def phases(self) -> np.ndarray:

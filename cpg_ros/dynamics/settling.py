@@ -16,10 +16,13 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+import math
 
 from cpg_ros.common.errors import ShortRepr
-from cpg_ros.dynamics.equilibrium import equilibrium
+from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.integration.simulate import History, LANES, simulate, Trajectory
+from cpg_ros.dynamics.isotypic import Expansion, waves_of
 from cpg_ros.dynamics.orbit import Path, signal_symmetry
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
@@ -153,12 +156,17 @@ SETTLING, HOLD = 30, 1.0
 #: variable at the equilibrium if that is above 1.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
 #: LOOKED: numbers of steps after which starts are checked; LONGER: further ones, on request;
-#: COARSER: factor of the step without a delay.
+#: COARSER: factor of the step without a delay; DELAYS: fewest delays before the first look;
+#: SLOWER: largest factor of the step that this needs.
 LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
-#: RESTING: rates below which a network rests, 1/model time; REPEATING: relative difference up to
-#: which cycles repeat.
+DELAYS, SLOWER = 8.0, 4.0
+#: RESTING: rates below which a network rests, over those at first; REPEATING: relative difference
+#: up to which cycles repeat.
 RESTING, REPEATING = 1e-9, 1e-3
-#: Range of the first variable below which a locked network does not oscillate.
+#: Ratio of a network's natural unit to 1 from which starts take it.
+FAR = 30.0
+#: Range of the first variable, over that of the whole run, below which a locked network does not
+#: oscillate.
 SMALLEST = 1e-3
 #: KEPT: largest relative error of the gait's shifts; ADDED: error up to which a further symmetry
 #: is there.
@@ -194,17 +202,23 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
     if early:
         # Most states that reach no gait come to rest soon.
         run = simulate(network, start, early * period, step, lock=lock, progress=False)
-        if _ends(run, run.t.size // 2):
+        if _ends(run, run.t.size // 2, np.abs(run.slopes).max()):
             return None
         history = run.x[-1]
     rest = SETTLING + 3 - early
     run = simulate(network, history, rest * period, step, lock=lock, progress=False)
-    return last_cycle(run, network.cells, int((rest - 3) * period / step), SMALLEST)
+    return last_cycle(run, network.cells, int((rest - 3) * period / step), _smallest(run, network))
 
 
-def _ends(run: Trajectory, first: int) -> bool:
-    """Return whether the network rests after a step, or has diverged."""
-    return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
+def _smallest(run: Trajectory, network: Network) -> float:
+    """Return the range of the first variable below which a run does not oscillate."""
+    return float(SMALLEST * np.ptp(run.x[:, :network.cells]))
+
+
+def _ends(run: Trajectory, first: int, rates: float) -> bool:
+    """Return whether the network rests after a step, compared with some rates, or has diverged."""
+    return bool(not np.isfinite(run.x[-1]).all()
+                or np.abs(run.slopes[first:]).max() <= RESTING * rates)
 
 
 def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
@@ -216,14 +230,31 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
     # Random states within the class, with the same standard deviation.
     inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
     inside *= np.sqrt(network.components / len(symmetry.basis))
-    rest = np.repeat(equilibrium(network), network.cells)
+    rest = equilibrium(network)
+    states = everywhere(network, rest)
     # A variable in mV swings by more than 1.
-    return rest + np.maximum(1.0, np.abs(rest)) * np.concatenate([waves, inside])
+    unit = natural_unit(network, rest) or np.maximum(1.0, np.abs(states))
+    return states + unit * np.concatenate([waves, inside])
+
+
+def natural_unit(network: Network, rest: np.ndarray) -> float | None:
+    """Return the size of a variable at which rates bend, where it is far from 1; else None.
+
+    At this size terms of second or third order about an equilibrium equal linear ones.
+    """
+    expansion = Expansion(network, rest)
+    slopes = expansion.slopes
+    sizes = [abs(slopes[v, last] / value)**(1.0 / (order - 1)) for order in (2, 3)
+             for (v, *_, last), value in expansion.derivatives(order).items()
+             if value and slopes.get((v, last))]
+    unit = min(sizes, default=1.0)
+    return None if 1.0 / FAR < unit < FAR else unit
 
 
 def find_orbit(network: Network, gait: str, random: int = RANDOM,
-               longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
-    """Yield the cycles with a gait's symmetry on which the network settles in the gait's class.
+               longer: Callable[[], bool] = lambda: True
+               ) -> Iterator[tuple[Symmetry, Path, float]]:
+    """Yield the cycles of a gait on which the network settles in the gait's class.
 
     Args:
         network: parameters.
@@ -232,30 +263,47 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
         longer: continue runs that have not settled, as slow relaxation oscillations need.
 
     Yields:
-        States over cycles, and the period in model time.
+        The gait's symmetry or that of its wave in the other direction, states over cycles, and
+            the period in model time.
+
+    Raises:
+        NoEquilibrium: the starts would lie about it.
+        NoOrbit: simulations from all of the first starts run away.
 
     """
-    symmetry = network.symmetry(gait)
+    directions = waves_of(network, gait)
+    symmetry = directions[0]
     step = network.step * (1.0 if network.delay_parameter else COARSER)
+    # Within the first steps there are a few periods, which a delay may make long.
+    slow = max(1.0, DELAYS * network.delay / (LOOKED[0] * step))
+    step *= min(slow, SLOWER)
+    longest = math.ceil(slow / SLOWER)
     for group in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
         histories: list[History] = list(group)
-        before = 0
-        for steps in LOOKED + LONGER:
-            if not histories or (before == LOOKED[-1] and not longer()):
+        before, rates = 0, 0.0
+        for steps in (longest * count for count in LOOKED + LONGER):
+            last = longest * LOOKED[-1]
+            if not histories or (before == last and not longer()):
                 break
             batch = simulate(network, histories, (steps - before) * step, step,
                              lock=(HOLD, symmetry), progress=False)
+            if not (before or np.isfinite(batch.x[:, -1]).any()):
+                raise NoOrbit(f'no {gait} was found: simulations with steps of {step:g} model '
+                              'time run away from all starts; a stiff network needs a shorter '
+                              "'step'")
+            rates = rates or float(np.nanmax(np.abs(batch.slopes[:, 0])))
             histories = []
             for x, slopes in zip(batch.x, batch.slopes, strict=True):
                 run = Trajectory(batch.t, x, slopes)
                 first = steps * 3 // 4 - before
-                cycle = last_cycle(run, network.cells, first, SMALLEST)
-                settled = _ends(run, first) or (cycle is not None and cycle.drift <= REPEATING)
+                cycle = last_cycle(run, network.cells, first, _smallest(run, network))
+                settled = _ends(run, first, rates) or (cycle is not None
+                                                       and cycle.drift <= REPEATING)
                 if not settled:
                     histories.append(_Past(run))
-                if ((settled or steps >= LOOKED[-1]) and cycle is not None
-                        and _fits(cycle, symmetry)):
-                    yield cycle, cycle.period
+                if (settled or steps >= last) and cycle is not None:
+                    yield from ((each, cycle, cycle.period) for each in directions
+                                if _fits(cycle, each))
             before = steps
 
 

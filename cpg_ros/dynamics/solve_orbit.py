@@ -46,11 +46,12 @@ import numpy as np
 #: Largest delay at which Hopf points are searched, over the network's delay.
 FURTHEST = 4.0
 #: POINTS: most points of a branch; MOST_PERIODS: most whole periods that are added to a delay.
-POINTS, MOST_PERIODS = 80, 12
+POINTS, MOST_PERIODS = 120, 12
 
 
-def branch_orbits(network: Network, gait: str) -> Iterator[list[Orbit]]:
-    """Yield for each Hopf point of the gait's class the orbits on its branch at the parameters.
+def branch_orbits(network: Network, gait: str
+                  ) -> Iterator[tuple[Branch | None, Iterator[Orbit]]]:
+    """Yield each Hopf point's branch in the gait's class, and its orbits at the parameters.
 
     The branches run along the delay or, without a delay, along the network's own line. There are
     none if the network has no equilibrium or its weights break the symmetry.
@@ -72,7 +73,8 @@ def branch_orbits(network: Network, gait: str) -> Iterator[list[Orbit]]:
     for point in points:
         if set(point.block.symmetry.shifts) == shifts:
             again = point.n > 0 and _repeats(network)
-            yield [] if again else list(_on_branch(network, point, low, high))
+            branch = None if again else _branch(network, point, low, high)
+            yield branch, iter(()) if branch is None else _on_branch(network, branch)
 
 
 def _line(network: Network) -> tuple[ParameterLine, float, float]:
@@ -92,19 +94,23 @@ def _repeats(network: Network) -> bool:
             and network.delay_parameter not in equations_of(type(network)).rows)
 
 
-def _on_branch(network: Network, point: HopfPoint, low: float, high: float) -> Iterator[Orbit]:
-    """Yield the orbits at the network's parameters on the branch of a Hopf point."""
+def _branch(network: Network, point: HopfPoint, low: float, high: float) -> Branch | None:
+    """Follow the branch of a Hopf point; None where it does not reach the network's parameters."""
     line, value = point.line, point.line.value(network)
     if network.delay_parameter:
         if point.value > value and point.normal_form.side > 0:
-            return
+            return None
         low, high = 0.5 * min(point.value, value), max(value, 1.1 * point.value)
     try:
-        branch = continue_from_hopf(point, line, low, high, most=POINTS)
+        return continue_from_hopf(point, line, low, high, most=POINTS)
     except NoOrbit:
-        return
+        return None
+
+
+def _on_branch(network: Network, branch: Branch) -> Iterator[Orbit]:
+    """Yield the orbits at the network's parameters on a branch."""
     for periods in range(MOST_PERIODS + 1 if _repeats(network) else 1):
-        yield from _crossings(network, branch, value, periods)
+        yield from _crossings(network, branch, branch.along.value(network), periods)
 
 
 def _crossings(network: Network, branch: Branch, value: float, periods: int) -> Iterator[Orbit]:
@@ -188,7 +194,7 @@ def solve_preset(preset: Preset) -> Orbit:
 def _from_hopf_point(network: Network, gait: str, error: NoOrbit) -> Orbit:
     """Return the first orbit on the branches of the equilibrium's Hopf points, or raise."""
     if not network.delay_parameter:
-        for orbits in branch_orbits(network, gait):
+        for _, orbits in branch_orbits(network, gait):
             for orbit in orbits:
                 if not extra_symmetry(orbit):
                     return orbit
@@ -214,6 +220,9 @@ def solve_from_path(network: Network, symmetry: Symmetry,
     return orbit
 
 
+#: Work on a gait's branches after which no further one is followed: sum over their points of the
+#: cube of their numbers, about a minute of CPU time.
+WORK = 2e11
 #: MORE_RANDOM: number of random states from which a thorough search simulates.
 MORE_RANDOM = 37
 #: Relative differences up to which two orbits are the same, up to phase and the network's
@@ -242,6 +251,7 @@ class CoexistingOrbits(ShortRepr):
         starts: number of simulated states in the gait's class.
         hopf_points: number of Hopf points of the class whose branches were followed.
         deflated: whether Newton's method was deflated about the orbits.
+        unfollowed: whether there are more Hopf points than the bound on work allows to follow.
 
     """
 
@@ -250,14 +260,17 @@ class CoexistingOrbits(ShortRepr):
     starts: int = 0
     hopf_points: int = 0
     deflated: bool = False
+    unfollowed: bool = False
 
     @property
     def searched(self) -> str:
         """Extent of the search, such as 'searched from 15 starts and 2 Hopf points', or ''."""
         counts = [f'{count} {what}{"" if count == 1 else "s"}' for count, what in (
             (self.starts, 'start'), (self.hopf_points, 'Hopf point')) if count]
-        deflated = ', and by deflation' if self.deflated and self.orbits else ''
-        return f'searched from {" and ".join(counts)}{deflated}' if counts else ''
+        more = ', and by deflation' if self.deflated and self.orbits else ''
+        if self.unfollowed:
+            more += '; further branches were left out, as these took long'
+        return f'searched from {" and ".join(counts)}{more}' if counts else ''
 
     def _summary(self) -> str:
         periods = ', '.join(f'{orbit.period:.7g}' for orbit in self.orbits)
@@ -307,11 +320,11 @@ class _Search:
     """The orbits of a gait that have been found, and the extent of the search."""
 
     def __init__(self, network: Network, gait: str) -> None:
-        self.network, self.gait, self.symmetry = network, gait, network.symmetry(gait)
+        self.network, self.gait = network, gait
         self.orbits: list[Orbit] = []
         self._within: list[Multipliers] = []
         self.starts = self.hopf_points = 0
-        self.deflated = False
+        self.deflated = self.unfollowed = False
 
     def reach(self, near: Orbit | None) -> str:
         """Solve for one orbit; return why there is none, or ''."""
@@ -335,7 +348,7 @@ class _Search:
             not self._within[k].attracts,
             0.0 if nearest is None else abs(np.log(self.orbits[k].period / nearest.period))))
         return CoexistingOrbits(self.gait, tuple(self.orbits[k] for k in order), self.starts,
-                                self.hopf_points, self.deflated)
+                                self.hopf_points, self.deflated, self.unfollowed)
 
     def add(self, orbit: Orbit | None) -> bool:
         """Add an orbit that is new and has no more symmetry; return whether it was added."""
@@ -352,23 +365,29 @@ class _Search:
         Slow runs continue while no orbit attracts, or with longer.
         """
         try:
-            for path, period in find_orbit(self.network, self.gait, random,
-                                           lambda: longer or not self.attracting):
+            for symmetry, path, period in find_orbit(self.network, self.gait, random,
+                                                     lambda: longer or not self.attracting):
                 if len(self.orbits) < MOST and not any(
                         _near(path, period, orbit) for orbit in self.orbits):
-                    self.add(solve_from_path(self.network, self.symmetry, path, period))
-        except NoEquilibrium:
-            # The starts lie about the equilibrium.
+                    self.add(solve_from_path(self.network, symmetry, path, period))
+        except (NoEquilibrium, NoOrbit):
+            # The starts lie about the equilibrium, or all run away.
             return
         self.starts = len(SIZES) + random
 
     def follow_branches(self) -> None:
         """Follow the branches of the class's Hopf points to the parameters."""
-        for orbits in branch_orbits(self.network, self.gait):
+        work = 0.0
+        for branch, orbits in branch_orbits(self.network, self.gait):
             self.hopf_points += 1
             for orbit in orbits:
                 if len(self.orbits) < MOST:
                     self.add(orbit)
+            if branch is not None:
+                work += sum(point.curve_point.z.size**3.0 for point in branch.points)
+            if self.network.delay_parameter and work > WORK:
+                self.unfollowed = True
+                break
 
     def deflate(self) -> None:
         """Deflate Newton's method about all orbits until it finds no more."""
@@ -377,7 +396,7 @@ class _Search:
         while todo:
             orbit = todo.pop(0)
             for path, period in _scaled(orbit):
-                solution = solve_from_path(self.network, self.symmetry, path, period,
+                solution = solve_from_path(self.network, orbit.symmetry, path, period,
                                            [other.period for other in self.orbits])
                 if len(self.orbits) < MOST and self.add(solution):
                     todo.append(self.orbits[-1])
@@ -400,7 +419,8 @@ def _levels(orbit: Orbit) -> np.ndarray:
 
 
 def _same(orbit: Orbit, other: Orbit) -> bool:
-    if abs(orbit.period / other.period - 1.0) > SAME_PERIOD:
+    if (orbit.symmetry != other.symmetry
+            or abs(orbit.period / other.period - 1.0) > SAME_PERIOD):
         return False
     a, b = _levels(orbit), _levels(other)
     return bool(np.abs(a - b).max() < SAME_LEVEL * np.abs(a).max())

@@ -24,10 +24,12 @@ from cpg_ros.dynamics.settling import last_cycle
 from cpg_ros.dynamics.solve_orbit import coexisting_orbits
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.delayed import Delayed
+from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.registry import find_network, PRESETS
 from depth import in_depth
 import numpy as np
 import pytest
+from van_der_pol import van_der_pol
 
 #: A set that optimize certified: the hop of period 13.9143 attracts, that of 13.38 does not.
 CERTIFIED = Biped(current=0.2787, phi=0.2601, w_21=0.2612, w_12=-0.8434, w_43=0.2612,
@@ -72,7 +74,7 @@ def test_the_orbit_that_attracts_comes_first():
     assert quick.orbits[0].period == pytest.approx(first.period, rel=1e-7)
 
 
-@pytest.mark.parametrize('delay', [4.0, *in_depth(5.0)])
+@pytest.mark.parametrize('delay', [4.0, 8.0, *in_depth(5.0, 20.0)])
 def test_long_delays(delay):
     network = Delayed(-4.5, 1.0, 6.5, -2.0, delay)
     found = coexisting_orbits(network, 'trot')
@@ -167,3 +169,18 @@ def test_a_cycle_of_three_spikes_is_found_where_variables_are_in_millivolts(tmp_
     assert found.orbits[0].period == pytest.approx(spikes[3] - spikes[0], abs=0.05)
     assert spikes[6] - spikes[3] == pytest.approx(spikes[3] - spikes[0], abs=0.05)
     assert multipliers_within(found.orbits[0]).leading < 1.0
+
+
+@pytest.mark.parametrize(('values', 'gait', 'period'), [
+    # Slow relaxation orbits on which 5 of 6 random starts settle.
+    ((-0.28129668681149644, -0.30217867035994656, 0.24333118851100943, 0.32137435218052846,
+      -0.060000727346913245, -0.029765008121790552), 'jump', 26.79595)])
+def test_slow_relaxation_orbits_of_the_quadruped_are_found(values, gait, period):
+    orbits = coexisting_orbits(Quadruped(*values), gait, everything=False).orbits
+    assert orbits[0].period == pytest.approx(period, abs=1e-4)
+    assert multipliers(orbits[0]).attracts
+
+
+def test_what_is_too_stiff_for_the_step_is_not_called_none():
+    with pytest.raises(NoOrbit, match=r'steps of 0.02 model time run away .* shorter .step.'):
+        coexisting_orbits(van_der_pol(1.0, 1.0)(200.0, -0.1), 'walk', everything=False)

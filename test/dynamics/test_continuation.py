@@ -95,7 +95,7 @@ def check_in_order(branch):
     signs = np.sign(np.diff(branch.values))
     turning = 1 + np.flatnonzero(signs[1:] * signs[:-1] < 0.0)
     assert list(turning) == list(branch.fold_indices)
-    assert np.abs(np.diff(branch.amplitudes)).max() < 0.5
+    assert np.abs(np.diff(branch.amplitudes)).max() < 0.5 * max(1.0, branch.amplitudes.max())
     for point in branch.points:
         orbit = point.orbit
         assert branch.along.value(orbit.network) == point.value

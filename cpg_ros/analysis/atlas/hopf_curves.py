@@ -498,7 +498,7 @@ def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
 def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     """Return where other roots of any class cross: pairs, or a real one."""
     crossings: list[CodimensionTwo] = []
-    small = ON_AXIS * max(1.0, float(curve.fractions[:, 2].max()))
+    small = ON_AXIS * float(curve.fractions[:, 2].max())
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
         count = tracked_roots([split[which] for _, split in points], SPARE + 2)

@@ -14,4 +14,4 @@
 
 """Periodic orbits as trigonometric polynomials, for networks with a delay."""
 
-__all__ = ['floquet', 'orbit', 'solve']
+__all__ = ['floquet', 'orbit', 'pieces', 'solve']

@@ -29,7 +29,7 @@ from typing import NamedTuple
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.characteristic import chebyshev
 from cpg_ros.dynamics.fourier import orbit as collocation
-from cpg_ros.dynamics.fourier.orbit import equations, FourierOrbit, MOST_NODES
+from cpg_ros.dynamics.fourier.orbit import equations, FourierOrbit, MOST_NODES, rows_of
 from cpg_ros.dynamics.isotypic import split
 from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
 from cpg_ros.networks.equations import Field, States
@@ -48,7 +48,7 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
 
     """
     symmetry = orbit.symmetry
-    u = orbit.values.reshape(-1, orbit.samples)
+    u = rows_of(orbit.network, symmetry, orbit.cycle(orbit.samples))
     alike = np.repeat(np.bincount(symmetry.waves), orbit.network.variables)[:, None]
     while True:
         rows, n = u.shape
@@ -63,8 +63,8 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
         values = -n * by_residual / (alike * orbit.period**2)
         if max(collocation.tail(row) for row in values) <= RESOLVED:
             break
-        if n >= MOST_NODES:
-            raise NoOrbit(f'the phase response is too steep for {MOST_NODES} nodes')
+        if n >= 2 * MOST_NODES:
+            raise NoOrbit(f'the phase response is too steep for {n} nodes')
         u = np.array([collocation.resample(row, 2 * n + 1) for row in u])
     variables = orbit.network.variables
 
@@ -326,7 +326,7 @@ class Variational:
         """
         network = orbit.network
         n = (orbit.samples + 1) * 2**halvings - 1
-        if n > MOST_NODES or n * network.components > MOST:
+        if n > 2 * MOST_NODES + 1 or n * network.components > MOST:
             raise NoOrbit('the waveform is too steep')
         self._orbit, self._n, self.delay = orbit, n, network.delay
         self._times = np.arange(n) / n * orbit.period

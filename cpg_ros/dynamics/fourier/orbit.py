@@ -23,8 +23,8 @@ solved at even nodes with the period as unknown. Cell 1 peaks at phase zero.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any, ClassVar, NamedTuple, TypeAlias
 
-from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.orbit import deflation_factor, Orbit
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
@@ -91,23 +91,90 @@ def resample(values: np.ndarray, n: int) -> np.ndarray:
     return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FourierOrbit(Orbit):
-    """An orbit by its waveforms on evenly spaced nodes.
+#: Functions on a cycle by n numbers each, and n collocation points: Nodes or pieces.Pieces.
+Basis: TypeAlias = Any
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Trigonometric polynomials by their values at n even nodes, which are the points.
 
     Attributes:
-        values: waveforms at the nodes theta = m / n, shape (waves, variables, n); cell 1's first
-            variable peaks at the first node.
+        n: number of the nodes.
+
+    """
+
+    n: int
+    #: Residual, over the slopes, at which Newton's method ends.
+    tolerance: ClassVar[float] = 1e-12
+
+    @property
+    def derive(self) -> np.ndarray:
+        """Matrix from the numbers to derivatives by theta at the points, shape (n, n)."""
+        return derivative_matrix(self.n)
+
+    def moved(self, shift: float) -> np.ndarray | None:
+        """Return the matrix to values at the points plus a shift; None for the identity."""
+        return None if shift == 0.0 else shift_matrix(self.n, shift)
+
+    def slope(self, values: np.ndarray, shift: float) -> np.ndarray:
+        """Return derivatives by theta at the points plus a shift, shape (n,)."""
+        return shift_matrix(self.n, shift) @ (self.derive @ values)
+
+    def jacobian(self, blocks: dict[tuple[int, int], np.ndarray], by_period: np.ndarray
+                 ) -> np.ndarray:
+        """Join blocks by row and source, the period's column, and the phase condition.
+
+        Cell 1 peaks at the first node.
+        """
+        rows, n = by_period.shape
+        jacobian = np.zeros((rows * n + 1, rows * n + 1))
+        whole = jacobian[:-1, :-1].reshape(rows, n, rows, n)
+        for (row, source), block in blocks.items():
+            whole[row, :, source] = block
+        jacobian[:-1, -1] = by_period.ravel()
+        jacobian[-1, :n] = self.derive[0]
+        return jacobian
+
+    def phase(self, values: np.ndarray) -> float:
+        """Return the residual of the phase condition of cell 1's first variable."""
+        return float(self.derive[0] @ values)
+
+    def solve(self, jacobian: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Solve a linear system.
+
+        Raises:
+            LinAlgError: it is singular.
+
+        """
+        # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes while it
+        # solves.
+        return np.linalg.solve(jacobian, right)
+
+    def evaluate(self, values: np.ndarray, theta: np.ndarray, order: int) -> np.ndarray:
+        """Return values, or derivatives by theta of an order, at theta in cycles."""
+        return evaluate(values, theta, order)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FourierOrbit(Orbit):
+    """An orbit by its waveforms on evenly spaced nodes, or on a mesh where it is too steep.
+
+    Attributes:
+        values: waveforms at the nodes theta = m / n, or those of a mesh, shape (waves, variables,
+            n); cell 1's first variable peaks at the first node.
         derivatives: by the parameters, of the nodal values at fixed theta, then of the period,
             shape (waves variables n + 1, parameters).
+        basis: of the waveforms.
 
     """
 
     values: np.ndarray
     derivatives: np.ndarray
+    basis: Basis
 
     def _summary(self) -> str:
-        return f'{super()._summary()}, {self.samples} nodes'
+        return f'{super()._summary()}, {self.values.shape[-1]} nodes'
 
     @property
     def d_period(self) -> np.ndarray:
@@ -134,8 +201,8 @@ class FourierOrbit(Orbit):
 
     @property
     def samples(self) -> int:
-        """Number of evenly spaced points that resolve a waveform: the nodes."""
-        return int(self.values.shape[-1])
+        """Number of evenly spaced points that resolve a waveform: the nodes, if they are even."""
+        return int(self.values.shape[-1]) if isinstance(self.basis, Nodes) else MOST_NODES
 
     @property
     def between(self) -> np.ndarray:
@@ -145,30 +212,31 @@ class FourierOrbit(Orbit):
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
         """Return a waveform, or its derivative in theta of the given order, at theta in cycles."""
-        return evaluate(self.values[wave, variable], theta, order)
+        return self.basis.evaluate(self.values[wave, variable], theta, order)
 
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
         """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
-        return np.stack([evaluate(column, theta)
+        return np.stack([self.basis.evaluate(column, theta, 0)
                          for column in self.d_values[wave, variable].T], -1)
 
     def _states(self, times: np.ndarray, order: int) -> np.ndarray:
         theta = np.asarray(times, dtype=float) / self.period
-        if self.values.shape[:2] == (1, 1):
+        if self.values.shape[:2] == (1, 1) and isinstance(self.basis, Nodes):
             return evaluate(self.values[0, 0], theta, order, self.phases)
         return super()._states(times, order)
 
 
 NODES = 63
-MOST_NODES = 1023
-#: TOLERANCE: residual at which Newton's method ends; STEPS: most steps of it.
-TOLERANCE, STEPS = 1e-12, 12
+MOST_NODES = 511
+#: STEPS: most steps of Newton's method.
+STEPS = 12
 #: RESOLVED: relative size of the last harmonics at which a waveform is resolved.
 RESOLVED = 1e-12
 #: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
 Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
-#: Range below which Newton's method has reached the equilibrium.
-SMALLEST = 1e-7
+#: Over the guess: SMALLEST: range below which Newton's method has reached the equilibrium;
+#: FURTHEST: size at which it has diverged.
+SMALLEST, FURTHEST = 1e-7, 1e3
 
 
 @lru_cache(maxsize=64)
@@ -194,8 +262,8 @@ def rows_of(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndar
     return states[:, columns].T.copy()
 
 
-def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
-              ) -> tuple[np.ndarray, np.ndarray, Point]:
+def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+              given: Basis | None = None) -> tuple[np.ndarray, Any, Point]:
     """Evaluate the equations on the nodes and the phase condition.
 
     Args:
@@ -203,25 +271,25 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
         symmetry: of the gait.
         u: waveforms on the nodes, a row for each variable of each wave, shape (rows, n).
         period: in model time.
+        given: basis of the waveforms, by default n even nodes.
 
     Returns:
         Residual (rows n + 1,), its Jacobian in (u, T), and what ``by_parameter`` needs.
 
     """
     rows, n = u.shape
+    basis: Basis = given or Nodes(n)
     variables, tau, kind = network.variables, network.delay, equations_of(type(network))
-    waves, derive = rows // variables, derivative_matrix(n)
-    rise, inputs = u @ derive.T, _inputs(type(network), symmetry)
+    waves, derive = rows // variables, basis.derive
+    rise, inputs = (derive @ u.T).T, _inputs(type(network), symmetry)
     states, slopes, matrices = [], [], []
     for delayed, sources in inputs:
         late = tau / period if delayed else 0.0
-        matrices.append([None if shift == late == 0.0 else
-                         shift_matrix(n, shift - late) for _, shift in sources])
-        moved = list(zip(sources, matrices[-1], strict=True))
-        states.append(np.array([u[row] if matrix is None else matrix @ u[row]
-                                for (row, _), matrix in moved]))
-        slopes.append([matrix @ rise[row] if delayed and matrix is not None else None
-                       for (row, _), matrix in moved])
+        matrices.append([basis.moved(shift - late) for _, shift in sources])
+        states.append(np.array([u[row] if matrix is None else matrix @ u[row] for (row, _), matrix
+                                in zip(sources, matrices[-1], strict=True)]))
+        slopes.append([basis.slope(u[row], shift - late) if delayed else None
+                       for row, shift in sources])
     p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
     rates, by_argument = kind.slopes(states, p)
 
@@ -229,31 +297,22 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     left = residual[:-1].reshape(waves, variables, n)
     for v, rate in enumerate(rates):
         left[:, v] = rise[v::variables] / period - rate
-    residual[-1] = rise[0, 0]
+    residual[-1] = basis.phase(u[0])
 
-    jacobian = np.zeros((rows * n + 1, rows * n + 1))
-    blocks = jacobian[:-1, :-1].reshape(rows, n, rows, n)
-    by_period = np.zeros((rows, n))
-    by_delay = np.zeros((rows, n))
-    for row in range(rows):
-        blocks[row, :, row] = derive / period
-        by_period[row] = -rise[row] / period**2
-    nodes, flat = np.arange(n), np.zeros((waves, n))
+    blocks: dict[tuple[int, int], Any] = {(row, row): derive / period for row in range(rows)}
+    by_period, by_delay, flat = -rise / period**2, np.zeros((rows, n)), np.zeros((waves, n))
     for (v, k), slope in by_argument.items():
         slope = slope + flat
         delayed, sources = inputs[k]
         for wave, (source, _) in enumerate(sources):
             row, matrix = wave * variables + v, matrices[k][wave]
-            if matrix is None:
-                blocks[row, nodes, source, nodes] -= slope[wave]
-                continue
-            blocks[row, :, source] -= slope[wave][:, None] * matrix
+            scaled = np.diag(slope[wave]) if matrix is None else matrix * slope[wave][:, None]
+            blocks[row, source] = blocks.get((row, source), 0.0) - scaled
             if delayed:
                 by_shift = slope[wave] * slopes[k][wave]
                 by_period[row] -= by_shift * tau / period**2
                 by_delay[row] += by_shift / period
-    jacobian[:-1, -1] = by_period.ravel()
-    jacobian[-1, :n] = derive[0]
+    jacobian = basis.jacobian(blocks, by_period)
     return residual, jacobian, (states, p, by_delay, rise)
 
 
@@ -276,9 +335,10 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
 
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-             jacobian: np.ndarray, point: Point) -> FourierOrbit:
-    """Complete a solution by its derivatives; the last two arguments are results of equations."""
-    derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
+             jacobian: Any, point: Point, given: Basis | None = None) -> FourierOrbit:
+    """Complete a solution by its derivatives; jacobian and point are results of equations."""
+    basis: Basis = given or Nodes(u.shape[1])
+    derivatives = -basis.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
     # The equations of one cell contain only the weights of its own inputs.
     for family in network.families(symmetry):
@@ -286,49 +346,38 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             members = [names.index(name) for name in family]
             derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
     shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
-    return FourierOrbit(network, symmetry, period, u.reshape(shape), derivatives)
+    return FourierOrbit(network, symmetry, period, u.reshape(shape), derivatives, basis)
 
 
-def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-           periods: Sequence[float] = ()) -> FourierOrbit | None:
-    """Solve by Newton's method from a guess, doubling the nodes until waveforms are resolved.
+class Converged(NamedTuple):
+    """A solution on one basis, with the Jacobian and the point of ``equations``."""
 
-    Args:
-        network: parameters.
-        symmetry: of the gait.
-        u: guess at the waveforms on the nodes, shape (rows, n).
-        period: guess, model time.
-        periods: of orbits to keep away from, model time.
+    u: np.ndarray
+    period: float
+    jacobian: Any
+    point: Point
 
-    Raises:
-        NoOrbit: more nodes are needed than are allowed.
 
-    """
-    while True:
-        for _ in range(2 * STEPS if periods else STEPS):
-            residual, jacobian, point = equations(network, symmetry, u, period)
-            size = float(np.abs(residual[:-1]).max())
-            if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
-                break
-            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
-            # while it solves.
-            try:
-                step = np.linalg.solve(jacobian, residual)
-            except np.linalg.LinAlgError:
-                return None
-            if periods:
-                step = step * deflation_factor(period, -float(step[-1]), periods)
-            u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
-            # The period or a waveform has diverged.
-            if not (1e-3 * network.delay < period < 1e3 * network.delay and np.abs(u).max() < 1e3):
-                return None
-        else:
-            return None
-        if np.ptp(u[0]) < SMALLEST:
-            return None
-        if max(tail(row) for row in u) <= RESOLVED:
+def converge(network: Network, symmetry: Symmetry, u: np.ndarray, period: float, basis: Basis,
+             periods: Sequence[float] = ()) -> Converged | None:
+    """Solve on one basis by Newton's method; None where it diverges or reaches an equilibrium."""
+    range_at_first, furthest = np.ptp(u[0]), FURTHEST * np.abs(u).max()
+    for _ in range(2 * STEPS if periods else STEPS):
+        residual, jacobian, point = equations(network, symmetry, u, period, basis)
+        size, rise = float(np.abs(residual[:-1]).max()), float(np.abs(point[3]).max()) / period
+        if size <= basis.tolerance * rise or not rise:
             break
-        if u.shape[1] >= MOST_NODES:
-            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
-        u, periods = np.array([resample(row, 2 * row.size + 1) for row in u]), ()
-    return complete(network, symmetry, u, period, jacobian, point)
+        try:
+            step = basis.solve(jacobian, residual)
+        except np.linalg.LinAlgError:
+            return None
+        if periods:
+            step = step * deflation_factor(period, -float(step[-1]), periods)
+        u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
+        if not (1e-3 * network.delay < period < 1e3 * network.delay
+                and np.abs(u).max() < furthest):
+            return None
+    else:
+        return None
+    return Converged(u, period, jacobian, point) if np.ptp(u[0]) > SMALLEST * range_at_first else (
+        None)

@@ -15,21 +15,25 @@
 """Solution for the orbit of a gait with a delay, from another orbit or from its onset."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.characteristic import critical_delay, frequencies
 from cpg_ros.dynamics.fourier import orbit as collocation
+from cpg_ros.dynamics.fourier import pieces
 from cpg_ros.dynamics.fourier.orbit import (
+    Basis,
     by_parameter,
     complete,
+    converge,
     equations,
     FourierOrbit,
     MOST_NODES,
-    newton,
     NODES,
+    Nodes,
     RESOLVED,
     rows_of,
 )
@@ -51,6 +55,7 @@ class FourierCurve(ShortRepr):
         symmetry: of the gait.
         along: the line.
         scales: of period and value.
+        sizes: of the variables.
 
     """
 
@@ -58,6 +63,7 @@ class FourierCurve(ShortRepr):
     symmetry: Symmetry
     along: ParameterLine
     scales: tuple[float, float]
+    sizes: np.ndarray
 
     def _rows(self, z: np.ndarray) -> np.ndarray:
         """Return the waveforms, a row for each variable of each wave, shape (rows, n)."""
@@ -68,9 +74,9 @@ class FourierCurve(ShortRepr):
         return float(self._weights(first.size) * first @ second)
 
     def _weights(self, size: int) -> np.ndarray:
-        weights = np.full(size, 1.0 / (size - 2))
-        weights[-2:] = np.array(self.scales)**-2.0
-        return weights
+        rows = (int(self.symmetry.waves.max()) + 1) * self.network.variables
+        each = np.resize(self.sizes**-2.0, rows).repeat((size - 2) // rows) / (size - 2)
+        return np.append(each, np.array(self.scales)**-2.0)
 
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newton's increment normal to the border, and the tangent."""
@@ -87,8 +93,8 @@ class FourierCurve(ShortRepr):
         return solutions[:, 0], solutions[:, 1]
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Return half the range of cell 1's first variable; its peak in an odd network."""
-        row = self._rows(z)[0]
+        """Half the range of cell 1's first variable over its size; the peak in an odd network."""
+        row = self._rows(z)[0] / self.sizes[0]
         return float(row[0] if self.symmetry.odd else 0.5 * np.ptp(row))
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
@@ -117,16 +123,17 @@ class FourierCurve(ShortRepr):
                         *equations(network, self.symmetry, u, period)[1:])
 
 
-def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]
-            ) -> tuple[FourierCurve, np.ndarray]:
+def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float],
+            sizes: np.ndarray) -> tuple[FourierCurve, np.ndarray]:
     """Return the curve of the orbits along a line, and the unknowns of one of them."""
-    return (FourierCurve(orbit.network, orbit.symmetry, line, scales),
-            np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
+    return (FourierCurve(orbit.network, orbit.symmetry, line, scales, sizes),
+            np.append(rows_of(orbit.network, orbit.symmetry, orbit.cycle(orbit.samples)),
+                      [orbit.period, line.value(orbit.network)]))
 
 
 def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
-           scales: tuple[float, float], path: Path, disturbance: Path, period: float
-           ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
+                 scales: tuple[float, float], sizes: np.ndarray, path: Path, disturbance: Path,
+                 period: float) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
     """Return the curve of the orbits that branch off, the old solution on it and the tangent.
 
     Args:
@@ -134,15 +141,59 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         symmetry: of the new orbits.
         line: of parameters.
         scales: as of the curve.
+        sizes: as of the curve.
         path: the old solution.
         disturbance: its critical disturbance.
         period: of the new orbits, model time.
 
     """
     theta = np.arange(NODES) / NODES
-    return (FourierCurve(network, symmetry, line, scales),
+    return (FourierCurve(network, symmetry, line, scales, sizes),
             np.append(rows_of(network, symmetry, path(theta)), [period, line.value(network)]),
             np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))
+
+
+def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+           periods: Sequence[float] = ()) -> FourierOrbit | None:
+    """Solve by Newton's method from a guess, doubling the nodes until waveforms are resolved.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: guess at the waveforms on the nodes, shape (rows, n).
+        period: guess, model time.
+        periods: of orbits to keep away from, model time.
+
+    Raises:
+        NoOrbit: the waveforms need more nodes than are allowed, and cannot be solved on a mesh.
+
+    """
+    while True:
+        solved = converge(network, symmetry, u, period, Nodes(u.shape[1]), periods)
+        if solved is None:
+            return None
+        u, period = solved.u, solved.period
+        if max(collocation.tail(row) for row in u) <= RESOLVED:
+            return complete(network, symmetry, *solved)
+        if u.shape[1] >= MOST_NODES:
+            return _steep(network, symmetry, Nodes(u.shape[1]), u, period)
+        u, periods = np.array([collocation.resample(row, 2 * row.size + 1) for row in u]), ()
+
+
+def _steep(network: Network, symmetry: Symmetry, basis: Basis, u: np.ndarray, period: float
+           ) -> FourierOrbit:
+    """Solve on a mesh from a guess on a basis.
+
+    Raises:
+        NoOrbit: Newton's method fails, or more intervals are needed than are allowed.
+
+    """
+    orbit = pieces.solve(network, symmetry, lambda theta: np.array(
+        [basis.evaluate(row, theta, 0) for row in u]), period)
+    if orbit is None:
+        raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes and for '
+                      f'{pieces.MOST} intervals')
+    return orbit
 
 
 #: Points of a cycle at which describing functions are computed.
@@ -154,6 +205,8 @@ def _delayed(network: Network, delay: float) -> Network:
     return replace(network, **{network.delay_parameter: delay})  # type: ignore[type-var]
 
 
+#: By how much the start may miss cell 1's peak, over its range.
+PEAKED = 1e-8
 Describing = Callable[[float], tuple[complex, complex]]
 
 
@@ -223,7 +276,11 @@ def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
 
 
 def _accepted(orbit: FourierOrbit | None) -> FourierOrbit | None:
-    return orbit if orbit is not None and orbit.values[0, 0].argmax() == 0 else None
+    """Return the orbit if cell 1 peaks at the first node."""
+    if orbit is None:
+        return None
+    first = orbit.values[0, 0]
+    return orbit if first[0] >= first.max() - PEAKED * np.ptp(first) else None
 
 
 def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None:
@@ -234,8 +291,12 @@ def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None
     while reached < delay and tries < 10:
         tries += 1
         here = _delayed(network, ahead)
-        guess = _guess(here, gait) if orbit is None else predicted(here, orbit)
-        solved = None if guess is None else _accepted(newton(here, network.symmetry(gait), *guess))
+        guess = None if orbit else _guess(here, gait)
+        try:
+            solved = beside(here, orbit) if orbit else guess and _accepted(
+                newton(here, network.symmetry(gait), *guess))
+        except NoOrbit:
+            solved = None
         if solved is None:
             ahead = reached + 0.4 * (ahead - reached)
             continue
@@ -258,20 +319,33 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
         NoOrbit: the method leads elsewhere; a shorter step may succeed.
 
     """
-    orbit = _accepted(newton(network, near.symmetry, *predicted(network, near)))
+    method = newton if isinstance(near.basis, Nodes) else partial(_steep, basis=near.basis)
+    u, period = predicted(network, near)
+    orbit = _accepted(method(network, near.symmetry, u=u, period=period))
     if orbit is None or not 0.5 < orbit.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
     return orbit
 
 
+#: Size of a guess's last harmonics, over the largest, that needs more nodes, or a mesh.
+STEEP = 1e-3
+
+
 def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
               periods: Sequence[float] = ()) -> FourierOrbit | None:
     """Solve for an orbit from a guess, as solve_orbit.solve_from_path."""
-    try:
-        u = rows_of(network, symmetry, path(THETA))
-        return _accepted(newton(network, symmetry, u, period, periods))
-    except NoOrbit:
-        return None
+    def rows(theta: np.ndarray) -> np.ndarray:
+        return rows_of(network, symmetry, path(theta % 1.0))
+
+    n, orbit = NODES, None
+    while (not periods and n < MOST_NODES
+           and max(map(collocation.tail, rows(np.arange(n) / n))) > STEEP):
+        n = 2 * n + 1
+    with suppress(NoOrbit):
+        orbit = _accepted(newton(network, symmetry, rows(np.arange(n) / n), period, periods))
+    # The phase of a plateau is no peak's.
+    return orbit or (None if n == NODES else _accepted(
+        pieces.solve(network, symmetry, rows, period)))
 
 
 def from_preset(preset: Preset) -> FourierOrbit:
@@ -314,7 +388,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
         if orbit is None and onset is not None and delay > onset:
             orbit = _continued(network, gait, onset)
         if orbit is None and not simple:
-            orbits = (from_path(network, symmetry, *guess) for guess in find_orbit(network, gait))
+            orbits = (from_path(network, *guess) for guess in find_orbit(network, gait))
             orbit = next((candidate for candidate in orbits if candidate is not None), None)
         if orbit is not None:
             return orbit

@@ -39,7 +39,6 @@ from numpy.polynomial import polynomial
 #: RESOLVED: relative size of the last terms of the polynomials at which a mesh is resolved.
 RESOLVED = 1e-11
 #: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
-#: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
 FEWEST, MOST_INTERVALS = 12, 800
 #: FEW: number of intervals of a first mesh; LOOKED: places of each at which the curvature of the
 #: guess is evaluated.
@@ -211,7 +210,7 @@ def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
     """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
     positions = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
     bend = np.abs(np.diff(reduced.rates(path(positions)), axis=0)).max(axis=1)
-    return collocation.spread(positions, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), intervals)
+    return collocation.spread(positions, np.sqrt(bend + 1e-3 * bend.max() + 1e-300), intervals)
 
 
 def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray]:

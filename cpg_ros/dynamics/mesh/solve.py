@@ -21,6 +21,7 @@ within their class are continued from Hopf points.
 """
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -54,11 +55,11 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import polynomial
 
-#: Factor of the number of intervals of a second first mesh, for waveforms with several spikes.
-MORE = 4
+#: Numbers of intervals of first meshes; the second is for waveforms with several spikes.
+MESHES = FEW, 4 * FEW
 #: Iterations in which ends of intervals move onto kinks.
 ALIGNED = 8
-#: Range below which the orbit has fallen to an equilibrium.
+#: Range, over that of the guess, below which the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
 
 
@@ -70,7 +71,7 @@ def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
     def guess(positions: np.ndarray) -> np.ndarray:
         return path(positions / symmetry.order)[:, reduced.kept]
 
-    for intervals in (FEW,) if periods else (FEW, MORE * FEW):
+    for intervals in MESHES[:1] if periods else MESHES:
         start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
         orbit = _refined(reduced, start, [excluded / symmetry.order for excluded in periods])
         if orbit is not None:
@@ -101,11 +102,11 @@ def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
 
 def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> MeshOrbit | None:
     """Solve, remesh and solve again until the mesh is fine enough; None as in from_path."""
-    fewest = FEWEST
+    fewest, smallest = FEWEST, SMALLEST * np.ptp(now.points[:, :reduced.size])
     while True:
         with np.errstate(all='ignore'):
             converged = newton(reduced, now, periods)
-        if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
+        if not converged or np.ptp(now.points[:, :reduced.size]) <= smallest:
             return None
         if not _on_kinks(reduced, now):
             return None
@@ -159,6 +160,7 @@ class MeshCurve(ShortRepr):
         symmetry: of the gait.
         along: the line.
         scales: of period and value.
+        sizes: of the variables.
         mesh: ends of the intervals, shape (n + 1,).
 
     """
@@ -167,6 +169,7 @@ class MeshCurve(ShortRepr):
     symmetry: Symmetry
     along: ParameterLine
     scales: tuple[float, float]
+    sizes: np.ndarray
     mesh: np.ndarray
 
     def _solution(self, z: np.ndarray) -> tuple[Reduced, Solution]:
@@ -183,7 +186,8 @@ class MeshCurve(ShortRepr):
         ends[:-1] += 0.5 * np.diff(self.mesh)
         ends[1:] += 0.5 * np.diff(self.mesh)
         weights = np.zeros(size)
-        weights[:d * ends.size] = np.repeat(ends / d, d)
+        each = np.repeat(self.sizes**-2.0, d // self.sizes.size) / d
+        weights[:d * ends.size] = np.outer(ends, each).ravel()
         weights[-2] = (self.scales[0] / self.symmetry.order)**-2.0
         weights[-1] = self.scales[1]**-2.0
         return weights
@@ -219,9 +223,9 @@ class MeshCurve(ShortRepr):
         return answers[0], answers[1]
 
     def amplitude(self, z: np.ndarray) -> float:
-        """Return half the range of cell 1's first variable at the mesh points."""
-        now = self._solution(z)[1]
-        return float(0.5 * np.ptp(now.points[:, columns_of(self.symmetry, 0, 0)]))
+        """Half the range of cell 1's first variable at the mesh points, over its size."""
+        points = self._solution(z)[1].points[:, columns_of(self.symmetry, 0, 0)]
+        return float(0.5 * np.ptp(points) / self.sizes[0])
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['MeshCurve', np.ndarray, np.ndarray] | None:
@@ -274,17 +278,17 @@ class MeshCurve(ShortRepr):
         return completed(*self._solution(z))
 
 
-def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
-            ) -> tuple[MeshCurve, np.ndarray]:
+def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float],
+            sizes: np.ndarray) -> tuple[MeshCurve, np.ndarray]:
     """Return the curve of the orbits along a line, and the unknowns of one of them."""
-    curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
+    curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, sizes, orbit.mesh)
     now = orbit.solution
     return curve, curve.pack(now, now.length, line.value(orbit.network))
 
 
 def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
-           scales: tuple[float, float], path: Path, disturbance: Path, period: float
-           ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
+                 scales: tuple[float, float], sizes: np.ndarray, path: Path, disturbance: Path,
+                 period: float) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
     """Return the curve of the orbits that branch off, the old solution on it and the tangent.
 
     The arguments are those of the Fourier method's function.
@@ -295,7 +299,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         return lambda positions: states(positions / symmetry.order)[:, reduced.kept]
 
     mesh = first_mesh(reduced, on_quotient(path))
-    curve = MeshCurve(network, symmetry, line, scales, mesh)
+    curve = MeshCurve(network, symmetry, line, scales, sizes, mesh)
     return (curve, curve.pack(sampled(on_quotient(path), mesh, 1.0), period / symmetry.order,
                               line.value(network)),
             curve.pack(sampled(on_quotient(disturbance), mesh, 1.0), 0.0, 0.0))
@@ -352,7 +356,10 @@ def _stated(network: Network, gait: str) -> MeshOrbit | None:
 
 
 def _sought(network: Network, gait: str) -> MeshOrbit:
-    orbit = _settled(network, gait)
+    orbit, unsolved = _settled(network, gait)
+    if unsolved:
+        raise NoOrbit(f'no {gait} was found at these parameters: simulations settle on a cycle of '
+                      f'period {unsolved:.6g}, which is too steep to be solved for')
     if orbit is None:
         # solve_orbit.solve_orbit searches from Hopf points before it raises this.
         raise NoOrbit(f'no {gait} was found at these parameters, neither by simulations from '
@@ -360,15 +367,22 @@ def _sought(network: Network, gait: str) -> MeshOrbit:
     return orbit
 
 
-def _settled(network: Network, gait: str) -> MeshOrbit | None:
-    """Return the orbit that simulations from states of the gait's class settle on, or None."""
-    symmetry = network.symmetry(gait)
-    try:
-        orbits = (_accepted(from_path(network, symmetry, *guess)) for guess in find_orbit(network,
-                                                                                          gait))
-        return next((orbit for orbit in orbits if orbit is not None), None)
-    except NoEquilibrium:
-        return None
+def _settled(network: Network, gait: str) -> tuple[MeshOrbit | None, float]:
+    """Simulate from states of the gait's class until the network settles.
+
+    Returns:
+        The orbit on which it settles, or None; where only the solution for an orbit fails, the
+            period of the cycle in model time, else 0.
+
+    """
+    unsolved = 0.0
+    with suppress(NoEquilibrium):
+        for symmetry, path, period in find_orbit(network, gait):
+            orbit = from_path(network, symmetry, path, period)
+            if _accepted(orbit) is not None:
+                return orbit, 0.0
+            unsolved = unsolved or (period if orbit is None else 0.0)
+    return None, unsolved
 
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
@@ -446,7 +460,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
         # The opposite wave has the same signals with other phases.
         start = _states(near, symmetry)
-    orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)
+    orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)[0]
     if orbit is not None:
         return orbit
     if near.symmetry == symmetry:
