@@ -14,7 +14,7 @@
 
 """C libraries that the system's compiler builds on first use, kept in the cache."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 import ctypes
 from importlib.util import find_spec
 import os
@@ -57,15 +57,16 @@ def compiler() -> list[str]:
                      'pip install ziglang, or name one in CC')
 
 
-def _compile(sources: Mapping[str, str], library: Path, what: str) -> None:
+def _compile(sources: Mapping[str, str], library: Path, what: str, options: Sequence[str]
+             ) -> None:
     """Write a library; arguments and errors as of load."""
     command = compiler()
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_text(text)
         files = [file for file in sources if file.endswith('.c')]
-        done = subprocess.run([*command, *OPTIONS, *files, '-lm', '-o', 'library.so'], cwd=folder,
-                              capture_output=True, text=True)
+        done = subprocess.run([*command, *OPTIONS, *options, *files, '-lm', '-o', 'library.so'],
+                              cwd=folder, capture_output=True, text=True)
         if done.returncode:
             line = next((line for line in done.stderr.splitlines() if 'error' in line),
                         f'it ended with {done.returncode}')
@@ -73,8 +74,8 @@ def _compile(sources: Mapping[str, str], library: Path, what: str) -> None:
         os.replace(Path(folder) / 'library.so', library)
 
 
-def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str
-         ) -> ctypes.CDLL:
+def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str,
+         options: Sequence[str] = ()) -> ctypes.CDLL:
     """Load a library; compile it first if the cache does not have it.
 
     Args:
@@ -82,27 +83,28 @@ def load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]
         name: of the library; changes whenever the sources do.
         sources: returns its files, name -> text.
         what: description for the error.
+        options: further ones of the compiler.
 
     Raises:
         NoCompiler: there is no compiler, it fails, or the library cannot be loaded.
 
     """
     try:
-        return _load(folder, name, sources, what)
+        return _load(folder, name, sources, what, options)
     except OSError as error:
         raise NoCompiler(f'{what} cannot be loaded: {error}') from error
 
 
-def _load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str
-          ) -> ctypes.CDLL:
+def _load(folder: Path | None, name: str, sources: Callable[[], Mapping[str, str]], what: str,
+          options: Sequence[str]) -> ctypes.CDLL:
     if folder is not None:
         library = folder / f'{name}.so'
         if not library.exists():
             with writing():
-                _compile(sources(), library, what)
+                _compile(sources(), library, what, options)
         if library.exists():
             return ctypes.CDLL(str(library))
     with tempfile.TemporaryDirectory() as temporary:
         library = Path(temporary) / f'{name}.so'
-        _compile(sources(), library, what)
+        _compile(sources(), library, what, options)
         return ctypes.CDLL(str(library))

@@ -21,7 +21,8 @@ import math
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
-from cpg_ros.dynamics.integration.simulate import History, LANES, simulate, Trajectory
+from cpg_ros.dynamics.integration.c_kernel import LANES
+from cpg_ros.dynamics.integration.simulate import History, simulate, Trajectory
 from cpg_ros.dynamics.isotypic import Expansion, waves_of
 from cpg_ros.dynamics.orbit import Path, signal_symmetry
 from cpg_ros.networks.network import Network

@@ -24,7 +24,7 @@ from functools import cache
 from typing import Any
 
 from cpg_ros.common.c_library import load
-from cpg_ros.dynamics.integration.c_kernel import library_of, version
+from cpg_ros.dynamics.integration.c_kernel import lanes_of, library_of, ONE, version
 from cpg_ros.dynamics.integration.c_text import part
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.mesh.collocation import solver
@@ -131,6 +131,7 @@ def precompile(name: str) -> None:
     # A gait without a stored orbit is sought from an equilibrium, by higher derivatives.
     generated.equations_of(network).derive(higher=network in NETWORKS.files)
     library_of(network)
+    lanes_of(network, ONE)
     if not network.delay_parameter:
         solver()
 
@@ -214,8 +215,8 @@ class CTrack:
         """Use a stepper's arrays as one of the struct's networks: net, home or seed."""
         lane = stepper.lane
         self._kept[which] = stepper, lane
-        arrays = stepper.clock, stepper.now, *stepper.ring[1:]
+        arrays = stepper.clock, stepper.now, *stepper.history
         setattr(self.struct, which, Net(lane.address, *(array.ctypes.data for array in arrays),
-                                        stepper.ring.x.size))
+                                        stepper.history[0].size))
         self.struct.advance = ctypes.cast(
             library_of(type(stepper.network)).advance, _POINTER).value

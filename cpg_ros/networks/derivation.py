@@ -35,15 +35,11 @@ class EquationTexts(Protocol):
         """Symbols in the texts: arguments, then parameters."""
 
 
-def print_float(printer: Any, value: Any) -> str:
-    """Print a number with all digits; sympy omits two."""
-    return repr(float(value))
-
-
 class _Printer(NumPyPrinter):  # type: ignore[misc]
     """Printer of numpy code, with all digits of numbers."""
 
-    _print_Float = print_float
+    def _print_Float(self, value: Any) -> str:
+        return repr(float(value))  # sympy omits two digits.
 
 
 _PRINTER = _Printer({'fully_qualified_modules': False, 'allow_unknown_functions': False})

@@ -22,9 +22,8 @@ import threading
 import time
 from typing import Any
 
-from cpg_ros.dynamics.integration.c_kernel import c_kernels, is_missing
+from cpg_ros.dynamics.integration.c_kernel import is_missing
 from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
-from cpg_ros.dynamics.integration.simulate import use
 from cpg_ros.motion.core import core, precompile
 from cpg_ros.networks.registry import find_network
 from cpg_ros.ros.node.health import START
@@ -86,7 +85,6 @@ def compile_kernels(network: str, node: Node) -> None:
         CpgError: there is no C compiler.
 
     """
-    use(c_kernels)
     if not COMPILED:
         node.get_logger().info('numba is not installed: there is no feedback')
     # Without a compiler it ends here.

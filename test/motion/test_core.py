@@ -16,9 +16,6 @@
 
 from functools import cache
 
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
-from cpg_ros.dynamics.integration.kernel import numba_kernels
-from cpg_ros.dynamics.integration.simulate import use
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.motion.robot_file import load_robot
@@ -34,14 +31,6 @@ SEED = 5757
 REQUESTS, PAUSE = 12, 0.15
 ACTIONS = ('apply', 'apply', 'enable', 'resume', 'steer', 'trim', 'correct', 'scale', 'push',
            'nan')
-
-
-@pytest.fixture(autouse=True)
-def in_c():
-    """Solve for gaits as the generator does."""
-    use(c_kernels)
-    yield
-    use(numba_kernels)
 
 
 @cache

@@ -18,8 +18,6 @@ from dataclasses import replace
 from itertools import pairwise
 import math
 
-from cpg_ros.dynamics.integration.compilation import exp
-from cpg_ros.dynamics.integration.machine_code import OPTIONS
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -28,11 +26,11 @@ from depth import examples
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from numba import njit
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from vector_functions import exp, over
 
 KINDS = pytest.mark.parametrize('kind', [Quadruped, Biped])
 START = {Quadruped: np.linspace(0.8, -0.4, 16), Biped: np.linspace(-0.4, 0.8, 8)}
@@ -107,22 +105,15 @@ def test_rates_and_derivatives_are_those_of_the_papers_equations(kind, data):
         assert close(by_set[k], np.transpose(wanted) * 1e30, 1e-12)
 
 
-@njit(**OPTIONS)
-def over(values, out):
-    """Return the exponential in a loop, where the compiler takes several at a time."""
-    for i in range(values.size):
-        out[i] = exp(values[i])
-
-
 def test_exponential_over_its_whole_range():
     rng, few = np.random.default_rng(4), [0.0, -0.0, 5e-324, 0.5 * math.log(2.0), 700.0, -700.0]
     values = np.concatenate([rng.uniform(-700.0, 700.0, 100_000), rng.uniform(-1.0, 1.0, 20_001),
                              10 ** rng.uniform(-308, 0, 10_000), few])
-    over(values, out := np.empty_like(values))
+    out = over('exp', values)
     assert (np.abs(out - np.exp(values)) <= 4.0 * np.spacing(np.exp(values))).all()
     # Limited beyond, so that 1 / exp is never 0 and never infinite; a NaN beside numbers stays.
     wild = np.array([701.0, 1e308, np.inf, np.nan, -701.0, -1e308, -np.inf, -np.nan] * 3)
-    over(wild, out := np.empty_like(wild))
+    out = over('exp', wild)
     ends = np.tile(np.exp([700.0] * 3 + [np.nan] + [-700.0] * 3 + [np.nan]), 3)
     assert np.allclose([out, [exp(x) for x in wild]], ends, 1e-15, 0.0, equal_nan=True)
 

@@ -42,7 +42,7 @@ def test_one_line_says_how_to_get_it(missing, module):
 
 
 @pytest.mark.parametrize(('missing', 'executable'), [
-    ('numba', 'analyze'), ('numba', 'robot_sim'), ('numba', 'tune'), ('rosbags', 'inversion')])
+    ('numba', 'robot_sim'), ('numba', 'tune'), ('rosbags', 'inversion')])
 def test_an_executable_without_a_library_ends_in_one_line_with_its_name(missing, executable):
     found = run(missing, f"""
 from cpg_ros.ros.cli.executables import start
@@ -54,6 +54,7 @@ sys.exit(start({executable!r}))""")
 
 @pytest.mark.parametrize(('missing', 'module'), [
     ('numba', 'cpg_ros'), ('numba', 'cpg_ros.ros.generator'),
+    ('numba', 'cpg_ros.analysis.analyze'), ('numba', 'cpg_ros.ros.cli.inversion'),
     ('rosbags', 'cpg_ros.ros.generator'), ('matplotlib', 'cpg_ros.ros.generator'),
     ('mujoco', 'cpg_ros.ros.generator'), ('pymoo', 'cpg_ros.ros.generator')])
 def test_what_does_without_it(missing, module):

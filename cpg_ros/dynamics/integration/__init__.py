@@ -14,5 +14,5 @@
 
 """The integrator: kernels compiled by numba or in C, in real time and offline."""
 
-__all__ = ['c_kernel', 'c_text', 'compilation', 'kernel', 'kernel_source', 'machine_code',
-           'memory', 'simulate', 'stepper']
+__all__ = ['c_kernel', 'c_text', 'compilation', 'kernel_source', 'machine_code', 'memory',
+           'simulate', 'stepper']

@@ -12,49 +12,77 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exported C as the kernels of a process, in place of numba's.
+"""Fixed-step RK4 integration in C over a history of nodes, for real time and simulation.
 
-Equations and steps are those of an export (field_source, ``c/network.c``) in float64. The system's
-compiler makes a library of them, which is cached on disk. Lanes are stepped one by one.
+A history is a ring of nodes: the state x and the slopes that arrive there (``before``) and leave
+(``after``), which differ where parameters change. Delayed values come from the cubic Hermite
+interpolant, so the method is of fourth order for any delay of at least one step.
+
+In real time equations and steps are those of an export (field_source, ``c/network.c``) in float64.
+Simulations have lanes (``c/lanes.c``): copies of the network with their own coefficients and
+delays, which advance together in vector registers. The system's compiler makes libraries of both,
+which are cached on disk.
 """
 
-from collections.abc import Iterator, Sequence
 import ctypes
 from functools import cache
 import hashlib
+from pathlib import Path
 import platform
 
 from cpg_ros.common.c_library import load
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.c_text import FOLDER, part
-from cpg_ros.dynamics.integration.kernel import Kernels, Ring, Samples, System
 from cpg_ros.networks import equations as generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
 import numpy as np
 
 MOST_NODES = 2**15 - 1
+#: Numbers of lanes for one trajectory and for several.
+ONE, LANES = 1, 8
+#: Options of the compiler for lanes: all vector registers of this machine.
+NATIVE = ('-march=native', '-ffp-contract=fast')
+
+
+def _defines(**sizes: int) -> str:
+    return '\n'.join(f'#define {name} {value}' for name, value in sizes.items())
 
 
 def _sources(network: type[Network]) -> dict[str, str]:
-    """Return the files of a network's kernel, name -> text."""
+    """Return the files of a network's kernel for real time, name -> text."""
     # sympy takes a third of a second to load, and is needed once for each set of equations.
     from cpg_ros.dynamics.integration.kernel_source import field_source
     equations = equations_of(network)
     field = field_source(equations, network.cells, each=True)
-    sizes = {'CPG_CELLS': network.cells, 'CPG_COMPONENTS': network.cells * network.variables,
-             'CPG_DRIVEN': field.driven, 'CPG_DRIVEN_ROOM': max(1, field.driven * network.cells)}
-    defines = '\n'.join(f'#define {name} {value}' for name, value in sizes.items())
+    defines = _defines(
+        CPG_CELLS=network.cells, CPG_COMPONENTS=network.cells * network.variables,
+        CPG_DRIVEN=field.driven, CPG_DRIVEN_ROOM=max(1, field.driven * network.cells))
     common, *rest = (part(f'{name}.c') for name in ('common', 'kernel_slopes', 'network',
                                                     'kernel'))
     return {'cpg.h': part('kernel.h', {'DEFINES': defines}),
             'cpg.c': ''.join([common, field.text, *rest])}
 
 
+def _lane_sources(network: type[Network], lanes: int) -> dict[str, str]:
+    """Return the file that steps some lanes, name -> text."""
+    from cpg_ros.dynamics.integration.kernel_source import field_source
+    field = field_source(equations_of(network), network.cells, lanes=lanes)
+    cells = network.cells * lanes
+    defines = _defines(
+        LANES=lanes, CPG_CELLS=cells, CPG_COMPONENTS=cells * network.variables,
+        CPG_DRIVEN=field.driven, CPG_DRIVEN_ROOM=max(1, field.driven * cells))
+    return {'lanes.c': part('vector.c') + part('lanes.c', {'DEFINES': defines,
+                                                           'FIELD': field.text})}
+
+
 @cache
 def version() -> str:
-    """Return a digest of everything from which the C is generated."""
-    digest = hashlib.sha256(platform.machine().encode())
+    """Return a digest of everything from which the C is generated, and of the processor."""
+    processor = Path('/proc/cpuinfo')
+    known = processor.read_text() if processor.exists() else ''
+    flags = next((line for line in known.splitlines() if line.startswith('flags')), '')
+    digest = hashlib.sha256((platform.machine() + flags).encode())
     for source in sorted(FOLDER.parent.rglob('*.[chp]*')):
         if source.suffix in ('.c', '.h', '.py'):
             digest.update(source.read_bytes())
@@ -62,14 +90,15 @@ def version() -> str:
 
 
 def is_missing(network: type[Network]) -> bool:
-    """Return whether a network's library could be on disk, but is not."""
+    """Return whether a library of a network for one trajectory could be on disk, but is not."""
     folder = generated.folder(equations_of(network).key)
-    return folder is not None and not (folder / f'kernel-{version()}.so').exists()
+    return folder is not None and not all(
+        (folder / f'{name}-{version()}.so').exists() for name in ('kernel', f'lanes{ONE}'))
 
 
 @cache
 def library_of(network: type[Network]) -> ctypes.CDLL:
-    """Return the library that steps a kind of network.
+    """Return the library that steps a kind of network in real time.
 
     Raises:
         NoCompiler: it is not in the cache, and there is no compiler, or it fails.
@@ -80,10 +109,31 @@ def library_of(network: type[Network]) -> ctypes.CDLL:
     pointer, whole = ctypes.c_void_p, ctypes.c_int
     library.set_slope.argtypes = pointer, whole
     library.advance.argtypes = pointer, pointer, ctypes.c_double, pointer
-    library.steps.argtypes = pointer, whole, whole, whole, whole, pointer, pointer
     return library
 
 
+class Block(ctypes.Structure):
+    """The struct ``block`` of ``c/lanes.c``: some lanes, and addresses of their arrays."""
+
+    _fields_ = [*((name, ctypes.c_void_p) for name in ('p', 'delay', 'basis', 'x', 'after',
+                                                       'before')),
+                ('gain', ctypes.c_double), ('step', ctypes.c_double),
+                ('basis_rows', ctypes.c_int), ('nodes', ctypes.c_int)]
+
+
+@cache
+def lanes_of(network: type[Network], lanes: int) -> ctypes.CDLL:
+    """Return the library that steps some lanes of a kind of network; errors as of library_of."""
+    library = load(generated.folder(equations_of(network).key), f'lanes{lanes}-{version()}',
+                   lambda: _lane_sources(network, lanes),
+                   f"the kernels of the network '{network.name}'", NATIVE)
+    block, pointer, whole = ctypes.POINTER(Block), ctypes.c_void_p, ctypes.c_int
+    library.begin.argtypes = block, whole
+    library.steps.argtypes = (block, whole, whole, pointer, whole, whole, whole, pointer, pointer)
+    return library
+
+
+@cache
 def _track_of(components: int) -> type[ctypes.Structure]:
     """Return the struct cpg_track of ``c/kernel.h``."""
     pointer, real, short = ctypes.c_void_p, ctypes.c_double, ctypes.c_int16
@@ -95,75 +145,32 @@ def _track_of(components: int) -> type[ctypes.Structure]:
 
 
 class Lane:
-    """A system with one lane and its history, as C takes them."""
+    """A network in real time, its symmetry lock and its history, as C takes them."""
 
-    def __init__(self, kind: type[ctypes.Structure], system: System, ring: Ring) -> None:
-        if len(ring.x) > MOST_NODES:
-            raise InputError(f'a history of {len(ring.x)} steps is too long for kernels in C: '
-                             f'they have at most {MOST_NODES}')
+    def __init__(self, network: Network, gain: float, basis: np.ndarray, step: float,
+                 history: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+        """Take a network.
+
+        Args:
+            network: parameters.
+            gain: of the symmetry lock, 1/model time.
+            basis: of the subspace that the lock leaves alone, shape (r, components).
+            step: model time between the nodes of the history.
+            history: states, and slopes after and before them, (nodes, components) each.
+
+        Raises:
+            InputError: the history has too many nodes.
+
+        """
+        nodes = len(history[0])
+        if nodes > MOST_NODES:
+            raise InputError(f'a history of {nodes} steps is too long for kernels in C: they have '
+                             f'at most {MOST_NODES}')
         # The arrays are kept as long as their addresses.
-        self.system, self.ring = system, ring
-        p, basis, x, after, before = (array.ctypes.data for array in (
-            system.p, system.basis, ring.x, ring.after, ring.before))
-        self._track = kind(p, system.gain, system.tau[0] / ring.step, ring.step, 0.0, x, after,
-                           before, len(system.basis), basis, 0, len(ring.x), 0)
+        self._arrays = network.coefficients, basis, *history
+        p, basis_address, *past = (array.ctypes.data for array in self._arrays)
+        self._track = _track_of(network.components)(
+            p, gain, network.delay / step, step, 0.0, *past, len(basis), basis_address, 0, nodes,
+            0)
         self.pointer = ctypes.byref(self._track)
         self.address = ctypes.addressof(self._track)
-
-
-def lane_of(network: type[Network], system: System, ring: Ring) -> Lane:
-    """Return a system with one lane and its history for the functions of library_of."""
-    return Lane(_track_of(network.cells * network.variables), system, ring)
-
-
-def _split(system: System, ring: Ring, lanes: int) -> Iterator[tuple[System, Ring]]:
-    """Yield each lane by itself, and copy changes of its history back."""
-    for lane in range(lanes):
-        arrays = [array[:, lane::lanes] for array in (ring.x, ring.after, ring.before)]
-        own = [array.copy() for array in arrays]
-        yield (System(system.p[:, lane::lanes].copy(), system.tau[lane:], system.gain,
-                      system.basis), Ring(ring.step, *own))
-        for array, changed in zip(arrays, own, strict=True):
-            array[:] = changed
-
-
-@cache
-def c_kernels(network: type[Network]) -> Kernels:
-    """Return a network's kernels in C, in place of numba's.
-
-    Raises:
-        NoCompiler: they are not in the cache, and there is no compiler, or it fails.
-
-    """
-    library, components = library_of(network), network.cells * network.variables
-    kind = _track_of(components)
-
-    def set_slope(system: System, ring: Ring, head: int) -> None:
-        for lane_arrays in _split(system, ring, ring.x.shape[1] // components):
-            library.set_slope(Lane(kind, *lane_arrays).pointer, head)
-
-    def integrate(system: System, ring: Ring, head: int, steps: int, noise: float, seed: int,
-                  record: Samples, row: int) -> int:
-        if noise:
-            raise InputError('noise needs numba: kernels in C have none')
-        every, states, slopes = record
-        spare, end = np.empty((2, *states.shape[1:])), head
-        for lane, lane_arrays in enumerate(_split(system, ring, ring.x.shape[1] // components)):
-            kept = (states[lane], slopes[lane]) if lane < len(states) else spare
-            end = library.steps(Lane(kind, *lane_arrays).pointer, head, steps, every, row,
-                                *(array.ctypes.data for array in kept))
-        return end
-
-    def integrate_many(system: System, ring: Ring, head: int, steps: int, noise: float,
-                       seeds: Sequence[int], record: Samples, row: int) -> int:
-        lanes, end = system.tau.shape[1], head
-        for block, seed in enumerate(seeds):
-            mine = slice(block * lanes, (block + 1) * lanes)
-            end = integrate(
-                System(system.p[block], system.tau[block], system.gain, system.basis),
-                Ring(ring.step, ring.x[block], ring.after[block], ring.before[block]), head,
-                steps, noise, seed, Samples(record.every, record.states[mine],
-                                            record.slopes[mine]), row)
-        return end
-
-    return Kernels(set_slope, integrate, integrate_many)

@@ -12,18 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Compilation of the numerical kernels, and the elementary functions that they share.
+"""Compilation of the numerical kernels of feedback and simulation by numba.
 
-numba is loaded when the first kernel runs; without feedback, the generator needs none. Without
-numba, kernels are plain Python, too slow for feedback and simulation.
+It is loaded when the first kernel runs; without feedback, the generator needs none. Without it,
+kernels are plain Python, too slow for feedback.
 """
 
 from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property, update_wrapper
 from importlib.util import find_spec
 import math
-
-import numpy as np
 
 #: Whether kernels are machine code.
 COMPILED = find_spec('numba') is not None
@@ -91,64 +89,3 @@ def specialised(kernel: Kernel, *arguments):
 def on_compile(compiling) -> AbstractContextManager:
     """Call a function before each compilation of a function that is not in the cache."""
     return _numba().on_compile(compiling) if COMPILED else nullcontext()
-
-
-_LOG2E = 1.0 / math.log(2.0)
-# ln 2 split so that n * _LN2_HIGH is exact (fdlibm).
-_LN2_HIGH = 6.93147180369123816490e-01
-_LN2_LOW = 1.90821492927058770002e-10
-# Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits of the mantissa.
-_ROUND = 6755399441055744.0
-
-
-@jit
-def _reduced(z):
-    """Return 2^n and expm1(r) with z = n ln 2 + r, |r| <= ln(2)/2, for |z| <= 708."""
-    rounded = z * _LOG2E + _ROUND
-    n = rounded - _ROUND
-    r = (z - n * _LN2_HIGH) - n * _LN2_LOW
-    # sum_{k=2}^{13} r^(k-2) / k!, in Estrin's order: short chains of dependent operations.
-    r2 = r * r
-    r4 = r2 * r2
-    low = (0.5 + r * (1 / 6)) + r2 * ((1 / 24) + r * (1 / 120))
-    middle = (1 / 720 + r * (1 / 5040)) + r2 * (1 / 40320 + r * (1 / 362880))
-    high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
-    q = low + r4 * (middle + r4 * high)
-    power = np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
-    return power, r + r2 * q
-
-
-@jit
-def tanh(x):
-    """Hyperbolic tangent, within 4 units in the last place, without a branch.
-
-    Unlike libm's it can be vectorised: expm1 by reduction and a Taylor polynomial of degree 13,
-    then tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
-    """
-    z = abs(x)
-    power, rest = _reduced(2.0 * (20.0 if z > 20.0 else z))
-    expm1 = power * rest + (power - 1.0)
-    return math.copysign(expm1 / (expm1 + 2.0), x)
-
-
-@jit
-def exp(x):
-    """Exponential, within 4 units in the last place for |x| <= 700, limited beyond; see tanh."""
-    z = 700.0 if x > 700.0 else x
-    z = -700.0 if z < -700.0 else z
-    power, rest = _reduced(z)
-    return power + power * rest
-
-
-@jit
-def fetch(lanes, source, given, out):
-    """Copy the inputs of each cell, all lanes of cell ``source[cell]``."""
-    if lanes == 1:
-        for cell in range(len(source)):
-            out[cell] = given[source[cell]]
-    else:
-        for cell in range(len(source)):
-            begin = source[cell] * lanes
-            there, here = given[begin:begin + lanes], out[cell * lanes:(cell + 1) * lanes]
-            for lane in range(lanes):
-                here[lane] = there[lane]

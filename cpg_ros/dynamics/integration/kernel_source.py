@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Kernel code of a network's right-hand side, in Python and C: loops over all cells and lanes.
+"""C of a network's right-hand side: loops over all cells, or over all cells and lanes.
 
-A function of another cell's variables is computed once, at that cell, and then fetched. Each
-elementary function and each result has a loop of its own, which compilers vectorise.
+A function of another cell's variables is computed once, at that cell, and then fetched.
 """
 
 from collections.abc import Sequence
@@ -24,20 +23,10 @@ from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.integration.c_text import WIDTH
 from cpg_ros.networks.definition import Argument, Source
-from cpg_ros.networks.derivation import expressions, print_float
+from cpg_ros.networks.derivation import expressions
 from cpg_ros.networks.equations import Equations
 import sympy
 from sympy.printing.c import C99CodePrinter
-from sympy.printing.pycode import PythonCodePrinter
-
-
-class _KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
-    """Printer of Python, with all digits of numbers."""
-
-    _print_Float = print_float
-
-
-_PRINTER = _KernelPrinter({'fully_qualified_modules': False})
 
 
 class LoopProgram:
@@ -100,82 +89,7 @@ class LoopProgram:
                            for arg in call.args))
 
 
-class Writer:
-    """Writer of a program's loops as the body of a function."""
-
-    def __init__(self, program: LoopProgram, sources: dict[Source, int]) -> None:
-        self._program, self.sources = program, sources
-        self.lines: list[str] = []
-        #: Fetched array -> by how many cells it is behind the array that it is fetched from.
-        self.rings: dict[str, int] = {}
-        self._allot()
-
-    def _allot(self) -> None:
-        """Assign every array a place in the scratch memory."""
-        program = self._program
-        behind: dict[Any, Any] = {}
-        for symbol, what, source in program.fetched:
-            shift = -source[0] % len(source)
-            ring = tuple((cell - shift) % len(source) for cell in range(len(source)))
-            if source == ring and what not in behind.values() and any(
-                    what == name for name, _ in program.functions):
-                behind[symbol] = what
-                self.rings[str(symbol)] = shift
-        self.arrays, self.extra = 0, 0
-        for symbol, *_ in (*program.functions, *program.fetched):
-            if symbol in behind.values():
-                continue
-            used = f'{self.arrays} * m + {self.extra} * lanes'
-            self.lines.append(f'{symbol} = work[{used}:{used} + m]')
-            if symbol in behind:
-                shift = self.rings[str(symbol)]
-                used += f' + {shift} * lanes'
-                self.lines.append(f'{behind[symbol]} = work[{used}:{used} + m]')
-                self.extra += shift
-            self.arrays += 1
-
-    def _elements(self, part: Any) -> str:
-        """Return the code of an expression at index i."""
-        names = {symbol: sympy.Symbol(f'{symbol}[i]') for symbol in part.free_symbols}
-        return str(_PRINTER.doprint(part.xreplace(names)))
-
-    def loops(self, results: Sequence[tuple[str, Any]]) -> None:
-        """Return the code of all loops: functions, fetched arrays and results (name, value)."""
-        program = self._program
-        done: set[Any] = set()
-        waiting_f = list(program.functions)
-        waiting_g = list(program.fetched)
-        needed = {symbol for symbol, _ in waiting_f} | {symbol for symbol, _, _ in waiting_g}
-        while waiting_f or waiting_g:
-            ready_f = [call for call in waiting_f if not call[1].free_symbols & needed - done]
-            ready_g = [call for call in waiting_g if not call[1].free_symbols & needed - done]
-            for symbol, call in ready_f:
-                self._loop(str(symbol), self._elements(call))
-                done.add(symbol)
-                waiting_f.remove((symbol, call))
-            for symbol, what, source in ready_g:
-                self._copy(str(symbol), str(what), source)
-                done.add(symbol)
-                waiting_g.remove((symbol, what, source))
-        for name, part in results:
-            self._loop(name, self._elements(part))
-
-    def _loop(self, target: str, code: str) -> None:
-        self.lines += ['for i in range(m):', f'    {target}[i] = {code}']
-
-    def _copy(self, target: str, array: str, source: Source) -> None:
-        """Fetch the inputs of each cell, in blocks of cells that lie evenly in both arrays."""
-        if target in self.rings:
-            # The ring lies straight in memory: only what it begins with has to be copied.
-            shift = self.rings[target]
-            self.lines += [f'to, of = {target}[:{shift} * lanes], {array}[m - {shift} * lanes:m]',
-                           f'for i in range({shift} * lanes):', '    to[i] = of[i]']
-            return
-        index = self.sources.setdefault(source, len(self.sources))
-        self.lines.append(f'fetch(lanes, SOURCE_{index}, {array}, {target})')
-
-
-# Kernel code for a network's right-hand side, written from its equations.
+# The right-hand side as loops, written from the equations.
 
 def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
     """Write hyperbolic functions of multiples of one argument by one exponential.
@@ -228,11 +142,6 @@ def _split(rates: list[Any], delayed: set[Any], now: set[Any]) -> tuple[list[Any
     return driven, rest
 
 
-def _function(name: str, head: str, doc: str, slices: Sequence[str], lines: Sequence[str]) -> str:
-    body = ''.join(f'        {line}\n' for line in (*slices, *lines))
-    return f'    @decorate\n    def {name}({head}):\n        """{doc}"""\n{body}'
-
-
 class LoweredPart(NamedTuple):
     """A part of the right-hand side as loops over the cells.
 
@@ -270,53 +179,7 @@ def lowered_parts(equations: Equations) -> list[LoweredPart]:
     return parts
 
 
-def kernel_source(equations: Equations) -> str:
-    """Write a module with ``compiled(decorate)``, which returns (drive or None, field).
-
-    ``drive(n, past, p, lanes, work, out)`` fills ``DRIVEN`` arrays of length n / variables;
-    ``field(n, z, driven, p, lanes, work, out)`` fills the rates. ``p`` has a row for each
-    parameter of the equations, ``work`` memory for ``WORK`` such arrays and ``EXTRA`` cells.
-    """
-    parts = lowered_parts(equations)
-    driven = len(parts[0].results) if len(parts) > 1 else 0
-    variables = len(parts[-1].results)
-    texts, most, extra = [], 0, 0
-    sources: dict[Source, int] = {}
-    for name, program, lowered in parts:
-        state = 'past' if name == 'drive' else 'z'
-        used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),
-                                         *(what for _, what, _ in program.fetched))
-                for symbol in part.free_symbols}
-        slices = [f'm = n // {variables}']
-        slices += [f'z{v} = {state}[{v} * m:{v + 1} * m]' for v in range(variables)
-                   if f'z{v}' in used]
-        slices += [f'd{k} = driven[{k} * m:{k + 1} * m]' for k in range(driven)
-                   if f'd{k}' in used]
-        slices += [f'p_{row} = p[{r}]' for r, row in enumerate(equations.rows)
-                   if f'p_{row}' in used]
-        slices += [f'o{k} = out[{k} * m:{k + 1} * m]' for k in range(len(lowered))]
-        writer = Writer(program, sources)
-        most, extra = max(most, writer.arrays), max(extra, writer.extra)
-        writer.loops([(f'o{k}', part) for k, part in enumerate(lowered)])
-        head = ('n, past, p, lanes, work, out' if name == 'drive'
-                else 'n, z, driven, p, lanes, work, out')
-        doc = ('What depends on delayed states alone.' if name == 'drive'
-               else 'Right-hand side at z.')
-        texts.append(_function(name, head, doc, slices, writer.lines))
-    code = '\n'.join(texts)
-    helpers = [word for word in ('exp', 'fetch', 'tanh') if f'{word}(' in code]
-    others = [word for word in ('cos', 'log', 'sin', 'sqrt') if f'{word}(' in code]
-    head = ''.join(line + '\n' for line in (
-        f'from math import {", ".join(others)}' if others else '',
-        f'from cpg_ros.dynamics.integration.compilation import {", ".join(helpers)}' if helpers
-        else '') if line)
-    head += 'from numpy import array\n' if sources else ''
-    definitions = ''.join(f'SOURCE_{k} = array({source!r})\n' for source, k in sources.items())
-    return (f'{head}\n{definitions}DRIVEN, WORK, EXTRA = {driven}, {most}, {extra}\n\n\n'
-            f'def compiled(decorate):\n{code}\n    return {"drive" if driven else None}, field\n')
-
-
-# C functions of a network's right-hand side, from the loops that its compiled kernel has.
+# C functions of a network's right-hand side, from these loops.
 
 HEADS = {'drive': 'static void drive(const cpg_real *past, const cpg_real *p, cpg_real *driven)',
          'field': 'static void field(const cpg_real *z, const cpg_real *driven, const cpg_real *p,'
@@ -368,7 +231,10 @@ class FieldSource(NamedTuple):
 class _Names:
     """Names of symbols in C, at cell i."""
 
-    def __init__(self, equations: Equations, cells: int, each: bool) -> None:
+    def __init__(self, equations: Equations, cells: int, each: bool, lanes: int) -> None:
+        cells, each = cells * max(1, lanes), each or lanes > 0
+        self._from = 'FROM(source_{}, {})' if lanes else 'source_{}[{}]'
+        self._head = 'EACH(i)' if lanes else 'for (int16_t i = 0; i < CPG_CELLS; i++)'
         self._p: dict[str, str] = {}
         self.size = 0
         for row in equations.rows:
@@ -388,7 +254,7 @@ class _Names:
             if name in fetched:
                 what, source = fetched[name]
                 number = self.sources.setdefault(source, len(self.sources))
-                text[symbol] = self.element(part, what, f'source_{number}[{place}]')
+                text[symbol] = self.element(part, what, self._from.format(number, place))
             elif name in self._p:
                 text[symbol] = self._p[name]
             elif name[0] == 'z' and name[1:].isdigit():
@@ -400,15 +266,15 @@ class _Names:
         return str(self._printer.doprint(expression.xreplace(
             {symbol: sympy.Symbol(word, real=True) for symbol, word in text.items()})))
 
+    def loop(self, lines: list[str]) -> list[str]:
+        """Return a loop over the cells."""
+        wrapped = [fill(line, WIDTH, initial_indent=8 * ' ', subsequent_indent=12 * ' ',
+                        break_long_words=False, break_on_hyphens=False) for line in lines]
+        return [f'    {self._head} {{', *wrapped, '    }']
+
 
 def _block(name: str) -> str:
     return '' if name[1:] == '0' else f'{name[1:]} * CPG_CELLS + '
-
-
-def _loop(lines: list[str]) -> list[str]:
-    wrapped = [fill(line, WIDTH, initial_indent=8 * ' ', subsequent_indent=12 * ' ',
-                    break_long_words=False, break_on_hyphens=False) for line in lines]
-    return ['    for (int16_t i = 0; i < CPG_CELLS; i++) {', *wrapped, '    }']
 
 
 def _c_function(part: LoweredPart, names: _Names) -> str:
@@ -420,15 +286,16 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
     while waiting:
         ready = [call for call in waiting if not
                  {inputs.get(symbol, symbol) for symbol in call[1].free_symbols} & needed - done]
-        lines += _loop([f'{symbol}[i] = {names.element(part, call)};' for symbol, call in ready])
+        lines += names.loop([f'{symbol}[i] = {names.element(part, call)};'
+                             for symbol, call in ready])
         done |= {symbol for symbol, _ in ready}
         waiting = [call for call in waiting if call not in ready]
     shared, results = sympy.cse(part.results, sympy.numbered_symbols('s'))
     out = 'driven' if part.name == 'drive' else 'out'
-    lines += _loop([f'const cpg_real {symbol} = {names.element(part, value)};'
-                    for symbol, value in shared]
-                   + [f'{out}[{_block(f"o{k}")}i] = {names.element(part, value)};'
-                      for k, value in enumerate(results)])
+    lines += names.loop([f'const cpg_real {symbol} = {names.element(part, value)};'
+                         for symbol, value in shared]
+                        + [f'{out}[{_block(f"o{k}")}i] = {names.element(part, value)};'
+                           for k, value in enumerate(results)])
     arrays = [f'    cpg_real {symbol}[CPG_CELLS];' for symbol, _ in part.program.functions]
     body = '\n'.join(lines)
     arrays += [f'    (void){name};' for name in ('p', *(['driven'] if out == 'out' else []))
@@ -436,19 +303,23 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
     return '\n'.join([HEADS[part.name], '{', *arrays, body, '}'])
 
 
-def field_source(equations: Equations, cells: int, each: bool = False) -> FieldSource:
+def field_source(equations: Equations, cells: int, each: bool = False, lanes: int = 0
+                 ) -> FieldSource:
     """Return C of a network's functions.
 
     Args:
         equations: of the network.
         cells: their number.
         each: every row of p has one number for each cell.
+        lanes: their number in ``c/lanes.c``, where every row has one number for each cell and
+            lane; 0 for other files.
 
     """
     parts = lowered_parts(equations)
-    names = _Names(equations, cells, each)
+    names = _Names(equations, cells, each, lanes)
     functions = [_c_function(part, names) for part in parts]
-    sources = [f'static CPG_ROM uint8_t source_{number}[CPG_CELLS] = '
+    size = cells if lanes else 'CPG_CELLS'
+    sources = [f'static CPG_ROM uint8_t source_{number}[{size}] = '
                f'{{{", ".join(map(str, source))}}};' for source, number in names.sources.items()]
     return FieldSource('\n'.join(['', *sources, '', *'\n\n'.join(functions).splitlines(), '']),
                        len(parts[0].results) if len(parts) > 1 else 0, names.size)

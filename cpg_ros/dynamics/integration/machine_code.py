@@ -23,14 +23,13 @@ from cpg_ros.common.cache_folder import writing
 from cpg_ros.dynamics.integration import memory
 from cpg_ros.networks import equations
 from llvmlite import ir
-from numba import config, njit, prange, typeof
+from numba import config, njit, typeof
 from numba.core import event, types
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic, overload
 
-__all__ = ['bound_by_first_call', 'cached_on_disk', 'jit', 'jit_entry', 'jit_for_python',
-           'machine_function', 'on_compile', 'prange', 'renamed', 'specialised']
+__all__ = ['jit', 'jit_entry', 'jit_for_python', 'machine_function', 'on_compile', 'specialised']
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
@@ -61,60 +60,20 @@ def _disk(function, folder: Path) -> _Disk:
         numba.CACHE_DIR = others
 
 
-def cached_on_disk(function, folder: Path | None, **options):
-    """Compile a function on its first call, and cache its machine code on disk.
-
-    Args:
-        function: not compiled yet.
-        folder: changes whenever something that the function calls has changed; None caches
-            nothing.
-        options: of numba, beside those of every kernel.
-
-    """
-    compiled = njit(**OPTIONS, **options)(function)
+def jit_entry(function):
+    """Compile an entry point of the package on its first call, and cache its machine code."""
+    compiled, folder = njit(**OPTIONS)(function), equations.folder()
     if folder is not None:
         compiled._cache = _disk(function, folder)
         # Where the folder cannot be written numba tries others, whose code may be out of date.
         if not Path(compiled.stats.cache_path).is_relative_to(folder):
-            return njit(**OPTIONS, **options)(function)
+            return jit_for_python(function)
     return compiled
-
-
-def jit_entry(function):
-    """Compile an entry point of the package, and cache its machine code on disk."""
-    return cached_on_disk(function, equations.folder())
 
 
 def specialised(kernel, *arguments):
     """Return a kernel's machine code for arguments like these."""
     return kernel.compile(tuple(typeof(argument) for argument in arguments))
-
-
-def bound_by_first_call(kernel):
-    """Return a kernel that is bound to arguments like those of its first call."""
-    code = None
-
-    def call(*arguments):
-        nonlocal code
-        if code is None:
-            code = specialised(kernel, *arguments)
-        return code(*arguments)
-    return call
-
-
-def renamed(function, key: str):
-    """Name a function that is compiled once for each network after that network.
-
-    numba identifies functions in its disk cache by their qualified name: a network would run
-    another's equations.
-
-    Args:
-        function: to rename.
-        key: of the network's equations.
-
-    """
-    function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
-    return function
 
 
 def machine_function(function, arguments: tuple) -> Any:

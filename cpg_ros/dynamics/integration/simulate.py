@@ -15,13 +15,15 @@
 """Offline simulation with the real-time kernel, recording every node."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import repeat
+import math
+import os
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
-from cpg_ros.dynamics.integration.compilation import COMPILED
-from cpg_ros.dynamics.integration.kernel import Kernels, numba_kernels, Ring, Samples, System
+from cpg_ros.dynamics.integration.c_kernel import Block, LANES, lanes_of, ONE
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -31,18 +33,10 @@ import numpy as np
 #: slopes.
 History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
 
-#: LANES: number of trajectories that advance together in vector registers.
-LANES = 8
-#: Backend of the kernels of batches: only numba's have noise and step all lanes at once.
-_maker: Callable[[type[Network]], Kernels] = numba_kernels if COMPILED else c_kernels
 #: CHUNK: work between two updates of the progress bar, components times steps.
 CHUNK = 20_000_000
-
-
-def use(maker: Callable[[type[Network]], Kernels]) -> None:
-    """Set the kernels of this process; c_kernels are ready at once, without numba."""
-    global _maker
-    _maker = maker
+#: NOISY: work of a step with noise, over that of one without; its random numbers take memory.
+NOISY = 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,63 +141,63 @@ class _Lanes:
     """
 
     def __init__(self, networks: Sequence[Network], histories: Sequence[History], step: float,
-                 batch: int) -> None:
+                 batch: int, lock: tuple[float, np.ndarray]) -> None:
         """Fill the rings of past states from the histories."""
         components, cells = networks[0].components, networks[0].cells
         # Five nodes at least, so that slopes of a given history are of fourth order.
         nodes = max(5, int(np.ceil(max(member.delay for member in networks) / step)) + 2)
-        lanes = min(LANES, batch)
+        lanes = ONE if batch == 1 else LANES
         blocks = -(-batch // lanes)
         members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
         #: States, and slopes after and before each node.
         self._ring = np.empty((3, blocks, nodes, components, lanes))
-        p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
+        self._p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
         self._tau = np.empty((blocks, lanes))
         samples = [sample_history(history, nodes, step, components) for history in histories]
         for (block, lane), m in np.ndenumerate(members):
             network = networks[m if len(networks) > 1 else 0]
-            p[block, :, :, lane], self._tau[block, lane] = network.coefficients, network.delay
+            self._p[block, ..., lane], self._tau[block, lane] = network.coefficients, network.delay
             past, slopes = samples[m if len(histories) > 1 else 0]
             self._ring[:, block, :, :, lane] = past, slopes, slopes
-        self._p = p.reshape(blocks, -1, cells * lanes)
-        self._step, self._batch = float(step), batch
+        self._library = lanes_of(type(networks[0]), lanes)
+        self._gain, self._basis = lock[0], np.ascontiguousarray(lock[1])
+        self._blocks = [Block(*(array.ctypes.data for array in (
+            self._p[k], self._tau[k], self._basis, *self._ring[:, k])), self._gain, step,
+            len(self._basis), nodes) for k in range(blocks)]
 
-    def run(self, compiled: Kernels, lock: tuple[float, np.ndarray], rows: int, every: int,
-            noise: float, seed: int, progress: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Integrate by the kernels of the network, and by steps as of ``simulate``.
+    def run(self, rows: int, every: int, noise: float, seed: int, progress: bool
+            ) -> tuple[np.ndarray, np.ndarray]:
+        """Integrate on all cores, by steps as of ``simulate``.
 
         Returns:
-            States and slopes at the start and at ``rows`` nodes after it, shape (batch, rows + 1,
-                components) each.
+            States and slopes at the start and at ``rows`` nodes after it, shape (lanes, rows + 1,
+                components) each; the last lanes may be spare.
 
         """
         _, blocks, nodes, components, lanes = self._ring.shape
-        flat = self._ring.reshape(3, blocks, nodes, components * lanes)
-        head, steps = nodes - 1, rows * every
-        systems = [System(p, tau, *lock) for p, tau in zip(self._p, self._tau, strict=True)]
-        rings = [Ring(self._step, *flat[:, block]) for block in range(blocks)]
-        for system, ring in zip(systems, rings, strict=True):
-            compiled.set_slope(system, ring, head)
-        states = np.empty((self._batch, rows + 1, components))
-        slopes = np.empty_like(states)
-        for m in range(self._batch):
-            states[m, 0], slopes[m, 0] = self._ring[:2, m // lanes, head, :, m % lanes]
-        record = Samples(every, states, slopes)
-        with progress_bar('simulating', steps, enabled=progress) as bar:
-            done = 0
+        steps, head, done = rows * every, nodes - 1, 0
+        states, slopes = np.empty((2, blocks, lanes, rows + 1, components))
+        size = blocks * components * lanes * (NOISY if noise else 1)
+
+        def advance(k: int, count: int, number: int) -> int:
+            random = np.random.default_rng([seed, done, k])
+            kicks = noise * random.standard_normal(count * components * lanes) if noise else None
+            return int(self._library.steps(
+                self._blocks[k], head, count, None if kicks is None else kicks.ctypes.data, every,
+                number, rows + 1, states[k].ctypes.data, slopes[k].ctypes.data))
+
+        for k, block in enumerate(self._blocks):
+            self._library.begin(block, head)
+            states[k, :, 0], slopes[k, :, 0] = self._ring[:2, k, head].swapaxes(1, 2)
+        with (progress_bar('simulating', steps, enabled=progress) as bar,
+              ThreadPoolExecutor(min(blocks, os.cpu_count() or 1)) as pool):
             while done < steps:
-                chunk = min(steps - done, max(1, CHUNK // (blocks * components * lanes)))
-                seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
-                if blocks == 1:
-                    head = compiled.integrate(systems[0], rings[0], head, chunk, noise, seeds[0],
-                                              record, done + 1)
-                else:
-                    head = compiled.integrate_many(
-                        System(self._p, self._tau, *lock), Ring(self._step, *flat), head, chunk,
-                        noise, seeds, record, done + 1)
-                done += chunk
+                count = min(steps - done, max(1, CHUNK // size))
+                work = range(blocks), repeat(count), repeat(done + 1)
+                *_, head = map(advance, *work) if blocks == 1 else pool.map(advance, *work)
+                done += count
                 bar(done)
-        return states, slopes
+        return (states.reshape(-1, rows + 1, components), slopes.reshape(-1, rows + 1, components))
 
 
 def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
@@ -249,14 +243,12 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
                     *(member.delay for member in networks if member.delay > 0.0)))
     _check(networks, t_end, step, every)
     rows = int(np.ceil(t_end / (step * every) - 1e-9))
-    lanes = _Lanes(networks, histories, step, batch)
     gain, basis = (0.0, np.zeros((1, networks[0].components))) if lock is None else (
         float(lock[0]), lock[1].basis)
-    # A single run takes as long in C, which compiles sooner than numba's but has no noise.
-    maker = c_kernels if batch == 1 and not noise else _maker
-    compiled = (numba_kernels if noise and COMPILED else maker)(type(networks[0]))
-    states, slopes = lanes.run(compiled, (gain, basis), rows, every, float(noise), seed, progress)
+    lanes = _Lanes(networks, histories, float(step), batch, (gain, basis))
+    # White noise: a normally distributed kick after each step (Euler-Maruyama).
+    states, slopes = lanes.run(rows, every, float(noise) * math.sqrt(step), seed, progress)
     times = np.arange(rows + 1) * (step * every)
     if isinstance(network, Network) and one_history:
         return Trajectory(times, states[0], slopes[0])
-    return Trajectory(times, states, slopes)
+    return Trajectory(times, states[:batch], slopes[:batch])

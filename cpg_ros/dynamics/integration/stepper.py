@@ -19,8 +19,7 @@ import copy
 import math
 
 from cpg_ros.common.errors import InputError
-from cpg_ros.dynamics.integration.c_kernel import lane_of, library_of
-from cpg_ros.dynamics.integration.kernel import Ring, System
+from cpg_ros.dynamics.integration.c_kernel import Lane, library_of
 from cpg_ros.dynamics.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
@@ -35,9 +34,8 @@ class Stepper:
 
     Attributes:
         now: x, x', x'' at the output instant, shape (3, components), overwritten by ``advance``.
-        system: network and symmetry lock as kernels take them.
-        ring: history.
-        lane: both, as C takes them.
+        history: ring of states, and of slopes after and before them, (nodes, components) each.
+        lane: network, symmetry lock and history, as C takes them.
         clock: newest node, and model time from the output instant to it, shape (2,).
 
     """
@@ -70,7 +68,6 @@ class Stepper:
         states, slopes = sample_history(history, nodes, step, network.components)
         self._x, self._after, self._before = states, slopes, slopes.copy()
         self.clock = np.array([nodes - 1, 0.0])
-        self._tau = np.empty(1)
         self.now = np.empty((3, network.components))
         self.set(network, gain, symmetry)
         self.advance(0.0)
@@ -93,12 +90,9 @@ class Stepper:
             raise ValueError('a symmetry gain needs the symmetry class')
         self.network, self.gain, self.symmetry = network, gain, symmetry
         self._library = library_of(type(network))
-        self._tau[0] = network.delay
-        self.system = System(
-            network.coefficients, self._tau, float(gain),
-            np.zeros((1, network.components)) if symmetry is None else symmetry.basis)
-        self.ring = Ring(self.step, self._x, self._after, self._before)
-        self.lane = lane_of(type(network), self.system, self.ring)
+        self.history = self._x, self._after, self._before
+        self.lane = Lane(network, float(gain), np.zeros((1, network.components))
+                         if symmetry is None else symmetry.basis, self.step, self.history)
         self._addresses = self.clock.ctypes.data, self.now.ctypes.data
         self._restart()
 
@@ -118,7 +112,7 @@ class Stepper:
     def copy(self) -> 'Stepper':
         """Return an independent stepper in the same state."""
         twin = copy.copy(self)
-        for name in ('_x', '_after', '_before', 'clock', '_tau', 'now'):
+        for name in ('_x', '_after', '_before', 'clock', 'now'):
             setattr(twin, name, getattr(self, name).copy())
         twin.set(self.network, self.gain, self.symmetry)
         return twin

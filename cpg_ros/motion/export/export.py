@@ -28,8 +28,6 @@ import sys
 from cpg_ros.common.command_line import note, number, Parser, refuse_repeated, run, say, table
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
-from cpg_ros.dynamics.integration.simulate import use
 from cpg_ros.motion.export.c_project import CProject, readme, SUBSTEP
 from cpg_ros.motion.export.gait_data import CFormat, GaitData
 from cpg_ros.motion.export.golden import golden_of
@@ -145,7 +143,6 @@ def _title(plans: Sequence[GaitPlan]) -> str:
 
 def _export(args: argparse.Namespace) -> int:
     _refuse_options(args)
-    use(c_kernels)
     plans = _plans(args)
     data = GaitData(plans, CFormat(args.form, args.real, args.tolerance or TOLERANCES[args.real],
                                    args.steering))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The exported C in place of numba's kernels: the same steps, with numba and without."""
+"""The exported C in real time takes the steps of simulations, with numba and without."""
 
 import os
 from pathlib import Path
@@ -22,9 +22,7 @@ import sys
 from c_export import GCC, needs_gcc
 from cpg_ros.common import c_library
 from cpg_ros.common.c_library import NoCompiler
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
-from cpg_ros.dynamics.integration.kernel import numba_kernels, Samples
-from cpg_ros.dynamics.integration.simulate import simulate, use
+from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.motion.pattern import Pattern
@@ -38,70 +36,27 @@ import pytest
 SEED = 3535
 
 
-@pytest.fixture
-def made_by():
-    """Choose what makes the kernels of simulations; numba does again at the end."""
-    yield use
-    use(numba_kernels)
-
-
-NOTHING = Samples(1, *np.empty((2, 0, 0, 0)))
-
-
 @needs_gcc
 @pytest.mark.parametrize('network', ['delayed', 'biped', 'hopf',
                                      *in_depth('quadruped', 'matsuoka', 'phase', 'delayed6')])
-def test_each_step_is_the_one_of_numba(network):
-    """From the same history, with changes of the delay and of the lock in it."""
-    draws, numba = np.random.default_rng(SEED), numba_kernels(find_network(network))
+def test_steps_in_real_time_are_those_of_simulations(network):
+    """From the same history, locked, with delays and coefficients of their own in all lanes."""
+    draws, networks, starts = np.random.default_rng(SEED), [], []
     for preset in find_network(network).presets().values():
-        own, symmetry = preset.network, preset.network.symmetry(preset.gait)
-        one = Stepper(own, 0.3 * draws.uniform(-1.0, 1.0, own.components),
-                      max_delay=2.0 * max(own.delay, own.step))
-        for step in range(60):
-            if step % 20 == 10:
-                longer = {own.delay_parameter: own.delay * draws.uniform(1.0, 2.0)} \
-                    if own.delay else {}
-                one.set(own.replace(**longer), draws.uniform(0.0, 2.0), symmetry)
-            other = one.copy()
-            head = int(other.clock[0])
-            numba.set_slope(other.system, other.ring, head)
-            head = numba.integrate(other.system, other.ring, head, 1, 0.0, np.uint64(0), NOTHING,
-                                   0)
-            one.advance(own.step)
-            assert int(one.clock[0]) == head
-            assert np.abs(one.newest() - other.ring.x[head]).max() < 1e-12
-
-
-@needs_gcc
-@pytest.mark.parametrize('network', ['delayed', 'hopf'])
-def test_batches_are_those_of_numba(network, made_by):
-    """More than one block of lanes, each with a history and a delay of its own."""
-    own = find_network(network).presets()['walk'].network
-    draws = np.random.default_rng(SEED)
-    networks = [own.replace(**{own.delay_parameter: one * own.delay}) if own.delay else own
-                for one in draws.uniform(1.0, 1.5, 11)]
-    starts = 0.1 * draws.uniform(-1.0, 1.0, (11, own.components))
-    lock = 0.5, own.symmetry('walk')
-    found = []
-    for maker in (numba_kernels, c_kernels):
-        made_by(maker)
-        found.append(simulate(networks, starts, 60 * own.step, own.step, lock=lock, every=3))
-        found.append(simulate(own, starts[0], 60 * own.step, own.step))
-    for one, other in zip(found[:2], found[2:], strict=True):
-        assert one.x.shape == other.x.shape and np.ptp(one.x) > 1e-3
-        assert np.abs(one.x - other.x).max() < 1e-11
-
-
-def test_noise_needs_numba():
-    told = without_numba("""
-from cpg_ros import PRESETS, simulate
-trot = PRESETS['delayed']['trot'].network
-try:
-    simulate(trot, [0.1] * trot.components, 1.0, noise=0.1)
-except Exception as error:
-    sys.exit(str(error))""")
-    assert told.stderr == 'noise needs numba: kernels in C have none\n'
+        own = preset.network
+        networks.append(own.replace(**{own.delay_parameter: own.delay * draws.uniform(1.0, 2.0)})
+                        if own.delay else own)
+        starts.append(0.3 * draws.uniform(-1.0, 1.0, own.components))
+    symmetry = networks[0].symmetry(networks[0].gaits()[0])
+    for gain in (0.0, 1.3):
+        runs = simulate(networks, np.array(starts), 60 * own.step, own.step, lock=(gain, symmetry))
+        for one, start, x in zip(networks, starts, runs.x, strict=True):
+            stepper = Stepper(one, start, gain=gain, symmetry=symmetry)
+            single = simulate(one, start, 60 * own.step, own.step, lock=(gain, symmetry))
+            for states in x[1:]:
+                stepper.advance(own.step)
+                assert np.abs(stepper.newest() - states).max() < 1e-12
+            assert np.abs(single.x - x).max() < 1e-12
 
 
 @needs_gcc
@@ -201,9 +156,8 @@ def test_all_gaits_walk_without_numba_as_they_do_with_it(robot, network, duty):
     assert off < 1e-9 and int(faults) == pattern.faults == 1
 
 
-def test_every_network_is_made_in_c_and_solved_by_it(made_by):
+def test_every_network_is_made_in_c_and_solved_by_it():
     """The orbit that C's steps lead to has the period of the one that is solved for."""
-    made_by(c_kernels)
     for name in NETWORKS:
         preset = next(iter(find_network(name).presets().values()))
         orbit = solve_orbit(preset.network, preset.gait)
@@ -217,9 +171,6 @@ SANITIZERS = '-fsanitize=address,undefined', '-fno-sanitize-recover=all'
 STORY = """
 import sys
 import test_core
-from cpg_ros.dynamics.integration.c_kernel import c_kernels
-from cpg_ros.dynamics.integration.simulate import use
-use(c_kernels)
 test_core.tell(sys.argv[1], float(sys.argv[2]), 1)
 """
 

@@ -1,5 +1,5 @@
 
-/* The entry points of integration.kernel, of one lane. */
+/* The entry points of integration.c_kernel in real time. */
 static void begin(cpg_track *t, int head)
 {
     t->head = (int16_t)head;
@@ -30,19 +30,4 @@ void advance(cpg_track *t, cpg_real *clock, cpg_real duration, cpg_real out[3][C
         out[2][i] = ((6.0 * s - 4.0) * after + 6.0 * (1.0 - 2.0 * s) * rise
                      + (6.0 * s - 2.0) * before) / step;
     }
-}
-
-/* Take steps, the first one number `row`, and record states and slopes at regular steps. */
-int steps(cpg_track *t, int head, int count, int every, int row, cpg_real *states,
-          cpg_real *slopes)
-{
-    begin(t, head);
-    for (const int end = row + count; row < end; row++) {
-        cpg_network_step(t);
-        if (row % every == 0) {
-            memcpy(states + row / every * CPG_COMPONENTS, t->x[t->head], sizeof *t->x);
-            memcpy(slopes + row / every * CPG_COMPONENTS, t->slope[t->head], sizeof *t->x);
-        }
-    }
-    return t->head;
 }
