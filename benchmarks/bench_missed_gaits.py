@@ -14,7 +14,8 @@
 
 """Gaits that simulation finds and the solver does not: random sets from twenty starts each.
 
-Six networks, of which the delayed one has delays up to 5, and three of one's own (own_networks).
+Six networks, of which the delayed one has delays up to 5, and six of one's own (own_networks),
+among them relaxation oscillators and one with unlike cells.
 Simulation is of the whole network, held in the gait's class by a symmetry lock; what it does in
 the end is compared with the gait's shifts. A gait that it settles on must be among the ones of
 coexisting_orbits, with its period, and attract in its class. Where it is neutral in its class, a
@@ -42,7 +43,14 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-from own_networks import FhnRing, half_centre, WilsonCowan
+from own_networks import (
+    Brusselators,
+    FhnRing,
+    half_centre,
+    UnlikePairs,
+    VanDerPol,
+    WilsonCowan,
+)
 
 SETS, STARTS = 40, 20
 #: A cycle has a shift where signals differ by less than this fraction of their range.
@@ -104,6 +112,22 @@ def hodgkin_huxley(rng: np.random.Generator) -> Network:
                          float(rng.choice([-75.0, 0.0])))
 
 
+def van_der_pol(rng: np.random.Generator) -> Network:
+    """Relaxation oscillators."""
+    return VanDerPol(rng.uniform(0.5, 8.0), rng.uniform(-0.4, 0.4))
+
+
+def unlike_pairs(rng: np.random.Generator) -> Network:
+    """Extensors that are slower or faster than flexors."""
+    return UnlikePairs(rng.uniform(-0.4, 0.4), rng.uniform(0.3, 1.0), rng.uniform(-0.4, 0.4),
+                       *rng.uniform(0.05, 0.15, 2))
+
+
+def brusselators(rng: np.random.Generator) -> Network:
+    """About where each oscillates by itself."""
+    return Brusselators(rng.uniform(-0.5, 0.5), 1.0, rng.uniform(1.8, 3.5))
+
+
 #: How a network is drawn, from where to where the states of its variables start, and how long it
 #: is simulated for, in model time.
 NETWORKS = {
@@ -118,7 +142,10 @@ NETWORKS = {
                  [(-0.5, 1.0)] * 2, 120.0),
     'fhn_ring': (fhn_ring, [(-2.0, 2.0), (-0.5, 1.5)], 2000.0),
     'wilson_cowan': (wilson_cowan, [(0.0, 1.0)] * 2, 600.0),
-    'half_centre': (hodgkin_huxley, [(-75.0, -30.0), *[(0.0, 1.0)] * 4], 1500.0)}
+    'half_centre': (hodgkin_huxley, [(-75.0, -30.0), *[(0.0, 1.0)] * 4], 1500.0),
+    'van_der_pol': (van_der_pol, [(-2.0, 2.0)] * 2, 800.0),
+    'unlike_pairs': (unlike_pairs, [(-2.0, 2.0), (-0.5, 1.5)], 2000.0),
+    'brusselators': (brusselators, [(0.0, 3.0)] * 2, 600.0)}
 
 
 def turned(signals: np.ndarray, shift: float) -> np.ndarray:
@@ -205,12 +232,13 @@ def main() -> None:
     parser.add_argument('--seed', type=int,
                         default=int(np.random.SeedSequence().entropy % 10**9))
     parser.add_argument('--sets', type=int, default=SETS, help='of each network')
+    parser.add_argument('--quick', action='store_true', help='one set of each network')
     parser.add_argument('--networks', nargs='+', choices=list(NETWORKS),
                         default=list(NETWORKS))
     args = parser.parse_args()
     seed, rng = args.seed, np.random.default_rng(args.seed)
     sets = [(name, NETWORKS[name][0](rng)) for name in args.networks
-            for _ in range(args.sets)]
+            for _ in range(1 if args.quick else args.sets)]
     missed, seen, neutral, slow, second, spent = [], 0, 0, 0, 0, 0.0
     for count, (name, network) in enumerate(sets):
         span = NETWORKS[name][2]

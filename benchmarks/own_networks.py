@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Networks that are none of the package's, for benchmarks: FitzHugh-Nagumo and Wilson-Cowan cells.
+"""Networks that are none of the package's, for benchmarks.
 
-A third one, of Hodgkin-Huxley cells, stands in the tutorial about networks of one's own.
+FitzHugh-Nagumo and Wilson-Cowan cells, relaxation oscillators, unlike cells, and chemical ones.
+One of Hodgkin-Huxley cells stands in the tutorial about networks of one's own.
 """
 
 from dataclasses import dataclass
@@ -138,6 +139,132 @@ class WilsonCowan(Network):
     def presets(cls):
         """Return the walk's."""
         return {'walk': Preset('walk', cls())}
+
+
+@dataclass(frozen=True)
+class VanDerPol(Network):
+    """Two relaxation oscillators: x'' = mu (1 - x^2) x' - x + k (x_other - x)."""
+
+    mu: float = 4.0
+    k: float = -0.1
+
+    name = 'van_der_pol'
+    cells = 2
+    states = ('x', 'y')
+    readout = 'phase'
+    step = 0.005
+    ranges: ClassVar = {'mu': Range(0.0, 20.0, ''), 'k': Range(-1.0, 1.0, 'coupling')}
+    couplings = ('k',)
+    legs: ClassVar = {'ankle': {'left': (1,), 'right': (2,)}}
+    usual_gait = 'walk'
+    free = ('mu', 'k')
+    line = 'mu'
+    span = (-1.0, 5.0)
+
+    @staticmethod
+    def equations(cell, p):
+        """Return the rates."""
+        x, y = cell.now()
+        other, _ = cell.now(OTHER)
+        return y, p.mu * (1.0 - x**2) * y - x + p.k * (other - x)
+
+    @classmethod
+    def gaits(cls):
+        """Return both legs alike, and half a cycle apart."""
+        return tuple(SHIFTS)
+
+    def symmetry(self, gait):
+        """Return by what fraction of a cycle one leg follows the other."""
+        return Symmetry.of(PAIR, {'side': SHIFTS[gait]})
+
+    @classmethod
+    def presets(cls):
+        """Return the same set for both gaits."""
+        return {gait: Preset(gait, cls()) for gait in SHIFTS}
+
+
+@dataclass(frozen=True)
+class UnlikePairs(VanDerPol):
+    """Flexors and extensors that differ: FitzHugh-Nagumo cells, two of each, in two legs.
+
+    v' = v - v^3/3 - w + i + k (v_other_leg - v) - m v_antagonist, w' = eps (v + 0.7 - 0.8 w).
+    """
+
+    mu: ClassVar[float]
+    k: float = -0.2
+    i: float = 0.5
+    m: float = 0.2
+    eps_flexor: float = 0.08
+    eps_extensor: float = 0.12
+
+    name = 'unlike_pairs'
+    cells = 4
+    states = ('v', 'w')
+    step = 0.05
+    ranges: ClassVar = {name: Range(-2.0, 2.0, '') for name in (
+        'k', 'i', 'm', 'eps_flexor', 'eps_extensor')}
+    own_of_cells: ClassVar = {'eps': ('eps_flexor',) * 2 + ('eps_extensor',) * 2}
+    couplings = ('k', 'm')
+    legs: ClassVar = {'ankle': {'left': (1, 3), 'right': (2, 4)}}
+    free = ('i', 'k')
+    line = 'i'
+    span = (-0.5, 0.7)
+
+    @staticmethod
+    def equations(cell, p):
+        """Return the rates."""
+        v, w = cell.now()
+        other, _ = cell.now((1, 0, 3, 2))
+        antagonist, _ = cell.now((2, 3, 0, 1))
+        return (v - v**3 / 3.0 - w + p.i + p.k * (other - v) - p.m * antagonist,
+                p.eps * (v + 0.7 - 0.8 * w))
+
+    def symmetry(self, gait):
+        """Return by what fraction of a cycle one leg follows the other."""
+        return Symmetry.of(Group(4, (('side', (1, 0, 3, 2)),)), {'side': SHIFTS[gait]})
+
+
+@dataclass(frozen=True)
+class Brusselators(VanDerPol):
+    """A ring of three: x' = a - (b + 1) x + x^2 y + k (x_before - x), y' = b x - x^2 y."""
+
+    mu: ClassVar[float]
+    k: float = 0.1
+    a: float = 1.0
+    b: float = 2.5
+
+    name = 'brusselators'
+    cells = 3
+    step = 0.01
+    ranges: ClassVar = {'k': Range(-2.0, 2.0, 'coupling'), 'a': Range(0.0, 5.0, ''),
+                        'b': Range(0.0, 10.0, '')}
+    legs: ClassVar = {'first': {f'leg{n}': (n,) for n in range(1, 4)}}
+    usual_gait = 'wave'
+    free = ('a', 'b')
+    line = 'b'
+    span = (1.0, 4.0)
+
+    @staticmethod
+    def equations(cell, p):
+        """Return the rates."""
+        x, y = cell.now()
+        before, _ = cell.now(lambda number: number - 1)
+        return p.a - (p.b + 1.0) * x + x**2 * y + p.k * (before - x), p.b * x - x**2 * y
+
+    @classmethod
+    def gaits(cls):
+        """Return all alike, and a third of a cycle apart."""
+        return 'hop', 'wave'
+
+    def symmetry(self, gait):
+        """Return by what fraction of a cycle a leg follows the one before it."""
+        return Symmetry.of(Group(3, (('turn', (1, 2, 0)),)),
+                           {'turn': Fraction(self.gaits().index(gait), 3)})
+
+    @classmethod
+    def presets(cls):
+        """Return the same set for both gaits."""
+        return {gait: Preset(gait, cls()) for gait in ('hop', 'wave')}
 
 
 def tutorial_file(folder: str, name: str) -> str:

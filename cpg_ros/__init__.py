@@ -28,13 +28,14 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from cpg_ros.common.errors import CpgError
     from cpg_ros.dynamics.arclength import NoOrbit
-    from cpg_ros.dynamics.continuation import continue_orbit  # noqa: I300
+    from cpg_ros.dynamics.continuation import bifurcations, continue_orbit  # noqa: I300
     from cpg_ros.dynamics.floquet import multipliers
     from cpg_ros.dynamics.hopf import hopf_points
     from cpg_ros.dynamics.integration.simulate import simulate
     from cpg_ros.dynamics.integration.stepper import Stepper
-    from cpg_ros.dynamics.solve_orbit import solve_orbit
-    from cpg_ros.dynamics.stability import stability
+    from cpg_ros.dynamics.phase_response import phase_response
+    from cpg_ros.dynamics.solve_orbit import coexisting_orbits, solve_orbit
+    from cpg_ros.dynamics.stability import stability, verdicts
     from cpg_ros.fitting.inversion.parameter_files import write_fitted
     from cpg_ros.fitting.inversion.recording_fit import fit_recording
     from cpg_ros.fitting.recordings.bag_reader import read_bag
@@ -51,9 +52,10 @@ if TYPE_CHECKING:
 
 __version__ = '0.2.0'
 __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLine', 'Pattern',
-           'Preset', 'Range', 'Stepper', 'Symmetry', 'continue_orbit', 'fit_recording',
-           'hopf_points', 'load_robot', 'multipliers', 'plan', 'read_bag', 'read_csv',
-           'read_recording', 'simulate', 'solve_orbit', 'stability', 'write_fitted']
+           'Preset', 'Range', 'Stepper', 'Symmetry', 'bifurcations', 'coexisting_orbits',
+           'continue_orbit', 'fit_recording', 'hopf_points', 'load_robot', 'multipliers',
+           'phase_response', 'plan', 'read_bag', 'read_csv', 'read_recording', 'simulate',
+           'solve_orbit', 'stability', 'verdicts', 'write_fitted']
 
 _PLACES = {
     'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'common.errors',
@@ -61,13 +63,16 @@ _PLACES = {
     'ParameterLine': 'networks.network', 'Pattern': 'motion.pattern',
     'Preset': 'networks.presets', 'Range': 'networks.definition',
     'Stepper': 'dynamics.integration.stepper', 'Symmetry': 'networks.symmetry',
+    'bifurcations': 'dynamics.continuation', 'coexisting_orbits': 'dynamics.solve_orbit',
     'continue_orbit': 'dynamics.continuation', 'fit_recording': 'fitting.inversion.recording_fit',
     'hopf_points': 'dynamics.hopf', 'load_robot': 'motion.robot_file',
-    'multipliers': 'dynamics.floquet', 'plan': 'motion.plan',
+    'multipliers': 'dynamics.floquet', 'phase_response': 'dynamics.phase_response',
+    'plan': 'motion.plan',
     'read_bag': 'fitting.recordings.bag_reader',
     'read_csv': 'fitting.recordings.csv_reader', 'read_recording': 'fitting.recordings.formats',
     'simulate': 'dynamics.integration.simulate', 'solve_orbit': 'dynamics.solve_orbit',
-    'stability': 'dynamics.stability', 'write_fitted': 'fitting.inversion.parameter_files'}
+    'stability': 'dynamics.stability', 'verdicts': 'dynamics.stability',
+    'write_fitted': 'fitting.inversion.parameter_files'}
 
 
 def __getattr__(name: str) -> object:

@@ -121,7 +121,7 @@ def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
     for first in range(0, count, TOGETHER):
         done(first)
         batch = simulate(network, starts[first:first + TOGETHER], CYCLES * period,
-                         period / (KEPT * every), every=every, progress=False,
+                         period / (KEPT * every), every=every, progress=False, quiet=True,
                          lock=(gain, orbit.symmetry) if gain else None)
         ends.update(end_of(Trajectory(batch.t, x, slopes), orbit)
                     for x, slopes in zip(batch.x, batch.slopes, strict=True))

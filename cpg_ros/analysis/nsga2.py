@@ -105,7 +105,7 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
     step = COARSE_STEPS * network.step
     every = max(1, round(KEPT_FRACTION / step))
     noisy = simulate(network, starts, DURATION, step, noise=NOISE, seed=seed, every=every,
-                     progress=False)
+                     progress=False, quiet=True)
     window = round(CYCLES * orbit.period / (step * every))
     windows = noisy.x[:, :(noisy.t.size - 1) // window * window].reshape(
         RUNS, -1, window, network.components)

@@ -217,6 +217,15 @@ class Branch(ShortRepr):
         """Half the range of cell 1's first variable at the points, shape (points,)."""
         return np.array([point.amplitude for point in self.points])
 
+    @property
+    def table(self) -> dict[str, np.ndarray]:
+        """Columns with a row for each point, for numpy.savez or a data frame.
+
+        Value of the parameter, period in model time, amplitude, and whether it is a fold.
+        """
+        return {'value': self.values, 'period': self.periods, 'amplitude': self.amplitudes,
+                'fold': np.isin(np.arange(len(self.points)), self.fold_indices)}
+
     def at(self, value: float) -> tuple[Orbit, ...]:
         """All orbits of the branch at a value, in its order; at a fold one or two.
 
@@ -478,7 +487,7 @@ def bifurcations(branch: Branch, spectra: Sequence[Multipliers] | None = None,
     Args:
         branch: of orbits.
         spectra: multipliers of its points; by default they are computed.
-        exact: tolerance, as a fraction of the way between two points.
+        exact: tolerance, in ratio to the distance between two points.
 
     """
     subspaces = [spectrum.subspaces for spectrum in spectra or map(

@@ -97,7 +97,7 @@ def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajector
     """Simulate networks from one start each, in one batch on all cores."""
     step = COARSE_STEPS * networks[0].step
     return simulate(networks, starts, SPAN, step, every=max(1, round(KEPT_FRACTION / step)),
-                    progress=False)
+                    progress=False, quiet=True)
 
 
 def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = ALIVE
@@ -202,12 +202,13 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
     early = 0 if network.delay_parameter else SETTLING // 4
     if early:
         # Most states that reach no gait come to rest soon.
-        run = simulate(network, start, early * period, step, lock=lock, progress=False)
+        run = simulate(network, start, early * period, step, lock=lock, progress=False,
+                       quiet=True)
         if _ends(run, run.t.size // 2, np.abs(run.slopes).max()):
             return None
         history = run.x[-1]
     rest = SETTLING + 3 - early
-    run = simulate(network, history, rest * period, step, lock=lock, progress=False)
+    run = simulate(network, history, rest * period, step, lock=lock, progress=False, quiet=True)
     return last_cycle(run, network.cells, int((rest - 3) * period / step), _smallest(run, network))
 
 
@@ -287,7 +288,7 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
             if not histories or (before == last and not longer()):
                 break
             batch = simulate(network, histories, (steps - before) * step, step,
-                             lock=(HOLD, symmetry), progress=False)
+                             lock=(HOLD, symmetry), progress=False, quiet=True)
             if not (before or np.isfinite(batch.x[:, -1]).any()):
                 raise NoOrbit(f'no {gait} was found: simulations with steps of {step:g} model '
                               'time run away from all starts; a stiff network needs a shorter '

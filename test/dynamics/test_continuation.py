@@ -350,3 +350,13 @@ def test_far_from_any_hopf_point_there_is_no_small_orbit():
     point = hopf_point(EXAMPLE, EXAMPLE.symmetry('trot'), 6.3, 0.05)
     with pytest.raises(NoOrbit, match=r'no orbit of amplitude 0.02 was found near tau 0.05'):
         continue_from_hopf(point, TAU, 0.0, 0.1)
+
+
+def test_a_branch_is_a_table_on_disk(tmp_path):
+    walk = PRESETS['delayed']['walk'].network
+    branch = continue_orbit(solve_orbit(walk, 'walk'), 'tau', 0.38, 0.42)
+    np.savez(tmp_path / 'branch.npz', **branch.table)
+    with np.load(tmp_path / 'branch.npz') as stored:
+        assert list(stored['period']) == [point.orbit.period for point in branch.points]
+        assert np.flatnonzero(stored['fold']).tolist() == list(branch.fold_indices)
+        assert stored['value'].shape == stored['amplitude'].shape == (len(branch.points),)

@@ -42,9 +42,10 @@ from cpg_ros.dynamics.stability import lock_rate
 from cpg_ros.networks.network import Network, other_gait
 import numpy as np
 
-#: Labels of a gait at a point. NONE: no orbit; UNSTABLE: unstable in its class; LOCKED: attracts
-#: with a symmetry lock; STABLE: attracts by itself.
-NONE, UNSTABLE, LOCKED, STABLE = range(4)
+#: Labels of a gait at a point. NONE: no orbit; UNSTABLE: unstable in its class; UNSURE: cannot
+#: tell, as a multiplier in its class is 1 to within its error; LOCKED: attracts with a symmetry
+#: lock; STABLE: attracts by itself.
+NONE, UNSTABLE, UNSURE, LOCKED, STABLE = range(5)
 #: KEPT: number of points of a waveform that are kept.
 KEPT = 65
 #: ACCURACY: of multipliers for a map; DOUBTFUL: distance of a leading one from 1 at which all are
@@ -198,8 +199,8 @@ def _assess(orbit: Orbit) -> dict[str, Any]:
     if any(abs(modulus - 1.0) < DOUBTFUL for modulus in (spectrum.leading_within,
                                                          spectrum.leading_transverse)):
         spectrum = multipliers(orbit)
-    return {'label': (STABLE if spectrum.attracts else
-                      LOCKED if spectrum.attracts_within else UNSTABLE),
+    return {'label': STABLE if spectrum.attracts else {
+        True: LOCKED, None: UNSURE, False: UNSTABLE}[spectrum.attracts_within],
             'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
             'leading': spectrum.leading, 'leading_within': spectrum.leading_within,
             'unstable': spectrum.unstable,

@@ -38,7 +38,8 @@ import numpy as np
 
 #: STATES: label of a point -> its colour; LINES: kind of curve -> its colour and style.
 STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
-          'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
+          'cannot tell': '#ced4da', 'attracts with a lock': '#b9d6f2',
+          'attracts by itself': '#2b6cb0'}
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
          'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
@@ -87,7 +88,7 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
               chart.second.low - half[1], chart.second.high + half[1])
     for panel, (gait, sheet) in zip(panels, sheets.items(), strict=False):
         panel.imshow(sheet.label.T, origin='lower', extent=extent, aspect='auto', vmin=-0.5,
-                     vmax=3.5, cmap=ListedColormap(list(STATES.values())), interpolation='nearest')
+                     vmax=4.5, cmap=ListedColormap(list(STATES.values())), interpolation='nearest')
         for curve in curves:
             if gait in curve.gaits:
                 colour, style = LINES[curve.kind]
@@ -129,7 +130,7 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
 
 #: MARK: file that marks a folder with an atlas; PARTS: folder of its finished parts.
 MARK, PARTS = 'atlas.json', 'parts'
-LABEL_NAMES = ('none', 'unstable', 'with lock', 'stable')
+LABEL_NAMES = ('none', 'unstable', 'cannot tell', 'with lock', 'stable')
 
 
 class AtlasFolder:
@@ -155,7 +156,7 @@ class AtlasFolder:
         write_atomically(mark, text)
 
     def _place(self, row: AtlasRow) -> Path:
-        text = json.dumps([row.gait, row.row, row.columns, row.near, row.basin])
+        text = json.dumps([LABEL_NAMES, row.gait, row.row, row.columns, row.near, row.basin])
         return self.folder / PARTS / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json'
 
     def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:

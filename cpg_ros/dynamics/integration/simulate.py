@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from itertools import repeat
 import math
 import os
+import warnings
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError, ShortRepr
@@ -203,9 +204,11 @@ class _Lanes:
 def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
              t_end: float, step: float | None = None, *,
              lock: tuple[float, Symmetry] | None = None,
-             noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
-             ) -> Trajectory:
+             noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True,
+             quiet: bool = False) -> Trajectory:
     """Integrate a network from a history, by RK4 with cubic Hermite delayed values.
+
+    A RuntimeWarning says how many simulations end in states that are not finite.
 
     One network and one history give one trajectory. A sequence of networks, an array of histories
     of shape (batch, components) or a list of histories give a batch, which runs on all cores; a
@@ -223,6 +226,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
         seed: of the noise of the whole batch.
         every: steps between recorded ones; t_end is rounded up to a multiple.
         progress: show a progress bar if the work takes more than about two seconds.
+        quiet: do not warn.
 
     Raises:
         InputError: step or t_end is not positive and finite, a parameter is not finite, or a delay
@@ -248,6 +252,11 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     lanes = _Lanes(networks, histories, float(step), batch, (gain, basis))
     # White noise: a normally distributed kick after each step (Euler-Maruyama).
     states, slopes = lanes.run(rows, every, float(noise) * math.sqrt(step), seed, progress)
+    lost = int((~np.isfinite(states[:batch, -1]).all(axis=1)).sum())
+    if lost and not quiet:
+        warnings.warn(f'{lost} of {batch} simulations end in states that are not finite: the '
+                      f'network runs away, or steps of {step:g} model time are too long for it',
+                      RuntimeWarning, stacklevel=2)
     times = np.arange(rows + 1) * (step * every)
     if isinstance(network, Network) and one_history:
         return Trajectory(times, states[0], slopes[0])

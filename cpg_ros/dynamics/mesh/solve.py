@@ -338,7 +338,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
 def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                 ) -> MeshOrbit | None:
     """Collocate from a simulation over a period from a state near the orbit."""
-    run = simulate(network, start, 1.05 * period, network.step, progress=False)
+    run = simulate(network, start, 1.05 * period, network.step, progress=False, quiet=True)
     return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
 
 

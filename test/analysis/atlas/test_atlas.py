@@ -17,7 +17,7 @@
 from dataclasses import replace
 import json
 
-from cpg_ros.analysis.atlas import atlas, fold_curves
+from cpg_ros.analysis.atlas import atlas, fold_curves, grid
 from cpg_ros.analysis.atlas import orbit_curves as curves
 from cpg_ros.analysis.atlas.chart import chart_of
 from cpg_ros.analysis.atlas.grid import (
@@ -30,9 +30,10 @@ from cpg_ros.analysis.atlas.grid import (
     uncrossed_edges,
 )
 from cpg_ros.analysis.atlas.hopf_curves import curves_from, hopf_curves, hopf_starts
+from cpg_ros.analysis.atlas.map import LABEL_NAMES
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.continuation import continue_orbit
-from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.solve_orbit import solve_orbit, solve_preset
 from cpg_ros.networks.network import ParameterLine
 from cpg_ros.networks.registry import PRESETS
@@ -121,6 +122,14 @@ def test_a_row_is_where_the_formula_says_and_as_orbits_alone_are():
     assert one['period'] == pytest.approx(orbit.period, rel=1e-9)
     assert one['leading'] == pytest.approx(judged.leading, rel=1e-4)
     assert one['unstable'] == judged.unstable == (np.abs(judged.transverse) >= 1.0).sum()
+
+
+def test_a_multiplier_of_1_to_within_its_error_is_no_verdict(monkeypatch):
+    chart = chart_of('delayed', TROT, OVER, (9, 33))
+    monkeypatch.setattr(grid, 'multipliers', lambda orbit, **_: Multipliers(
+        orbit.period, 0.0, np.array([1.0 + 3e-9]), 1.0 + 0.0j, (np.array([0.5]),)))
+    (point,) = assess_row(AtlasRow(chart, 'trot', 5, (16,)))
+    assert LABEL_NAMES[point['label']] == 'cannot tell'
 
 
 def test_a_neutral_multiplier_that_rounding_puts_below_1_crosses_nothing(monkeypatch):

@@ -161,6 +161,13 @@ def test_refuses(network, history, t_end, step, words):
         simulate(network, history, t_end, step)
 
 
+def test_what_runs_away_is_said():
+    growing = replace(WALK, a=9.0)
+    with pytest.warns(RuntimeWarning, match=r'2 of 3 simulations end .* steps of 0\.01 '):
+        run = simulate([growing, WALK, growing], START, 100.0, 0.01)
+    assert [np.isfinite(x[-1]).all() for x in run.x] == [False, True, False]
+
+
 @pytest.mark.parametrize('time', [-0.01, 1.02, np.nan])
 def test_no_value_outside_the_simulated_span(time):
     with pytest.raises(ValueError, match='from 0 to 1'):
