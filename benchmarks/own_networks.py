@@ -85,88 +85,13 @@ class FhnRing(Network):
         return {'walk': Preset('walk', cls())}
 
 
-@dataclass(frozen=True)
-class WilsonCowan(Network):
-    """Two half-centres of excitatory and inhibitory populations (Wilson & Cowan 1972).
+class Pair(Network):
+    """What networks of two legs have in common, of one cell each unless they say otherwise."""
 
-    ``e' = -e + S(a e - b u - k u_other + p)``, ``tau u' = -u + S(c e - d u + q)``, S logistic.
-    """
-
-    a: float = 10.0
-    b: float = 10.0
-    c: float = 10.0
-    d: float = 2.0
-    p: float = 1.0
-    q: float = -3.0
-    k: float = 1.0
-    tau: float = 1.0
-
-    name = 'wilson_cowan'
     cells = 2
-    states = ('e', 'u')
     readout = 'phase'
-    step = 0.02
-    ranges: ClassVar = {'tau': Range(0.1, 10.0, ''), **{
-        name: Range(-50.0, 50.0, '') for name in ('a', 'b', 'c', 'd', 'p', 'q', 'k')}}
-    couplings = ('k',)
-    legs: ClassVar = {'ankle': {'left': (1,), 'right': (2,)}}
-    sides: ClassVar = {'left': 'left', 'right': 'right'}
-    usual_gait = 'walk'
-    free = ('p', 'k')
-    line = 'p'
-    span = (-5.0, 5.0)
-
-    @staticmethod
-    def equations(cell, p):
-        """Return the rates."""
-        def logistic(x):
-            return 0.5 + 0.5 * tanh(0.5 * x)
-        e, u = cell.now()
-        _, u_other = cell.now(OTHER)
-        return (-e + logistic(p.a * e - p.b * u - p.k * u_other + p.p),
-                (-u + logistic(p.c * e - p.d * u + p.q)) / p.tau)
-
-    @classmethod
-    def gaits(cls):
-        """Return both legs alike, and half a cycle apart."""
-        return tuple(SHIFTS)
-
-    def symmetry(self, gait):
-        """Return by what fraction of a cycle one leg follows the other."""
-        return Symmetry.of(PAIR, {'side': SHIFTS[gait]})
-
-    @classmethod
-    def presets(cls):
-        """Return the walk's."""
-        return {'walk': Preset('walk', cls())}
-
-
-@dataclass(frozen=True)
-class VanDerPol(Network):
-    """Two relaxation oscillators: x'' = mu (1 - x^2) x' - x + k (x_other - x)."""
-
-    mu: float = 4.0
-    k: float = -0.1
-
-    name = 'van_der_pol'
-    cells = 2
-    states = ('x', 'y')
-    readout = 'phase'
-    step = 0.005
-    ranges: ClassVar = {'mu': Range(0.0, 20.0, ''), 'k': Range(-1.0, 1.0, 'coupling')}
-    couplings = ('k',)
     legs: ClassVar = {'ankle': {'left': (1,), 'right': (2,)}}
     usual_gait = 'walk'
-    free = ('mu', 'k')
-    line = 'mu'
-    span = (-1.0, 5.0)
-
-    @staticmethod
-    def equations(cell, p):
-        """Return the rates."""
-        x, y = cell.now()
-        other, _ = cell.now(OTHER)
-        return y, p.mu * (1.0 - x**2) * y - x + p.k * (other - x)
 
     @classmethod
     def gaits(cls):
@@ -184,13 +109,79 @@ class VanDerPol(Network):
 
 
 @dataclass(frozen=True)
-class UnlikePairs(VanDerPol):
+class WilsonCowan(Pair):
+    """Two half-centres of excitatory and inhibitory populations (Wilson & Cowan 1972).
+
+    ``e' = -e + S(a e - b u - k u_other + p)``, ``tau u' = -u + S(c e - d u + q)``, S logistic.
+    """
+
+    a: float = 10.0
+    b: float = 10.0
+    c: float = 10.0
+    d: float = 2.0
+    p: float = 1.0
+    q: float = -3.0
+    k: float = 1.0
+    tau: float = 1.0
+
+    name = 'wilson_cowan'
+    states = ('e', 'u')
+    step = 0.02
+    ranges: ClassVar = {'tau': Range(0.1, 10.0, ''), **{
+        name: Range(-50.0, 50.0, '') for name in ('a', 'b', 'c', 'd', 'p', 'q', 'k')}}
+    couplings = ('k',)
+    sides: ClassVar = {'left': 'left', 'right': 'right'}
+    free = ('p', 'k')
+    line = 'p'
+    span = (-5.0, 5.0)
+
+    @staticmethod
+    def equations(cell, p):
+        """Return the rates."""
+        def logistic(x):
+            return 0.5 + 0.5 * tanh(0.5 * x)
+        e, u = cell.now()
+        _, u_other = cell.now(OTHER)
+        return (-e + logistic(p.a * e - p.b * u - p.k * u_other + p.p),
+                (-u + logistic(p.c * e - p.d * u + p.q)) / p.tau)
+
+    @classmethod
+    def presets(cls):
+        """Return the walk's."""
+        return {'walk': Preset('walk', cls())}
+
+
+@dataclass(frozen=True)
+class VanDerPol(Pair):
+    """Two relaxation oscillators: x'' = mu (1 - x^2) x' - x + k (x_other - x)."""
+
+    mu: float = 4.0
+    k: float = -0.1
+
+    name = 'van_der_pol'
+    states = ('x', 'y')
+    step = 0.005
+    ranges: ClassVar = {'mu': Range(0.0, 20.0, ''), 'k': Range(-1.0, 1.0, 'coupling')}
+    couplings = ('k',)
+    free = ('mu', 'k')
+    line = 'mu'
+    span = (-1.0, 5.0)
+
+    @staticmethod
+    def equations(cell, p):
+        """Return the rates."""
+        x, y = cell.now()
+        other, _ = cell.now(OTHER)
+        return y, p.mu * (1.0 - x**2) * y - x + p.k * (other - x)
+
+
+@dataclass(frozen=True)
+class UnlikePairs(Pair):
     """Flexors and extensors that differ: FitzHugh-Nagumo cells, two of each, in two legs.
 
     v' = v - v^3/3 - w + i + k (v_other_leg - v) - m v_antagonist, w' = eps (v + 0.7 - 0.8 w).
     """
 
-    mu: ClassVar[float]
     k: float = -0.2
     i: float = 0.5
     m: float = 0.2
@@ -225,20 +216,21 @@ class UnlikePairs(VanDerPol):
 
 
 @dataclass(frozen=True)
-class Brusselators(VanDerPol):
+class Brusselators(Pair):
     """A ring of three: x' = a - (b + 1) x + x^2 y + k (x_before - x), y' = b x - x^2 y."""
 
-    mu: ClassVar[float]
     k: float = 0.1
     a: float = 1.0
     b: float = 2.5
 
     name = 'brusselators'
     cells = 3
+    states = ('x', 'y')
     step = 0.01
     ranges: ClassVar = {'k': Range(-2.0, 2.0, 'coupling'), 'a': Range(0.0, 5.0, ''),
                         'b': Range(0.0, 10.0, '')}
     legs: ClassVar = {'first': {f'leg{n}': (n,) for n in range(1, 4)}}
+    couplings = ('k',)
     usual_gait = 'wave'
     free = ('a', 'b')
     line = 'b'

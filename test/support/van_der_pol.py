@@ -15,35 +15,26 @@
 """A pair of van der Pol oscillators, in any units of its variables and of time."""
 
 from dataclasses import dataclass
-from fractions import Fraction
 
-from cpg_ros.networks.network import Network, Preset, Range
-from cpg_ros.networks.symmetry import Group, Symmetry
-
-OTHER = (1, 0)
-PAIR = Group(2, (('side', OTHER),))
-SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
+from cpg_ros.networks.definition import Range
+from cpg_ros.networks.network import Preset
+from two_sided import OTHER, TwoSided
 
 
 def van_der_pol(size, time):
     """Return the class of a pair of oscillators x'' = (mu - x^2) x' - x + k (x_other - x)."""
     @dataclass(frozen=True)
-    class Pair(Network):
+    class Pair(TwoSided):
         mu: float
         k: float
 
         name = f'van_der_pol_{size:g}_{time:g}'.translate(str.maketrans('-.+', '___'))
-        cells = 2
-        states = ('x', 'y')
-        readout = 'phase'
         step = 0.01 * time
         ranges = {'mu': Range(-10.0, 10.0, 'parameter'), 'k': Range(-5.0, 5.0, 'weight')}
         couplings = ('k',)
-        legs = {'ankle': {'left': (1,), 'right': (2,)}}
         usual_gait = 'walk'
         free = ('mu', 'k')
         line = 'mu'
-        span = (-1.0, 3.0)
 
         @staticmethod
         def equations(cell, p):
@@ -51,13 +42,6 @@ def van_der_pol(size, time):
             other, _ = (value / size for value in cell.now(OTHER))
             return (size / time * y,
                     size / time * ((p.mu - x**2) * y - x + p.k * (other - x)))
-
-        @classmethod
-        def gaits(cls):
-            return tuple(SHIFTS)
-
-        def symmetry(self, gait):
-            return Symmetry.of(PAIR, {'side': SHIFTS[gait]})
 
         @classmethod
         def presets(cls):

@@ -112,7 +112,7 @@ def library_of(network: type[Network]) -> ctypes.CDLL:
     return library
 
 
-class Block(ctypes.Structure):
+class LaneBlock(ctypes.Structure):
     """The struct ``block`` of ``c/lanes.c``: some lanes, and addresses of their arrays."""
 
     _fields_ = [*((name, ctypes.c_void_p) for name in ('p', 'delay', 'basis', 'x', 'after',
@@ -127,7 +127,7 @@ def lanes_of(network: type[Network], lanes: int) -> ctypes.CDLL:
     library = load(generated.folder(equations_of(network).key), f'lanes{lanes}-{version()}',
                    lambda: _lane_sources(network, lanes),
                    f"the kernels of the network '{network.name}'", NATIVE)
-    block, pointer, whole = ctypes.POINTER(Block), ctypes.c_void_p, ctypes.c_int
+    block, pointer, whole = ctypes.POINTER(LaneBlock), ctypes.c_void_p, ctypes.c_int
     library.begin.argtypes = block, whole
     library.steps.argtypes = (block, whole, whole, pointer, whole, whole, whole, pointer, pointer)
     return library

@@ -24,7 +24,7 @@ import warnings
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.dynamics.integration.c_kernel import Block, LANES, lanes_of, ONE
+from cpg_ros.dynamics.integration.c_kernel import LaneBlock, LANES, lanes_of, ONE
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -162,7 +162,7 @@ class _Lanes:
             self._ring[:, block, :, :, lane] = past, slopes, slopes
         self._library = lanes_of(type(networks[0]), lanes)
         self._gain, self._basis = lock[0], np.ascontiguousarray(lock[1])
-        self._blocks = [Block(*(array.ctypes.data for array in (
+        self._blocks = [LaneBlock(*(array.ctypes.data for array in (
             self._p[k], self._tau[k], self._basis, *self._ring[:, k])), self._gain, step,
             len(self._basis), nodes) for k in range(blocks)]
 
