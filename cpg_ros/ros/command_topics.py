@@ -25,6 +25,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import LARGEST
 from cpg_ros.ros.generator_io import COMMAND_TOPICS, joint_state
 from cpg_ros.ros.node.message_block import indices, MessageBlock, Template
+from cpg_ros.ros.node.parameters import Spec
 from cpg_ros.ros.node.polled import PolledSubscription
 import numpy as np
 from rclpy.node import Node
@@ -101,13 +102,87 @@ class HeldSubscription:
         return np.array(message.position)
 
 
-KINDS = ('joint_states', *COMMAND_TOPICS)
-#: Least time between two warnings about commands, s.
+#: Least time between two warnings about messages, s.
 QUIET = 10.0
 
 
 class _Bad(CpgError):
     """A message that cannot be used."""
+
+
+# The topic ``feedforward/joint_states``: torques of another node, beside the joints' targets.
+
+FEEDFORWARD_TOPIC = 'feedforward/joint_states'
+FEEDFORWARD = Spec(0.0, f"largest torque that messages on {FEEDFORWARD_TOPIC} may add, as a "
+                   "fraction of the motors' limits; 0 ignores them", 0.0, 1.0)
+#: FEEDFORWARD_TIMEOUT: time without a message after which torques fall to 0, s; FEEDFORWARD_RISE:
+#: time in which a torque passes from 0 to its limit, s.
+FEEDFORWARD_TIMEOUT, FEEDFORWARD_RISE = 0.05, 0.05
+
+
+class FeedforwardSubscription:
+    """Receives torques that the motors add to those of their targets.
+
+    A message has ``effort`` of any of the joints; the others get none.
+
+    Attributes:
+        topic: resolved name.
+        torque: what the motors add now, N m, shape (joints,).
+
+    """
+
+    def __init__(self, node: Node, joints: Sequence[str], limit: np.ndarray) -> None:
+        """Subscribe; ``limit`` are the largest torques of ``joints``, N m, finite."""
+        self._node, self._limit = node, limit
+        self._subscription = PolledSubscription(node, JointState, FEEDFORWARD_TOPIC)
+        self.topic = self._subscription.topic
+        self._index = {name: k for k, name in enumerate(joints)}
+        self.torque, self._goal = np.zeros((2, len(joints)))
+        self._received, self._before = -math.inf, math.inf
+
+    def receive(self, now: float, active: bool = True) -> np.ndarray:
+        """Return ``torque``, which follows the newest message within the limits.
+
+        It fades to 0 where that message is old or cannot be used, or where not ``active``.
+
+        Args:
+            now: s, from any origin.
+            active: whether torques may act.
+
+        """
+        if (message := self._subscription.newest()) is not None:
+            self._received = now
+            try:
+                self._goal = self._read(message)
+            except _Bad as error:
+                self._goal = np.zeros(len(self._limit))
+                self._node.get_logger().warning(f'ignored: {error}', throttle_duration_sec=QUIET)
+        valid = active and 0.0 <= now - self._received < FEEDFORWARD_TIMEOUT
+        step = self._limit * min(max(now - self._before, 0.0) / FEEDFORWARD_RISE, 1.0)
+        self._before = now
+        self.torque = self.torque + np.clip(self._goal * valid - self.torque, -step, step)
+        return self.torque
+
+    def _read(self, message: JointState) -> np.ndarray:
+        """Return the torques of a message, N m, shape (joints,); raise _Bad if it has others."""
+        names, efforts = message.name, message.effort
+        if len(efforts) != len(names):
+            raise _Bad(f'{self.topic}: {len(efforts)} efforts for {len(names)} joints')
+        goal = np.zeros(len(self._limit))
+        for name, effort in zip(names, efforts, strict=True):
+            if name not in self._index:
+                raise _Bad(f"{self.topic}: joint '{name}' is not one of {', '.join(self._index)}")
+            if names.count(name) != 1:
+                raise _Bad(f"{self.topic}: joint '{name}' is there twice")
+            if not math.isfinite(effort):
+                raise _Bad(f"{self.topic}: joint '{name}' with {effort} N m")
+            goal[self._index[name]] = effort
+        return np.clip(goal, -self._limit, self._limit)
+
+
+# The target angles, in messages of any of KINDS.
+
+KINDS = ('joint_states', *COMMAND_TOPICS)
 
 
 class Commands:

@@ -23,7 +23,14 @@ import time
 
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
-from cpg_ros.ros.command_topics import Commands, HeldSubscription, KINDS, KpScaleSubscription
+from cpg_ros.ros.command_topics import (
+    Commands,
+    FEEDFORWARD,
+    FeedforwardSubscription,
+    HeldSubscription,
+    KINDS,
+    KpScaleSubscription,
+)
 from cpg_ros.ros.feedback.odometry import has_transforms, odometry, PERIOD, transform
 from cpg_ros.ros.generator_io import foot_wrenches, joint_state, labelled, STAMPED
 from cpg_ros.ros.node.health import Health, HealthPublisher, OtherPublishers
@@ -232,6 +239,7 @@ SPECS = fixed({
     'kp': Spec(0.0, "proportional gain of the joints [N m / rad]; 0 scales a Go2's gain to the "
                "robot's mass", 0.0, 1e5),
     'kd': Spec(0.0, 'damping gain of the joints [N m s / rad]; 0 likewise', 0.0, 1e4),
+    'feedforward': FEEDFORWARD,
     'rate': Spec(500.0, 'rate of reading commands and publishing states, in simulated time [Hz]',
                  1.0, 2000.0),
     'timestep': Spec(0.002, 'time step of the physics [s]; the period of rate must be a multiple '
@@ -349,6 +357,7 @@ class RobotSim(StartedNode):
                                    partial(self._find_lack, clock), self._move, self._fail,
                                    factor)
         self._kp_scale = KpScaleSubscription(self)
+        self._feedforward = self._take_torques(self._value('feedforward'))
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_subscription(String, 'cpg_generator/gait',
@@ -371,6 +380,17 @@ class RobotSim(StartedNode):
             set_friction(body.model, friction)
         body.load(self._value('payload'))
         return body
+
+    def _take_torques(self, share: float) -> FeedforwardSubscription | None:
+        """Subscribe to torques up to a share of the motors' limits; to none if that is 0."""
+        if not share:
+            return None
+        names, limits = self._body.robot.order, self._body.torque_limits
+        if unlimited := [name for name, limit in zip(names, limits, strict=True)
+                         if not np.isfinite(limit)]:
+            raise StartError(f"feedforward is a fraction of the motors' limits: the model has "
+                             f'none for {", ".join(unlimited)}')
+        return FeedforwardSubscription(self, names, share * limits)
 
     # -- requests -------------------------------------------------------------------------
 
@@ -423,8 +443,10 @@ class RobotSim(StartedNode):
             self._requests.popleft()()
         if self._held is not None and (angles := self._held.receive()) is not None:
             body.hold(angles)
+        torque = (0.0 if self._feedforward is None else
+                  self._feedforward.receive(self._now / self._rate))
         for _ in range(self._steps):
-            body.command(self._approach.towards(self._commands.angles))
+            body.command(self._approach.towards(self._commands.angles), torque)
             body.step()
         self._now += 1
         # MuJoCo resets itself then: its time shows that, at little cost.

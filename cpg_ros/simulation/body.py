@@ -70,6 +70,7 @@ class Body:
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.order_indices]
         self._kp, self._kp_scale = self.model.actuator_gainprm[:, 0].copy(), 1.0
+        self._added: np.ndarray | float = 0.0
         count, n = len(robot.legs), len(robot.order)
         joints = self.model.actuator_trnid[:n, 0]
         self._held = list(robot.held.values())
@@ -128,9 +129,18 @@ class Body:
         return min(mujoco.mj_geomDistance(model, data, plane, geom, 100.0, None)
                    for plane in planes for geom in own)
 
-    def command(self, angles: np.ndarray) -> None:
-        """Set the target angles of the joints, rad, shape (joints,)."""
-        self._control[:] = angles
+    def command(self, angles: np.ndarray, torque: np.ndarray | float = 0.0) -> None:
+        """Set the target angles of the joints, rad, and torques to add, N m, shape (joints,)."""
+        # As part of the motor's force, which its limits confine.
+        self._added = torque / (self._kp_scale * self._kp[:len(angles)])
+        self._control[:] = angles + self._added
+
+    @property
+    def torque_limits(self) -> np.ndarray:
+        """Largest torques of the motors, N m, shape (joints,); inf for those without a limit."""
+        motors, n = self.model, len(self.stand)
+        return np.where(motors.actuator_forcelimited[:n], abs(motors.actuator_forcerange[:n]).min(
+            axis=1), math.inf)
 
     def hold(self, angles: np.ndarray) -> None:
         """Set the target angles of joints of no leg, rad, in the order of ``robot.held``."""
@@ -253,7 +263,7 @@ class Body:
         assert self._height is not None
         mujoco, posed = engine(), self._posed
         posed.qpos[self._at] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-        posed.qpos[self._angles] = self._control
+        posed.qpos[self._angles] = self._control - self._added
         mujoco.mj_kinematics(self.model, posed)
         return -self._clearance(posed) < FOLDED * self._height
 

@@ -37,9 +37,10 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
          'assume_stand': 'true'},
         {'robot': 'unitree_go2', 'feedback.enabled': 'true', 'combined_topic': '""',
          'feedback.odometry_topic': 'odom', 'stamped': 'true'})),
-    'robot_sim': (RobotSim, ({'clock': 'true', 'stamped': 'true'}, {'command': 'joint_trajectory'},
-                             {'command': 'forward_position'})),
-    'unitree_bridge': (UnitreeBridge, ({'stamped': 'true'}, {'command': 'joint_trajectory'},
+    'robot_sim': (RobotSim, ({'clock': 'true', 'stamped': 'true', 'feedforward': '0.5'},
+                             {'command': 'joint_trajectory'}, {'command': 'forward_position'})),
+    'unitree_bridge': (UnitreeBridge, ({'stamped': 'true', 'feedforward': '0.5'},
+                                       {'command': 'joint_trajectory'},
                                        {'command': 'forward_position'})),
     'inversion': (Inversion, ({},))}
 #: Topics whose names are the same in every namespace.

@@ -23,6 +23,7 @@ import sys
 from types import ModuleType
 
 from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.ros.bridges.unitree.messages import MODELS
 from cpg_ros.ros.generator_io import COMMAND_TOPICS
 from launch_files import of_generator, Stub
 import pytest
@@ -44,26 +45,38 @@ BROKEN = {'size_gt': lambda value, limit: len(value) <= limit[0],
           'one_of': lambda value, limit: value not in limit[0]}
 
 
-def controllers(page):
+def controllers(page, first='controller_manager'):
     (text,) = [one.text for one in blocks(str(page.relative_to(ROOT)))
-               if one.text.startswith('controller_manager:')]
-    return {name: part['ros__parameters'] for name, part in yaml.safe_load(text).items()}
+               if one.text.startswith(f'{first}:')]
+    return {name: flat(part['ros__parameters']) for name, part in yaml.safe_load(text).items()}
 
 
-def leaves(schema, before=''):
-    """Return name -> description of each parameter; of those for each joint, nothing."""
+def flat(parameters, before=''):
+    """Return name -> value, as ROS reads nested parameters."""
+    found = {}
+    for name, value in parameters.items():
+        found |= (flat(value, f'{before}{name}.') if isinstance(value, dict)
+                  else {f'{before}{name}': value})
+    return found
+
+
+def leaves(schema, joints, before=''):
+    """Return name -> description of each parameter."""
     found = {}
     for name, part in schema.items():
         if name == '__map_joints':
-            continue
-        found |= ({f'{before}{name}': part} if 'type' in part and isinstance(part['type'], str)
-                  else leaves(part, f'{before}{name}.'))
+            for joint in joints:
+                found |= leaves(part, joints, f'{before}{joint}.')
+        elif 'type' in part and isinstance(part['type'], str):
+            found[f'{before}{name}'] = part
+        else:
+            found |= leaves(part, joints, f'{before}{name}.')
     return found
 
 
 def faults(schema, given):
     """Return what is wrong with parameters by generate_parameter_library's schema."""
-    known, found = leaves(schema), []
+    known, found = leaves(schema, given.get('joints', ())), []
     for name, value in given.items():
         if name not in known:
             found.append(f'{name}: unknown')
@@ -95,20 +108,24 @@ constraints: {goal_time: {type: double, default_value: 0.0},
     ({'joints': ['a'], 'constraints.goal_time': 1}, ['constraints.goal_time: 1 is not a double']),
     ({'joints': ['a'], 'interfaces': ['effort']}, ["interfaces: ['effort'] is against subset_of"]),
     ({'joints': ['a'], 'method': 'x'}, ["method: 'x' is against one_of"]),
+    ({'joints': ['a'], 'constraints.a.goal': 0.1}, []),
+    ({'joints': ['a'], 'constraints.b.goal': 0.1}, ['constraints.b.goal: unknown']),
     ({'joints': ['a'], 'joint': 'b'}, ['joint: unknown'])])
 def test_the_check_itself(given, wrong):
     assert faults(SCHEMA, given) == wrong
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
-@pytest.mark.parametrize('name', CONTROLLERS)
-def test_controllers_have_the_parameters_of_their_schemas(page, name):
+@pytest.mark.parametrize(('page', 'name', 'first'), [
+    *((page, name, 'controller_manager') for page in PAGES for name in CONTROLLERS),
+    (PAGE, 'joint_trajectory_controller', 'joint_trajectory_controller')])
+def test_controllers_have_the_parameters_of_their_schemas(page, name, first):
     folder = os.environ.get('ROS2_CONTROLLERS')
     if not folder:
         pytest.skip('ROS2_CONTROLLERS names no folder with the sources of ros2_controllers')
     package = CONTROLLERS[name]
     path = Path(folder) / package / 'src' / f'{package}_parameters.yaml'
-    assert faults(yaml.safe_load(path.read_text())[package], controllers(page)[name]) == []
+    given = controllers(page, first)[name]
+    assert faults(yaml.safe_load(path.read_text())[package], given) == []
 
 
 @pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
@@ -117,8 +134,18 @@ def test_joints_are_those_of_the_robot_file_in_its_order(page):
     for name in CONTROLLERS:
         assert tuple(found[name]['joints']) == GO2.order
         package = CONTROLLERS[name]
-        assert found['controller_manager'][name]['type'].startswith(f'{package}/')
+        assert found['controller_manager'][f'{name}.type'].startswith(f'{package}/')
     assert type(found['controller_manager']['update_rate']) is int
+
+
+def test_torques_of_motors_are_held_to_those_of_the_bridge():
+    given = controllers(PAGE, 'joint_trajectory_controller')['joint_trajectory_controller']
+    assert tuple(given['joints']) == GO2.order
+    limits = dict(zip(MODELS['go2'].joints, [*MODELS['go2'].torque] * 4, strict=True))
+    for name in GO2.order:
+        assert given[f'gains.{name}.p'] == 60.0 and given[f'gains.{name}.d'] == 2.0
+        assert given[f'gains.{name}.u_clamp_max'] == -given[f'gains.{name}.u_clamp_min'] == (
+            limits[name])
 
 
 def test_the_controllers_listen_where_the_generator_publishes():

@@ -81,6 +81,7 @@ class Hanging:
         self.position, self.velocity, self.torque = np.zeros((3, len(stand)))
         self.quaternion, self.twist, self.base = np.array([1.0, 0, 0, 0]), np.zeros(6), np.ones(3)
         self.kp, self.kd, self._target = np.zeros((3, len(stand)))
+        self.added = 0.0
 
     def command(self, angles):
         self._target = angles
@@ -88,7 +89,7 @@ class Hanging:
     def step(self):
         # kg m^2, backward in time, so that no gain is too high.
         inertia = 0.01 + 0.001 * self._limit
-        force = self.kp * (self._target - self.position)
+        force = self.kp * (self._target - self.position) + self.added
         before = self.velocity
         self.velocity = (before + DT / inertia * force) / (
             1.0 + DT / inertia * (self.kd + DT * self.kp))
@@ -170,13 +171,14 @@ class StandIn(threading.Thread):
         _, x, y, _ = self.body.quaternion.tolist()
         return 1.0 - 2.0 * (x * x + y * y) < 0.7
 
-    def _drive(self, q, kp, kd):
-        """Drive the joints, torque = kp (q - angle) - kd speed, within what they bear."""
+    def _drive(self, q, kp, kd, tau=0.0):
+        """Drive the joints, torque = kp (q - angle) - kd speed + tau, within what they bear."""
         if self.humanoid:
-            self.body.kp, self.body.kd = kp, kd
+            self.body.kp, self.body.kd, self.body.added = kp, kd, tau
         else:
             model = self.body.model
             model.actuator_gainprm[:, 0] = kp
+            model.actuator_biasprm[:, 0] = tau
             model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -kp, -kd
         self.body.command(q)
 
@@ -222,16 +224,16 @@ class StandIn(threading.Thread):
         assert (motors[:, 0] == 1).all()
         q, dq, tau, kp, kd = motors[:, 1:6].T
         angle, speed = self.body.position, self.body.velocity
-        assert not dq.any() and not tau.any()
-        torque = kp * (q - angle) - kd * speed
-        old_q, _, old_kp, old_kd = self._before
-        step = np.abs(torque - (old_kp * (old_q - angle) - old_kd * speed))
+        assert not dq.any()
+        torque = kp * (q - angle) - kd * speed + tau
+        old_q, old_tau, old_kp, old_kd = self._before
+        step = np.abs(torque - (old_kp * (old_q - angle) - old_kd * speed + old_tau))
         self._rows[self._count] = (now, kp.max(), (np.abs(torque) / self.limit).max(),
                                    step.max(), kd.max(), q[0])
         self._count += 1
-        self._before = np.array([q, dq, kp, kd])
-        self.q, self.kp, self.kd = q, kp, kd
-        self._drive(q, kp, kd)
+        self._before = np.array([q, tau, kp, kd])
+        self.q, self.tau, self.kp, self.kd = q, tau, kp, kd
+        self._drive(q, kp, kd, tau)
 
     def _state(self):
         body = self.body

@@ -39,7 +39,12 @@ from cpg_ros.ros.bridges.watchdog_link import (
     RobotInterface,
     WatchdogLink,
 )
-from cpg_ros.ros.command_topics import Commands, KINDS, KpScaleSubscription
+from cpg_ros.ros.command_topics import (
+    Commands,
+    FeedforwardSubscription,
+    KINDS,
+    KpScaleSubscription,
+)
 from cpg_ros.ros.node.health import Health, HealthPublisher, NAMELESS, others_on, STEADY
 from cpg_ros.ros.node.node_base import StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, Spec
@@ -181,6 +186,13 @@ class BridgeNode(StartedNode):
         self._commands = Commands(self, self.robot, value('command'), period,
                                   settings.stand[self._driven].take(self._order.argsort()))
         self._kp_scale = KpScaleSubscription(self)
+        self._feedforward: FeedforwardSubscription | None = None
+        self._followed = list(self._commands.topics)
+        # Bridges of motors that take no torques lack the parameter.
+        if 'feedforward' in self.specs and (share := value('feedforward')):
+            self._feedforward = FeedforwardSubscription(self, settings.names,
+                                                        share * settings.torque)
+            self._followed.append(self._feedforward.topic)
         self._every = (max(1, round(value('rate') / value('sensor_rate')))
                        if 'sensor_rate' in self.specs else 1)
         self._requests: deque[Callable[[float], None]] = deque()
@@ -284,7 +296,7 @@ class BridgeNode(StartedNode):
     def dry_report(self) -> str:
         """Return what the last command would demand of the motors, for the log of a dry run."""
         command, robot = self.supervisor.command, self.supervisor.robot
-        torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
+        torque = command.kp * (command.q - robot.q) - command.kd * robot.dq + command.tau
         return f'the largest torque would be {abs(torque).max():.1f} N m'
 
     # -- the thread -----------------------------------------------------------------------
@@ -294,6 +306,9 @@ class BridgeNode(StartedNode):
         self._receive_state(now)
         self._receive_targets(now)
         supervisor.kp_scale = self._kp_scale.receive(now)
+        if self._feedforward is not None:
+            supervisor.feedforward = self._feedforward.receive(
+                now, supervisor.state is BridgeState.FOLLOWING)
         while self._requests:
             self._requests.popleft()(now)
         # Before anything is sent: joints that have given way must not be driven back at once.
@@ -486,7 +501,7 @@ class BridgeNode(StartedNode):
         if names := self._others():
             return (f'another node commands the robot: {names}',
                     names == self.get_fully_qualified_name())
-        for topic in self._commands.topics if self._value('exclusive') else ():
+        for topic in self._followed if self._value('exclusive') else ():
             if names := others_on(self, topic, 0, 1):
                 return (f'{topic} is published by {names}: only one may publish it (exclusive)',
                         len(set(names.split(', '))) == 1)
@@ -521,6 +536,7 @@ class BridgeNode(StartedNode):
             'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
             'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
             'largest tracking error [rad]': supervisor.tracking.worst,
+            'largest feed-forward torque [N m]': f'{abs(supervisor.feedforward).max():.1f}',
             **self.measured_values()}
 
     # -- beginning and end ----------------------------------------------------------------
@@ -531,7 +547,7 @@ class BridgeNode(StartedNode):
             signal.signal(number, self._leave)
         self.get_logger().info(
             f"{'dry run: ' * self.dry}a {self.title} at {self._value('rate'):g} Hz; "
-            'commands from ' + ', '.join(self._commands.topics))
+            'commands from ' + ', '.join(self._followed))
         self.ticker.start()
         if self._value('autostart'):
             self._begin_start()

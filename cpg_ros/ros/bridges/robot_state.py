@@ -20,7 +20,7 @@ from typing import Any
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.motion.robot import Robot
-from cpg_ros.ros.command_topics import KINDS
+from cpg_ros.ros.command_topics import FEEDFORWARD, KINDS
 from cpg_ros.ros.node.parameters import one_of, Spec
 import numpy as np
 
@@ -38,6 +38,7 @@ def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
                         constraints=one_of(KINDS)),
         'torque_factor': Spec(1.0, "fraction of the motors' torque limits that commands may use",
                               0.1, 1.0),
+        'feedforward': FEEDFORWARD,
         'rate': Spec(500.0, 'commands per second [Hz]', 100.0, 1000.0),
         'sensor_rate': Spec(500.0, 'measured states published per second, at most [Hz]', 1.0,
                             1000.0),

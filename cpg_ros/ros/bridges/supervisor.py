@@ -242,6 +242,7 @@ class Supervisor:
         reason: for this state.
         tracking: distances of joints from their commanded angles.
         kp_scale: factor of kp while the robot follows targets, up to the settings' most_kp.
+        feedforward: torques to add, N m, shape (joints,), as far as the limits allow.
 
     """
 
@@ -255,6 +256,7 @@ class Supervisor:
         self.tracking = TrackingMonitor(settings)
         self._checks = SafetyChecks(settings, robot)
         self.state, self.reason, self.kp_scale = BridgeState.IDLE, '', 1.0
+        self.feedforward = np.zeros(len(settings.names))
         self._at = self._from = settings.stand
         self._began = self._before = 0.0
         self._fades, self._gathered = False, 0.0
@@ -434,8 +436,9 @@ class Supervisor:
         if self.kp_scale != 1.0 and self.state is BridgeState.FOLLOWING:
             kp = np.maximum(kp, np.minimum(self.kp_scale * kp, settings.most_kp))
         braking, stiffness = kd * robot.dq, np.maximum(kp, 1e-9)
-        least = robot.q + (braking - settings.torque) / stiffness
-        most = robot.q + (braking + settings.torque) / stiffness
+        low, high = braking - settings.torque, braking + settings.torque
+        tau = np.minimum(np.maximum(self.feedforward, low), high)
+        least, most = robot.q + (low - tau) / stiffness, robot.q + (high - tau) / stiffness
         command.q[:] = np.minimum(np.maximum(self._at, least), most)
-        command.dq[:] = command.tau[:] = 0.0
+        command.dq[:], command.tau[:] = 0.0, tau
         command.kp[:], command.kd[:] = kp, kd

@@ -260,9 +260,13 @@ def test_it_does_not_rise_in_danger_and_rises_after_it():
 
 @pytest.mark.parametrize('seed', range(5))
 def test_no_command_asks_for_more_torque_than_joints_bear(seed):
-    """Whatever is measured and asked for: |kp (q - angle) - kd speed| is within the limits."""
+    """Whatever is measured and asked for: |kp (q - angle) - kd speed + tau| is within the limits.
+
+    One motor has no stiffness.
+    """
     rng = np.random.default_rng(seed)
-    rig = Rig().following()
+    kp = np.where(np.arange(12) == seed, 0.0, 60.0)
+    rig = Rig(settings=replace(GO2, kp=kp)).following()
     limit = np.tile([23.7, 23.7, 45.43], 4)
     for _ in range(300):
         rig.state.q[:] = rng.uniform(GO2.lower, GO2.upper)
@@ -271,16 +275,18 @@ def test_no_command_asks_for_more_torque_than_joints_bear(seed):
         rig.machine.state_received(rig.now)
         rig.machine.set_target(GO2.stand + 0.1 + rng.uniform(-0.05, 0.05, 12), rig.now)
         rig.machine.kp_scale = rng.choice([1.0, 2.0, 4.0])
+        rig.machine.feedforward = rng.uniform(-1.0, 1.0, 12) * limit
         rig.machine.step(rig.now)
         command, state = rig.machine.command, rig.state
-        assert (command.kp == min(60.0 * rig.machine.kp_scale, 150.0)).all()
-        torque = command.kp * (command.q - state.q) - command.kd * state.dq
+        assert (command.kp == np.minimum(kp * rig.machine.kp_scale, 150.0)).all()
+        assert command.tau.any()
+        torque = command.kp * (command.q - state.q) - command.kd * state.dq + command.tau
         assert (np.abs(torque) <= limit * (1.0 + 1e-4)).all()
     assert rig.machine.state is BridgeState.FOLLOWING
     rig.machine.damp(rig.now, 'now')
     rig.machine.step(rig.now)
     assert (np.abs(command.kd * state.dq) <= limit * (1.0 + 1e-4)).all()
-    assert not command.kp.any()
+    assert not command.kp.any() and not command.tau.any()
 
 
 @pytest.mark.parametrize(('kp', 'words'), [

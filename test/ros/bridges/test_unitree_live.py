@@ -15,6 +15,7 @@
 """The bridge beside a stand-in robot and a real generator, as processes on a real ROS graph."""
 
 import importlib.util
+import math
 import os
 import signal
 import time
@@ -22,7 +23,7 @@ import time
 from graph import free_domain, Process, until
 import numpy as np
 import pytest
-from sensor_msgs.msg import BatteryState, Imu
+from sensor_msgs.msg import BatteryState, Imu, JointState
 from stand_in import StandIn
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
@@ -115,6 +116,45 @@ def suffer(walk, fault, sits):
 @pytest.mark.parametrize('fault', FAULTS_OF['go2'], ids=lambda fault: fault.__name__)
 def test_what_happens_on_a_fault(walk, fault):
     assert suffer(walk, fault, FAULTS_OF['go2'][fault][1] is not None) < 15.0
+
+
+def test_torques_of_another_node_are_added_within_limits_and_end_with_it():
+    walk = Walk(*PATIENT, 'feedforward:=0.1')
+    publisher = walk.watcher.node.create_publisher(JointState, 'feedforward/joint_states', 1)
+
+    def send(effort, seconds=0.2):
+        """Send it for some time; return the torques of the last commands, N m."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if effort is not None:
+                publisher.publish(JointState(name=['RL_calf_joint'], effort=[effort]))
+            time.sleep(0.005)
+        return walk.robot.tau.tolist()
+
+    try:
+        walk.wait_for('rising')
+        assert not any(send(2.0))
+        walk.walking()
+        assert not any(send(None))
+        rows = walk.robot.since(time.monotonic() - 0.5)
+        calm = rows[1:, 3].max()
+        began = time.monotonic()
+        # Motors 0 to 11, FR FL RR RL: the last one.
+        assert send(2.0) == pytest.approx([0.0] * 11 + [2.0])
+        assert send(-500.0) == pytest.approx([0.0] * 11 + [-4.543])
+        assert not any(send(math.nan))
+        assert 'with nan N m' in walk.bridge.log
+        assert send(2.0)[11] == pytest.approx(2.0)
+        assert not any(send(None))
+        # The 4.543 N m of the limit take 0.05 s, 25 commands.
+        assert walk.robot.since(began)[:, 3].max() < calm + 1.0
+        send(2.0)
+        walk.call('stop')
+        assert not any(send(2.0))
+        walk.wait_for('damping')
+        assert walk.robot.damped and not any(send(2.0)) and not walk.robot.wrong
+    finally:
+        walk.end()
 
 
 @pytest.mark.parametrize('fault', FAULTS_OF['g1'], ids=lambda fault: fault.__name__)

@@ -34,7 +34,7 @@ import numpy as np
 NAME = Servos.bridge_name()
 #: ABSENT: settings of a bridge that this one lacks: servos limit their torque themselves and
 #: measure no tilt or temperature.
-ABSENT = 'torque_factor', 'tilt', 'hottest', 'sensor_rate'
+ABSENT = 'torque_factor', 'feedforward', 'tilt', 'hottest', 'sensor_rate'
 SPECS = fixed({
     **{name: spec for name, spec in bridge_specs('', calibration=Spec(
         '', 'calibration file of the servos', constraints='the path of a YAML file')).items()
