@@ -187,12 +187,7 @@ class Analysis(ShortRepr):
     @property
     def parameters(self) -> str:
         """The network's parameters in a line."""
-        values = self.network.as_dict()
-        for name, members in self.network.groups.items():
-            if len({values[member] for member in members}) == 1:
-                values = {name if key == members[0] else key: value for key, value
-                          in values.items() if key == members[0] or key not in members}
-        return ', '.join(f'{name} {value:g}' for name, value in values.items())
+        return ', '.join(f'{name} {value:g}' for name, value in self.network.grouped().items())
 
     def _gaits(self) -> list[str]:
         names = next((list(verdict.phases) for verdict in self.existing), [])
@@ -213,19 +208,18 @@ class Analysis(ShortRepr):
             'symmetry lock per model time):'] + [
                 f'  {line}' for line in table(rows, '<>>' + '>' * len(names) + '>>>>>>')]
         if not self.existing:
-            lines = ['No gait was found at these parameters.']
+            lines = []
         lines += [f'  {orbit.gait}: the multiplier along the orbit comes out as '
                   f'{abs(orbit.multipliers.trivial):.6g} instead of 1; the others are no better'
                   for whole in self.existing for orbit in whole.orbits
                   if orbit.multipliers.error > UNSURE]
-        missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
-        return lines + [f'  {self._reason(verdict)}' for verdict in missing]
-
-    @staticmethod
-    def _reason(verdict: GaitAssessment) -> str:
-        """Return why a gait does not exist or was not found, as a sentence."""
-        subject = f'no {verdict.gait}'
-        return verdict.why if verdict.why.startswith(subject) else f'{subject}: {verdict.why}'
+        reasons: dict[str, list[str]] = {}
+        for verdict in self.gaits.values():
+            if verdict.orbit is None and verdict.gait != self.network.unnamed:
+                gait, why = verdict.gait, verdict.why.removesuffix(f", not '{verdict.gait}'")
+                reason = why.removeprefix(f'no {gait}')
+                reasons.setdefault(f': {why}' if reason == why else reason, []).append(gait)
+        return lines + [f'  no {", ".join(gaits)}{reason}' for reason, gaits in reasons.items()]
 
     def _conclusion(self) -> str:
         """Return a summary in a sentence or two."""

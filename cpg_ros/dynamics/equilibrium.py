@@ -205,7 +205,7 @@ def equilibrium(network: Network) -> np.ndarray:
         return np.zeros(network.variables)
     _check(network)
     if not network.rests:
-        raise NoEquilibrium('an uncoupled cell oscillates from any state: there is no stand')
+        raise NoEquilibrium('an uncoupled cell oscillates from any state: there is no equilibrium')
     rest = network.at_rest()
     if rest is not None:
         return rest

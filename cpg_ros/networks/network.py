@@ -86,6 +86,15 @@ class Network(NetworkDefinition):
             changes |= dict.fromkeys(self.members(name), value)
         return dataclasses.replace(self, **changes)  # type: ignore[type-var]
 
+    def grouped(self) -> dict[str, float]:
+        """Return name -> value, with one entry for each group of parameters that are equal."""
+        values = self.as_dict()
+        for name, members in self.groups.items():
+            if len({values[member] for member in members}) == 1:
+                values = {name if key == members[0] else key: value for key, value
+                          in values.items() if key == members[0] or key not in members}
+        return values
+
     @property
     def coefficients(self) -> np.ndarray:
         """Parameters as the kernel takes them, one value for each cell, shape (rows, cells)."""

@@ -467,10 +467,11 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         orbit, reached = _continue_orbit(near, network)
         if orbit is not None:
             return orbit
-        changed = ', '.join(
-            f'{name} {old + reached * (value - old):.4g}' for (name, value), old
-            in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
-            if value != old)
+        first = near.network
+        last = first.replace(**{name: old + reached * (network.as_dict()[name] - old)
+                                for name, old in first.as_dict().items()})
+        changed = ', '.join(f'{name} {value:.4g}' for name, value in last.grouped().items()
+                            if value != first.grouped().get(name))
         raise NoOrbit(f'no {gait} at these parameters: continued from its preset, it ends at '
                       f'{changed}')
     raise NoOrbit(f'no {gait} at these parameters')
