@@ -35,7 +35,7 @@ from cpg_ros.feedback.closed_loop import (
 )
 from cpg_ros.feedback.estimate import Odometry, SensorData
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.kinematics import Geometry, LegArrays
+from cpg_ros.feedback.kinematics import forward, Geometry, LegArrays
 from cpg_ros.motion.robot import Robot
 from numba.extending import intrinsic
 import numpy as np
@@ -128,3 +128,4 @@ def warm_up(geometry: Geometry, joints: int) -> None:
                        Instant.empty(legs, np.zeros(1)), angles, angles, Odometry.begin(), angles)
     closing_function(loop)
     finishing_function(loop)
+    forward(geometry, angles)

@@ -162,6 +162,8 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
     robot = read_tree(path)
     meshes = _Meshes(path, mesh_folder(robot))
     for link in robot.findall('link'):
+        for part in (*link.findall('visual'), *link.findall('collision')):
+            part.attrib.pop('name', None)  # MuJoCo would warn of equal ones
         if not visual:
             for part in link.findall('visual'):
                 link.remove(part)

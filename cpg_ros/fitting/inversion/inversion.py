@@ -21,6 +21,7 @@ the generator loads. Without a recording the executable is the node ``cpg_invers
 
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 import sys
@@ -139,10 +140,16 @@ def _parser() -> Parser:
 
 def _recording(args: Namespace, robot: Robot | None) -> Recording:
     given = chosen_format(args)
-    return read_recording(
-        getattr(args, given), given,
-        robot_joints=robot.order if robot else (),
-        **reading_arguments(args))
+    order = robot.order if robot else ()
+    recording = read_recording(getattr(args, given), given, robot_joints=order,
+                               **reading_arguments(args))
+    # Tables often call FR_hip what the robot file calls FR_hip_joint.
+    longer = {name.removesuffix('_joint'): name for name in order}
+    if set(order) & set(recording.joints) or not set(longer) & set(recording.joints):
+        return recording
+    return replace(
+        recording, joints=tuple(longer.get(name, name) for name in recording.joints),
+        notes=(*recording.notes, "the robot file's names of the joints end in '_joint'"))
 
 
 def _refuse_options(args: Namespace) -> None:

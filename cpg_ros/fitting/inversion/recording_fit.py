@@ -275,7 +275,8 @@ def leg_joints(recording: Recording, robot: Robot | None
     missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
     if len(missing) == len(robot.joints):
         raise InputError(f'{recording.source}: none of the joints of robot {robot.name} is '
-                         f'there: it has {", ".join(recording.joints)}')
+                         f'there: it has {", ".join(recording.joints)}; the robot has '
+                         f'{", ".join(missing)}: rename either, or leave out --robot')
     read = f'legs and cells are those of robot {robot.name}'
     return ({leg: names for leg, names in legs.items() if names},
             read + (f'; not recorded: {", ".join(missing)}' if missing else ''))

@@ -40,6 +40,7 @@ from cpg_ros.ros.kernels import StartProgress
 from cpg_ros.ros.node.client import CallError, NodeClient, RequestRefused, ServiceClients
 from cpg_ros.ros.node.polled import latched
 from cpg_ros.simulation.robot_model import find_model
+from cpg_ros.simulation.robot_setup.leg_chains import FACING
 from geometry_msgs.msg import Pose, Quaternion
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -230,6 +231,11 @@ class DemoRobot:
 
 def add_options(parser: ArgumentParser) -> None:
     """Add the options that select a user's own robot."""
+    parser.add_argument('--forward', choices=FACING, help='with --urdf: direction in which the '
+                        'robot faces, where check_robot asks for it; other than x, a URDF that is '
+                        'turned to x is written beside the file, and used')
+    parser.add_argument('--legs', nargs='+', metavar='LEG=TEXT', help='with --urdf or --mjcf: the '
+                        'legs, each with a part of the names of its joints, such as lf=leg1_')
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help="with --urdf or --mjcf: "
                         "velocity limit of all joints instead of the file's")
     parser.add_argument('--evaluations', type=int, metavar='N', help='with --urdf or --mjcf: '
@@ -250,7 +256,7 @@ def name_of(args: Namespace) -> str:
 
     """
     if args.urdf is None and args.mjcf is None:
-        for option in ('velocity', 'evaluations', *SERVO_GAINS):
+        for option in ('forward', 'legs', 'velocity', 'evaluations', *SERVO_GAINS):
             if getattr(args, option) is not None:
                 raise InputError(f'argument --{option}: only with --urdf or --mjcf')
         return ''
@@ -258,6 +264,11 @@ def name_of(args: Namespace) -> str:
         raise InputError(f'argument --evaluations: {args.evaluations} is not positive')
     if args.urdf is None:
         return find_model(args.mjcf).stem
+    if args.forward not in (None, 'x'):
+        from cpg_ros.simulation.robot_setup.check_robot import facing_x, turned
+        path = facing_x(args.urdf)
+        args.urdf, args.forward = path if path.exists() else turned(args.urdf, args.forward), 'x'
+        say(f'the robot of {args.urdf} faces x')
     load_urdf(args.urdf)
     return str(args.urdf.stem)
 
@@ -312,9 +323,13 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
     if file.exists():
         _again(file, find_model(source[1]), 'velocity', args)
     else:
-        limit = [] if args.velocity is None else ['--velocity', f'{args.velocity:g}']
+        options = [] if args.velocity is None else ['--velocity', f'{args.velocity:g}']
+        if args.forward:
+            options += ['--forward', args.forward]
+        if args.legs:
+            options += ['--legs', *args.legs]
         code = steps.run(f'making {file} from {source[1]}', MADE,
-                          ['check_robot', *source, '--make', str(file), *limit])
+                          ['check_robot', *source, '--make', str(file), *options])
         if not file.exists():
             raise StepFailed(code)
     robot = load_robot(str(file))

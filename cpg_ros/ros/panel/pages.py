@@ -14,7 +14,6 @@
 
 """The open pages: the robot that each shows, checks of its requests, and messages to it."""
 
-import asyncio
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 import json
@@ -90,10 +89,6 @@ ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'record': {'on': _flag}, 'fit': {}}
 
 
-def _refuse(name: str) -> float:
-    raise RequestError(f'{name} is not a number')
-
-
 def _checked(action: str, name: str, check: Callable[[Any], Any], value: Any) -> Any:
     try:
         return check(value)
@@ -111,9 +106,7 @@ def read(text: str | bytes) -> Request:
     if not isinstance(text, str):
         raise RequestError('a request must be text')
     try:
-        message = json.loads(text, parse_constant=_refuse)
-    except RequestError:
-        raise
+        message = json.loads(text)
     except (ValueError, RecursionError) as error:
         raise RequestError('the request is not JSON') from error
     if not isinstance(message, dict):
@@ -201,57 +194,36 @@ class Pages:
     """The open pages; belongs to the thread of the event loop.
 
     Attributes:
-        open: those that can do everything.
-        stopping: those beyond the limit, oldest first, which can only stop the robot.
+        everyone: all of them, oldest first; those beyond MOST can only stop the robot.
 
     """
 
     def __init__(self) -> None:
-        self.open: set[Page] = set()
-        self.stopping: list[Page] = []
-        self._loop: asyncio.AbstractEventLoop | None = None
+        self.everyone: list[Page] = []
 
-    def begin(self) -> None:
-        """Use the running event loop."""
-        self._loop = asyncio.get_running_loop()
-
-    def later(self, act: Callable[..., None], *values: Any) -> None:
-        """Call a function from the event loop soon; callable from any thread."""
-        if self._loop is not None:
-            self._loop.call_soon_threadsafe(act, *values)
+    @property
+    def open(self) -> list[Page]:  # noqa: A003
+        """Pages that can do everything."""
+        return self.everyone[:MOST]
 
     @property
     def full(self) -> bool:
         """Whether no page is admitted any more, not even one that can only stop the robot."""
-        return len(self.stopping) >= MOST_STOPPING
-
-    @property
-    def everyone(self) -> list[Page]:
-        """All pages, whatever they can do."""
-        return [*self.open, *self.stopping]
+        return len(self.everyone) >= MOST + MOST_STOPPING
 
     def admit(self, connection: ServerConnection) -> Page:
         """Add the page of a connection, and return it."""
         taken = {page.number for page in self.everyone}
         number = next(k for k in range(1, len(taken) + 2) if k not in taken)
-        page = Page(connection, number, stop_only=len(self.open) >= MOST)
-        if page.stop_only:
-            self.stopping.append(page)
-        else:
-            self.open.add(page)
-        return page
+        self.everyone.append(Page(connection, number, stop_only=len(self.everyone) >= MOST))
+        return self.everyone[-1]
 
     def leave(self, page: Page) -> Page | None:
         """Remove a page; return one that is no longer limited to stopping, if there is one."""
-        if page.stop_only:
-            self.stopping.remove(page)
-            return None
-        self.open.discard(page)
-        if not self.stopping:
-            return None
-        promoted = self.stopping.pop(0)
-        promoted.stop_only = False
-        self.open.add(promoted)
+        self.everyone.remove(page)
+        promoted = next((other for other in self.open if other.stop_only), None)
+        if promoted is not None:
+            promoted.stop_only = False
         return promoted
 
     def of(self, node: str) -> list[Page]:

@@ -47,7 +47,7 @@ from cpg_ros.ros.panel import pages as requests
 from cpg_ros.ros.panel.pages import MOST, Page, Pages, Request, RequestError, SLOW
 from cpg_ros.ros.panel.robot_view import BridgeViews, HEALTH, RobotView, STOPS, Subscriptions
 from cpg_ros.ros.panel.teleop import LeaseError
-from cpg_ros.ros.panel.web_server import AccessControl, token_for, WebServer
+from cpg_ros.ros.panel.web_server import token_for, WebServer
 from diagnostic_msgs.msg import DiagnosticStatus
 import rclpy
 from rclpy.node import Node
@@ -67,7 +67,7 @@ class Recorder:
 
     """
 
-    def __init__(self, node: Node, folder: Path, largest: int, ended: Callable[[str], None]
+    def __init__(self, node: Node, folder: Path, largest: int, ended: Callable[[str], object]
                  ) -> None:
         """Record into a folder; a bag ends at ``largest``, bytes.
 
@@ -331,6 +331,7 @@ class Panel(StartedNode):
             f'{self.get_name()}_watch', namespace=self.get_namespace(), enable_rosout=False,
             start_parameter_services=False, use_global_arguments=False)
         self._pages = Pages()
+        self._loop: asyncio.AbstractEventLoop
         self._calls = ServiceClients(self)
         self._views: dict[str, RobotView] = {}
         self._bridges = BridgeViews(self._watch, self._calls)
@@ -339,9 +340,9 @@ class Panel(StartedNode):
         self._recorder = Recorder(
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
-            lambda why: self._pages.later(self._recorded, why))
+            lambda why: self._loop.call_soon_threadsafe(self._recorded, why))
         self._handler = RequestHandler(self._pages, self._calls, self._recorder, self._recorded)
-        self._server = WebServer(AccessControl(self._token), self._pages, self._recorder.packed,
+        self._server = WebServer(self._token, self._pages, self._recorder.packed,
                                  self._come, self._on_request, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
         self._own_health = HealthPublisher(self, 'pages', '', lambda: (
@@ -374,7 +375,7 @@ class Panel(StartedNode):
             self._fail(error)
 
     async def _serve(self) -> None:
-        self._pages.begin()
+        self._loop = asyncio.get_running_loop()
         server = await self._server.start(self._socket)
         host, port = self._value('host'), self._port
         shown = socket.gethostname() if host in ('0.0.0.0', '::') else host

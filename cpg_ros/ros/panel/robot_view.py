@@ -156,7 +156,7 @@ class Controls:
         """Set a parameter soon; of several waiting values only the last one is sent.
 
         Raises:
-            RequestError: the node has no such parameter, or the value is invalid.
+            RequestError: the node has no such parameter, or it cannot change.
 
         """
         control = self.by_name.get(name)
@@ -164,7 +164,7 @@ class Controls:
             raise RequestError(f"{self._node.name} has no parameter '{name}'")
         if control['fixed']:
             raise RequestError(f'{name} cannot be changed while the node runs')
-        self._waiting[name] = _fitting(control, value)
+        self._waiting[name] = value
         if self._work is None or self._work.done():
             self._work = asyncio.get_running_loop().create_task(self._send())
 
@@ -180,18 +180,6 @@ class Controls:
                 self._report(str(error))
 
 
-def _fitting(control: dict[str, Any], value: Any) -> Any:
-    """Return a value converted to the type of its parameter."""
-    kind, name = control['kind'], control['name']
-    right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
-    if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):
-        raise RequestError(f'{name} must be a {kind}, not {value!r}')
-    low, high = control['low'], control['high']
-    if low is not None and not low <= value <= high:
-        raise RequestError(f'{name} {value:g} is not from {low:g} to {high:g}')
-    return float(value) if kind == 'double' else value
-
-
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
 #: The folder of an absolute path.
@@ -200,38 +188,13 @@ FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
 
 #: A topic that is silent for this long has no message, s.
 SILENCE = 1.0
+#: Type of ``robot_description``.
+TEXT = 'std_msgs/msg/String'
 
 
 def descriptions(space: str) -> tuple[str, str]:
     """Return the usual topics of a robot's URDF, that of the namespace first."""
     return f'{space}/robot_description', '/robot_description'
-
-
-async def robot_info(watch: Node, services: ServiceClients, graph: Graph, generator: str,
-                     robot: str, urdf: str) -> shape.RobotInfo:
-    """Return the description of a robot by the graph and the user.
-
-    ``generator`` is the full name of the node that moves it, ``robot`` its robot file, ``urdf``
-    the file that the user names, '' for none. ``watch`` is not spun.
-
-    Raises:
-        CallError: the simulation does not answer.
-
-    """
-    space, description, model = namespace(generator), '', ''
-    for topic in descriptions(space):
-        if not (urdf or description) and (topic, 'std_msgs/msg/String') in graph.topics:
-            description = getattr(await _once(watch, String, topic), 'data', '')
-    simulation = graph.beside(generator, graph.simulations)
-    if simulation:
-        model, = await NodeClient(services, simulation).values(['model'])
-    legs = {}
-    for topic, kind in () if shape.shipped_robot(robot) is not None else sorted(graph.topics):
-        leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
-        if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
-            message = await _once(watch, JointState, topic)
-            legs[leg] = list(message.name) if message else []
-    return shape.RobotInfo(urdf, description, model if isinstance(model, str) else '', robot, legs)
 
 
 async def _once(watch: Node, kind: type, name: str) -> Any:
@@ -302,9 +265,7 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.by_name.values())})
-            info = await robot_info(
-                self._watch, self._services, self.graph, self.name,
-                str(self.controls.value('robot') or ''), self._urdf)
+            info = await self._robot_info()
             doubts: list[str] = []
             drawn = await asyncio.to_thread(shape.find, info, doubts.append)
             doubts = list(dict.fromkeys(doubts))[:5]
@@ -319,6 +280,35 @@ class RobotView:
             self._report(str(error))
             self._stale = True
 
+    async def _robot_info(self) -> shape.RobotInfo:
+        """Return the description of the robot by the graph and the user.
+
+        Raises:
+            CallError: the simulation does not answer.
+
+        """
+        robot = str(self.controls.value('robot') or '')
+        info = shape.RobotInfo(self._urdf, robot=robot)
+        for topic in descriptions(self._space):
+            if not (info.urdf or info.description) and (topic, TEXT) in self.graph.topics:
+                message = await _once(self._watch, String, topic)
+                info.description = getattr(message, 'data', '')
+        if simulation := self.graph.beside(self.name, self.graph.simulations):
+            model, = await NodeClient(self._services, simulation).values(['model'])
+            info.model = str(model or '')
+        if shape.shipped_robot(robot) is None:
+            for topic in self._leg_topics():
+                message = await _once(self._watch, JointState, topic)
+                leg = topic.split('/')[-2]
+                info.legs[leg] = list(message.name) if message else []
+        return info
+
+    def _leg_topics(self) -> list[str]:
+        """Return the topics of single legs' joint states, sorted."""
+        pattern = re.compile(re.escape(self._space) + '/[^/]+/joint_states')
+        return sorted(name for name, kind in self.graph.topics
+                      if kind == 'sensor_msgs/msg/JointState' and pattern.fullmatch(name))
+
     def messages(self) -> list[dict[str, Any]]:
         """Return the messages that a new page needs."""
         return list(self._latest.values())
@@ -332,22 +322,19 @@ class RobotView:
     def listen(self, graph: Graph, listening: bool) -> None:
         """Subscribe to the topics on the graph, or to none if no page shows the generator."""
         self.graph = graph
-        space, floats = self._space, 'std_msgs/msg/Float64MultiArray'
-        joints = [topic for topic in (f'{space}/joint_states',)
-                  if self._watch.count_publishers(topic)]
+        space = self._space
         # One topic with all joints costs their publisher less than one for each leg.
-        joints = joints or [name for name, kind in graph.topics if kind.endswith('/JointState')
-                            and name.startswith(f'{space}/') and name.endswith('/joint_states')
-                            and name.removeprefix(f'{space}/').count('/') == 1]
-        topics = {**{name: (JointState, best_effort()) for name in joints},
-                  f'{self.name}/gait': (String, latched()),
+        whole = f'{space}/joint_states'
+        joints = [whole] if self._watch.count_publishers(whole) else self._leg_topics()
+        topics = {f'{self.name}/gait': (String, latched()),
                   '/parameter_events': (ParameterEvent, best_effort(100))}
-        optional = {f'{self.name}/phase': Float64MultiArray, f'{self.name}/cells':
-                    Float64MultiArray, f'{space}/foot_contacts': Float64MultiArray}
-        topics.update({name: (kind, best_effort()) for name, kind in optional.items()
-                       if (name, floats) in graph.topics})
-        if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
-            topics[f'{space}/odom'] = Odometry, best_effort()
+        for kind, name, names in (
+                (JointState, 'sensor_msgs/msg/JointState', joints),
+                (Odometry, 'nav_msgs/msg/Odometry', [f'{space}/odom']),
+                (Float64MultiArray, 'std_msgs/msg/Float64MultiArray',
+                 [f'{self.name}/phase', f'{self.name}/cells', f'{space}/foot_contacts'])):
+            topics.update({topic: (kind, best_effort()) for topic in names
+                           if (topic, name) in graph.topics})
         self._topics.subscribe_to(topics if listening else {})
 
     def frame(self) -> dict[str, Any]:

@@ -196,39 +196,40 @@ LONG, WIDE, LEG = 0.24, 0.11, 0.42
 BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
 
 
-def draw(name: str, legs: Mapping[str, Sequence[str]],
-         quarters: Mapping[str, tuple[float, float]]) -> Shape:
+def stick_figure(name: str, legs: Mapping[str, Sequence[str]], robot: Robot | None) -> Shape:
     """Return the shape.
 
     Args:
         name: of the robot, for people.
         legs: leg -> its joints, from the body down. Of three the first turns about the axis that
             points ahead, all others turn about that to the left.
-        quarters: leg -> 1 or -1 for ahead or behind (0 in between), and for left or right.
+        robot: that says where a leg is; without one the leg's name does, as in the shipped
+            networks: lh rh lf rf, left right.
 
     """
-    base = Link('base', -1)
-    ends = [np.array([LONG * ahead, WIDE * left, 0.0]) for ahead, left in quarters.values()]
-    long = max((abs(end[0]) for end in ends), default=0.0)
-    base.parts += [Part('box', np.array([long + 0.06, 0.7 * WIDE, 0.05]), None, BODY),
-                   Part('box', np.array([0.02, 0.04, 0.02]), None, STICK,
-                        np.array([long + 0.08, 0.0, 0.02]))]
+    hips = {}
+    for leg in legs:
+        girdle, side = ((robot.girdles.get(leg, ''), robot.sides.get(leg, '')) if robot else
+                        ({'h': 'hind', 'f': 'fore'}.get(leg[1:], ''), leg))
+        hips[leg] = np.array([{'fore': LONG, 'hind': -LONG}.get(girdle, 0.0),
+                              -WIDE if side[:1] == 'r' else WIDE, 0.0])
+    long = max((abs(hip[0]) for hip in hips.values()), default=0.0)
+    base = Link('base', -1, parts=[
+        Part('box', np.array([long + 0.06, 0.7 * WIDE, 0.05]), None, BODY),
+        Part('box', np.array([0.02, 0.04, 0.02]), None, STICK,
+             np.array([long + 0.08, 0.0, 0.02]))])
     shape = Shape(f"stick figure of '{name}'", [base])
-    for (leg, joints), end in zip(legs.items(), ends, strict=True):
-        base.parts.append(along(np.array([end[0], 0.0, 0.0]), end, 0.025, BODY))
-        parent, position = 0, end
-        down = [k for k in range(len(joints)) if not (len(joints) >= 3 and k == 0)]
-        length = LEG / max(len(down), 1)
-        for k, joint in enumerate(joints):
-            link = Link(joint, parent, joint, position=position,
-                        axis=np.eye(3)[1 if k in down else 0])
-            if k in down:
-                tip = np.array([0.0, 0.0, -length])
-                link.parts += [along(np.zeros(3), tip, 0.018, STICK),
-                               Part('sphere', np.array([0.028]), None, BODY)]
-            else:
-                tip = np.array([0.0, 0.3 * np.sign(end[1]) * WIDE, 0.0])
-                link.parts.append(along(np.zeros(3), tip, 0.025, BODY))
+    for leg, joints in legs.items():
+        parent, position = 0, hips[leg]
+        base.parts.append(along(position * [1.0, 0.0, 0.0], position, 0.025, BODY))
+        swinging = joints[1:] if len(joints) >= 3 else joints
+        for joint in joints:
+            swings = joint in swinging
+            tip = (np.array([0.0, 0.0, -LEG / len(swinging)]) if swings else
+                   np.array([0.0, 0.3 * hips[leg][1], 0.0]))
+            link = Link(joint, parent, joint, position=position, axis=np.eye(3)[int(swings)],
+                        parts=[along(np.zeros(3), tip, 0.018, STICK),
+                               Part('sphere', np.array([0.028]), None, BODY)])
             shape.links.append(link)
             parent, position = len(shape.links) - 1, tip
         shape.links[parent].parts.append(Part('sphere', np.array([0.026]), None, FOOT, position))
@@ -344,7 +345,11 @@ def _skeleton(tree: Xml.Element, source: str) -> Shape:
         if len(shape.links) > len(joints) + 1:
             raise DescriptionError(f'URDF {source}: the links form a loop')
         for joint in below.get(link.name, ()):
-            shape.links.append(_held(joint, index))
+            fixed, axis = joint.kind == 'fixed' or bool(joint.mimic), np.array(joint.axis)
+            shape.links.append(Link(
+                joint.child, index, '' if fixed else joint.name, joint.kind == 'prismatic',
+                axis / max(float(np.linalg.norm(axis)), 1e-9), np.array(joint.xyz),
+                rotation(joint.rpy)))
     return shape
 
 
@@ -373,14 +378,6 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[
         instead = '; drawn by their collision shapes or as boxes: ' + ', '.join(replaced)
         report(f'not drawn: {errors[0]}{more}{instead if replaced else ""}')
     return shape
-
-
-def _held(joint: JointDescription, parent: int) -> Link:
-    fixed = joint.kind == 'fixed' or bool(joint.mimic)
-    axis = np.array(joint.axis)
-    return Link(joint.child, parent, '' if fixed else joint.name, joint.kind == 'prismatic',
-                axis / max(float(np.linalg.norm(axis)), 1e-9), np.array(joint.xyz),
-                rotation(joint.rpy))
 
 
 def _numbers(text: str | None, default: str) -> np.ndarray:
@@ -414,12 +411,12 @@ class _Drawing:
 
     def _add(self, link: Link, visual: Xml.Element) -> None:
         origin, material = visual.find('origin'), visual.find('material')
-        position = _numbers(None if origin is None else origin.get('xyz'), '0 0 0')
-        pose = rotation(tuple(_numbers(None if origin is None else origin.get('rpy'), '0 0 0')))
+        position, angles = (_numbers(None if origin is None else origin.get(key), '0 0 0')
+                            for key in ('xyz', 'rpy'))
         colour = GREY if material is None else self._colour(material)
         for solid in visual.iterfind('geometry/*'):
             part = self._part(solid)
-            part.colour, part.position, part.pose = colour, position, pose
+            part.colour, part.position, part.pose = colour, position, rotation(tuple(angles))
             count = SOLIDS[part.kind] if part.mesh is None else len(part.mesh.triangles)
             if count > self._remaining:
                 raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
@@ -469,7 +466,7 @@ class ShapeError(CpgError):
     """A shape is too large for the page; one line for the user."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class RobotInfo:
     """Data on a robot from the graph and the user.
 
@@ -509,6 +506,8 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
     ``report`` takes a line about each better shape that is not available.
     """
     robot = shipped_robot(info.robot)
+    legs: Mapping[str, Sequence[str]] = info.legs if robot is None else {
+        leg: [joint.name for joint in joints] for leg, joints in robot.legs.items()}
     described = [
         lambda: (from_text(info.description, 'robot_description', report)
                  if info.description else None),
@@ -531,11 +530,11 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
             report(one_line(f"drawn as a stick figure: '{info.robot[:200]}' is not one of the "
                             'shipped robots, and the panel opens no file that a node names; '
                             'publish robot_description, or start the panel with -p urdf:=FILE'))
-        shape = _sticks(info, robot)
+        shape = stick_figure(robot.name if robot else info.robot or 'a robot', legs, robot)
     # The generator respects the robot file's limits.
     for joint in robot.joints if robot else ():
         shape.limits[joint.name] = joint.lower, joint.upper
-    _with_feet(shape, info, robot)
+    _add_feet(shape, legs)
     return shape
 
 
@@ -556,15 +555,9 @@ def _from_model(info: RobotInfo, robot: Robot, report: Callable[[str], None]) ->
     return from_model(model, robot) if model else None
 
 
-def _legs(info: RobotInfo, robot: Robot | None) -> dict[str, list[str]]:
-    if robot is None:
-        return info.legs
-    return {leg: [joint.name for joint in joints] for leg, joints in robot.legs.items()}
-
-
-def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
+def _add_feet(shape: Shape, legs: Mapping[str, Sequence[str]]) -> None:
     index = {link.joint: k for k, link in enumerate(shape.links) if link.joint}
-    for leg, joints in _legs(info, robot).items():
+    for leg, joints in legs.items():
         ends = [index[joint] for joint in joints if joint in index]
         if not ends or leg in shape.feet:
             continue
@@ -576,15 +569,3 @@ def _with_feet(shape: Shape, info: RobotInfo, robot: Robot | None) -> None:
         away = np.linalg.norm(corners, axis=1)
         shape.feet[leg] = end, (tips[-1].position if tips else
                                 corners[away >= 0.95 * away.max()].mean(axis=0))
-
-
-def _sticks(info: RobotInfo, robot: Robot | None) -> Shape:
-    legs, name = _legs(info, robot), robot.name if robot else info.robot or 'a robot'
-    if robot is None:
-        # Corners of the body for legs named as in the shipped networks: lh rh lf rf, left right.
-        quarters = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
-                  for leg in legs}
-    else:
-        quarters = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
-                        -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
-    return draw(name, legs, quarters)

@@ -187,8 +187,8 @@ class Teleop:
         self.update()
         if not self.confirmed:
             self.stop()
-            raise LeaseError(f'{self._topic} is also published by {self.names}: take over to '
-                             'steer')
+            raise LeaseError(f'{self._topic} is also published by {", ".join(self.names)}: '
+                             'take over to steer')
         self._until, self._stops = stamp + HOLD, STOPS
         self.target = speed * self._fastest[0], turn * self._fastest[1]
 
@@ -229,9 +229,9 @@ class Teleop:
         return self.lease.confirmed.issuperset(self.others)
 
     @property
-    def names(self) -> str:
-        """Names of the other nodes."""
-        return ', '.join(sorted(set(self.others.values())))
+    def names(self) -> list[str]:
+        """Names of the other nodes, sorted."""
+        return sorted(set(self.others.values()))
 
     def update(self) -> None:
         """Find the other publishers."""
@@ -267,7 +267,6 @@ class Teleop:
         holder = self.lease.holder
         return {'type': 'lease', 'page': str(page), 'holder': str(holder or ''),
                 'yours': holder is page, 'lost_to': page.lost_to, 'stop_only': page.stop_only,
-                'others': sorted(set(self.others.values())),
-                'confirmed': self.confirmed, 'limit': HOLD,
+                'others': self.names, 'confirmed': self.confirmed, 'limit': HOLD,
                 'round_trip': round(page.round_trip, 1)
                 if page.round_trip > HOLD else None}

@@ -74,35 +74,29 @@ def token_for(host: str, setting: str, terminal: bool) -> str:
     return setting
 
 
-class AccessControl:
-    """Checks each request before its contents are read."""
+def rejected(token: str, path: str, host: str, origin: str) -> str:
+    """Return why a request is rejected before its contents are read, or ''.
 
-    def __init__(self, token: str) -> None:
-        """Require a token, as of ``token_for``."""
-        self._token = token.encode()
+    Args:
+        token: as of ``token_for``.
+        path: of the request, with the query.
+        host: header Host.
+        origin: header Origin, '' for a program that is not a browser.
 
-    def validate(self, path: str, host: str, origin: str) -> str:
-        """Return why a request is rejected, or ''.
-
-        Args:
-            path: of the request, with the query.
-            host: header Host.
-            origin: header Origin, '' for a program that is not a browser.
-
-        """
-        # Another site's page, open in the same browser, must not move the robot.
-        if origin and urlsplit(origin).netloc != host:
-            return 'the request comes from a page of another site'
-        if self._token:
-            token = parse_qs(urlsplit(path).query).get('token', [''])[0]
-            if not token:
-                return 'the token is missing'
-            if not hmac.compare_digest(token.encode(errors='replace'), self._token):
-                return 'the token is wrong'
-        # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
-        elif not is_loopback(urlsplit(f'//{host}').hostname or ''):
-            return f"'{host[:80]}' is not a name of this machine"
-        return ''
+    """
+    # Another site's page, open in the same browser, must not move the robot.
+    if origin and urlsplit(origin).netloc != host:
+        return 'the request comes from a page of another site'
+    if token:
+        given = parse_qs(urlsplit(path).query).get('token', [''])[0]
+        if not given:
+            return 'the token is missing'
+        if not hmac.compare_digest(given.encode(errors='replace'), token.encode()):
+            return 'the token is wrong'
+    # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
+    elif not is_loopback(urlsplit(f'//{host}').hostname or ''):
+        return f"'{host[:80]}' is not a name of this machine"
+    return ''
 
 
 FILES = Path(__file__).parent / 'page'
@@ -125,11 +119,11 @@ _LOG.propagate = False
 class WebServer:
     """Serves files to authorised clients, and reports pages that open, send requests and close."""
 
-    def __init__(self, access: AccessControl, pages: Pages, bag: Callable[[str], bytes],
+    def __init__(self, token: str, pages: Pages, bag: Callable[[str], bytes],
                  come: Callable[[Page], None],
                  on_request: Callable[[Page, str | bytes], Awaitable[None]],
                  gone: Callable[[Page], None]) -> None:
-        self._access, self._pages, self._bag = access, pages, bag
+        self._token, self._pages, self._bag = token, pages, bag
         self._come, self._on_request, self._gone = come, on_request, gone
         self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
                        (file.read_bytes(), TYPES[file.suffix])
@@ -146,8 +140,8 @@ class WebServer:
     async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         path = urlsplit(request.path).path
         hosts, origins = (request.headers.get_all(name) for name in ('Host', 'Origin'))
-        refused = self._access.validate(request.path, hosts[0] if len(hosts) == 1 else '',
-                                     origins[0] if origins else '')
+        refused = rejected(self._token, request.path, hosts[0] if len(hosts) == 1 else '',
+                           origins[0] if origins else '')
         # The page's files are public: with them it can show that a token is missing.
         if path in self._files and (not refused or 'token' in refused):
             body, kind = self._files[path]

@@ -113,7 +113,10 @@ def _checked(args: Namespace) -> RobotCheck:
     description = load_mjcf(args.mjcf) if args.urdf is None else load_urdf(args.urdf)
     if args.make is None or args.forward in ('', 'x'):
         return _compared(args, description)
-    args.urdf = _turned(args, description)
+    if args.urdf is None:
+        raise InputError(f'--forward {args.forward}: an MJCF file cannot be turned, as its base '
+                         'moves freely: turn the parts of its base instead')
+    args.urdf = turned(args.urdf, args.forward)
     try:
         return _compared(args, load_urdf(args.urdf))
     finally:
@@ -171,6 +174,7 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
     stand = ', '.join(f'{joint.name} at {joint.offset:g}' for joint in joints)
     notes += f'\nassumed: small amplitudes, and the stand, which has in {leg} {stand} rad'
     source = find_model(args.mjcf) if args.urdf is None else args.urdf
+    args.make.parent.mkdir(parents=True, exist_ok=True)
     write_robot(args.make, robot, COMMENT.format(source=source.name, format=description.format,
                                                    notes=notes))
     if args.forward not in ('', 'x'):
@@ -192,20 +196,27 @@ def _biped(args: Namespace, robot: Robot, description: RobotDescription) -> tupl
         return robot, f'feedback: none, as {error}'
 
 
-def _turned(args: Namespace, description: RobotDescription) -> Path:
-    """Write a URDF beside the given one, with a root link that faces x; return its path."""
-    if args.urdf is None:
-        raise InputError(f'--forward {args.forward}: an MJCF file cannot be turned, as its base '
-                         'moves freely: turn the parts of its base instead')
-    path = args.urdf.with_name(f'{args.urdf.stem}_facing_x.urdf')
+def facing_x(urdf: Path) -> Path:
+    """Return the path of the URDF that ``turned`` writes beside the given one."""
+    return urdf.with_name(f'{urdf.stem}_facing_x.urdf')
+
+
+def turned(urdf: Path, forward: str) -> Path:
+    """Write a URDF with a root link that faces x for a robot that faces ``forward``.
+
+    Raises:
+        InputError: there is such a file already.
+
+    """
+    path = facing_x(urdf)
     if path.exists():
-        raise InputError(f'--forward {args.forward}: {path} already exists')
-    tree = ElementTree.parse(args.urdf)
-    angle = -0.5 * pi * FACING.index(args.forward)
+        raise InputError(f'--forward {forward}: {path} already exists')
+    tree, root = ElementTree.parse(urdf), load_urdf(urdf).root()
+    angle = -0.5 * pi * FACING.index(forward)
     ElementTree.SubElement(tree.getroot(), 'link', name='facing_x')
     joint = ElementTree.SubElement(tree.getroot(), 'joint', name='facing_x_joint', type='fixed')
     ElementTree.SubElement(joint, 'parent', link='facing_x')
-    ElementTree.SubElement(joint, 'child', link=description.root())
+    ElementTree.SubElement(joint, 'child', link=root)
     ElementTree.SubElement(joint, 'origin', xyz='0 0 0', rpy=f'0 0 {angle:.9g}')
     write_atomically(path, ElementTree.tostring(tree.getroot()))
     return path

@@ -140,6 +140,23 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
         assert moved is None if 'gripper' in joint.name else len(moved.weights) == 6
 
 
+def test_a_table_may_leave_out_the_ending_of_a_robots_joints(tmp_path, capsys):
+    path = table_of(tmp_path / 'walk.csv', *walked())
+    file, words = tmp_path / 'robot.yaml', ['--csv', str(path), '--free', 'tau', '--json']
+    for ending, code in (('_joint', 0), ('_motor', 2)):
+        file.write_text(yaml.safe_dump({'network': 'delayed', 'legs': {leg: {'joints': [
+            {'name': f'{leg}_{joint}{ending}', 'cell': cell, 'offset': 0.0, 'amplitude': 0.1,
+             'lower': -3.0, 'upper': 3.0, 'velocity': 40.0} for joint in ('hip', 'knee')]}
+            for leg, cell in LEGS.items()}}))
+        assert main([*words, '--robot', str(file)]) == code
+        said = capsys.readouterr()
+        if code:
+            assert 'the robot has' in said.err and 'lf_hip_motor' in said.err
+        else:
+            assert set(json.loads(said.out)['joints']) == {
+                f'{leg}_{joint}_joint' for leg in LEGS for joint in ('hip', 'knee')}
+
+
 # A file with gaits of its own, geometry, feedback and steering; one with a body of a biped.
 @pytest.mark.parametrize(('name', 'gait', 'frequency'), [
     ('unitree_go2', 'trot', 1.8), *in_depth(('humanoid', 'walk', 1.2))])

@@ -24,6 +24,7 @@ import shutil
 import signal
 
 from cpg_ros.common.errors import InputError
+from cpg_ros.motion.description import load_urdf
 from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.ros.cli import demo as tool
 from cpg_ros.ros.cli import demo_parts
@@ -57,8 +58,9 @@ class Made:
 
 
 def args(folder, **changes):
-    return Namespace(**{'urdf': URDF, 'mjcf': None, 'velocity': None, 'evaluations': None,
-                        'kp': None, 'kd': None, 'tour': None, 'out': folder, **changes})
+    return Namespace(**{'urdf': URDF, 'mjcf': None, 'forward': None, 'legs': None,
+                        'velocity': None, 'evaluations': None, 'kp': None, 'kd': None,
+                        'tour': None, 'out': folder, **changes})
 
 
 def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(tmp_path, capsys):
@@ -82,6 +84,18 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
     for option in ('velocity', 'evaluations'):
         with pytest.raises(InputError, match=rf'--{option}: .*\.yaml is there already'):
             demo_parts.prepare(args(tmp_path, **{option: 5}), steps)
+
+
+def test_a_robot_that_faces_another_way_is_turned_once_and_its_legs_are_those_given(tmp_path):
+    urdf = Path(shutil.copy(URDF, tmp_path))
+    for _ in range(2):
+        given, steps = args(tmp_path, urdf=urdf, forward='-y', legs=['lf=lf_', 'rf=rf_']), Made()
+        assert demo_parts.name_of(given) == 'quadruped_facing_x'
+        demo_parts.prepare(given, steps)
+        turned = tmp_path / 'quadruped_facing_x.urdf'
+        assert given.urdf == turned
+        assert all(str(turned) in words for words in steps.words)
+    assert not steps.words and load_urdf(turned).root() == 'facing_x'
 
 
 def test_gains_of_servos_tune_the_robot_and_drive_it(tmp_path):

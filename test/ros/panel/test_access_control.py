@@ -14,6 +14,7 @@
 
 """Who may come in to the panel, and what may be asked of it."""
 
+from functools import partial
 import json
 
 import pytest
@@ -24,7 +25,7 @@ from cpg_ros.common.files import is_loopback  # noqa: E402, I100
 from cpg_ros.ros.node.parameters import choices  # noqa: E402
 from cpg_ros.ros.panel.pages import LONGEST_REQUEST, read, RequestError  # noqa: E402
 from cpg_ros.ros.panel.robot_view import unit  # noqa: E402
-from cpg_ros.ros.panel.web_server import AccessControl, AccessError, token_for  # noqa: E402
+from cpg_ros.ros.panel.web_server import AccessError, rejected, token_for  # noqa: E402
 
 
 @pytest.mark.parametrize(('host', 'only_here'), [
@@ -68,20 +69,20 @@ def test_tokens():
     ('/socket', 'evil.example:8080', 'http://evil.example:8080', 'not a name of this machine'),
     ('/socket', '', '', 'not a name of this machine')])
 def test_on_loopback_pages_of_this_machine_come_in(path, host, origin, said):
-    found = AccessControl('').validate(path, host, origin)
+    found = rejected('', path, host, origin)
     assert (said in found) if said else not found
 
 
 @pytest.mark.parametrize('query', ['', '?token=', '?token=wor', '?token=wordy', '?token=WORD',
                                    '?Token=word', '?token=w%00ord', '?token=\udcff'])
 def test_a_wrong_token_does_not(query):
-    assert 'token' in AccessControl('word').validate(f'/socket{query}', 'robot:8080', '')
+    assert 'token' in rejected('word', f'/socket{query}', 'robot:8080', '')
 
 
 def test_the_token_does_from_anywhere_but_another_sites_page():
-    door = AccessControl('a b&c')
-    assert not door.validate('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
-    assert door.validate('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
+    door = partial(rejected, 'a b&c')
+    assert not door('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
+    assert door('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
 
 
 @pytest.mark.parametrize('text', [

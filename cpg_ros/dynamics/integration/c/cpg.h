@@ -116,6 +116,9 @@ void cpg_network_step(cpg_track *t);
 #ifdef CPG_INTERNAL
 /* Constants are in flash memory where that is an address space of its own. */
 #if defined(__AVR__)
+#ifndef __FLASH
+#error "compile with -std=gnu99 or later, as the Arduino IDE does: -std=c99 leaves out __flash"
+#endif
 #define CPG_ROM const __flash
 #else
 #define CPG_ROM const
