@@ -150,13 +150,24 @@ def _deviation(tables, memory, sensors, planned, run, level):
 
 
 @jit
+def _possible_speed(tables, memory, run, slot):
+    """Return the wanted forward speed as far as steering goes, m/s."""
+    return limited(memory.wanted_velocity[run, 0, 0], tables.at[slot, -1])
+
+
+@jit
 def _change_strides(tables, gains, memory, run, slot, missing, turned, step):
-    """Fill the changes of the strides; missing speed in m/s, missing heading in rad."""
+    """Fill the changes of the strides; missing speed in m/s, missing heading in rad.
+
+    Returns:
+        Relative increase of their frequency, where they cannot be as long as the speed takes.
+
+    """
     stride, (dt, fraction, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
-        return
-    longer = uneven = 0.0
+        return 0.0
+    longer = uneven = faster = 0.0
     if gains.speed:
         memory.speed_integral[run] = speed.integrate(memory.speed_integral[run], missing, gains,
                                                      fraction * dt)
@@ -166,13 +177,18 @@ def _change_strides(tables, gains, memory, run, slot, missing, turned, step):
                                 memory.wanted_velocity[run, 0, 0])
         memory.heading_integral[run] = integral = heading.integrate(
             memory.heading_integral[run], turned, gains, fraction * dt)
-        uneven = fraction * heading.yaw_rate(turned, integral, gains) / rate
+        # The faster it runs, the sooner a heading error carries it off its line.
+        hurry = max(_possible_speed(tables, memory, run, slot) / sidestep.FAST, 1.0)
+        uneven = fraction * hurry * heading.yaw_rate(turned, integral, gains) / rate
         length = heading.response(tables.at[slot], tables.length[slot],
                                   memory.wanted_velocity[run, 0, 0])
         # No stride is longer than 1: turning back comes before speed.
-        longer = limited(length + longer, max(1.0 - 0.5 * abs(uneven), 0.0)) - length
+        possible = limited(length + longer, max(1.0 - 0.5 * abs(uneven), 0.0)) - length
+        faster = limited(max(longer - possible, 0.0), gains.speed_faster)
+        longer = possible
     for leg in range(stride.shape[0]):
         stride[leg] = longer + uneven * tables.sides[leg]
+    return faster
 
 
 @jit
@@ -215,7 +231,8 @@ def _intend(tables, gains, memory, planned, run, off, step):
         memory.commanded_turn[run], planned.turn[run], gains.sidestep_filter, dt)
     memory.sidestep_correction[run] = sidestep.correct_speed(
         memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run],
-        math.hypot(ground[0], ground[1]), gains, fraction * dt)
+        math.hypot(ground[0], ground[1]), _possible_speed(tables, memory, run, slot), gains,
+        fraction * dt)
     strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
     memory.last_phase[run] = phase
     return slot, Intent(alternates, off.roll - ground[0], off.pitch - ground[1],
@@ -339,14 +356,14 @@ def _stiffen(gains, memory, run, intent, step):
 
 
 @jit
-def _change_frequency(gains, memory, run, steered, intent, phase_rate, step):
+def _change_frequency(gains, memory, run, steered, intent, faster, phase_rate, step):
     """Fill the factor of the stride frequency; phase_rate is the legs' sum, rad/s."""
     scale, (dt, fraction, _, _) = 1.0, step
     frequency = max(intent.strode / dt, 0.1)
     if gains.pace and steered:
         scale += fraction * pace.frequency_change(intent.error, memory.fatigue[run], gains)
     memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
-    scale += fraction * phase_rate / (2.0 * math.pi * frequency * memory.stride.shape[1])
+    scale += faster + fraction * phase_rate / (2.0 * math.pi * frequency * memory.stride.shape[1])
     if gains.touchdown:
         change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
         memory.phase_correction[run] -= change * intent.strode
@@ -385,7 +402,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory.clearance_share[run] = clearance.update(
             memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
         _stiffen(gains, memory, run, intent, step)
-        _change_frequency(gains, memory, run, tables.steered[slot], intent, phase_rate, step)
-        _change_strides(tables, gains, memory, run, slot, -off.vx,
-                        wrapped(planned.heading[run] - sensors.rpy[run, 2]
-                                + planned.lean[run, 2]), step)
+        faster = _change_strides(tables, gains, memory, run, slot, -off.vx,
+                                 wrapped(planned.heading[run] - sensors.rpy[run, 2]
+                                         + planned.lean[run, 2]), step)
+        _change_frequency(gains, memory, run, tables.steered[slot], intent, faster, phase_rate,
+                          step)

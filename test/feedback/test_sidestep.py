@@ -40,14 +40,18 @@ def loop():
 def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():
     added = 0.0
     for _ in range(round(10.0 / DT)):
-        added = sidestep.correct_speed(added, 0.05, 0.1, 0.0, 0.0, GAINS, DT)
+        added = sidestep.correct_speed(added, 0.05, 0.1, 0.0, 0.0, 0.0, GAINS, DT)
     assert added == pytest.approx(0.1 * GAINS.sidestep_more)
-    assert sidestep.correct_speed(added, -0.05, 0.1, 0.0, 0.0, GAINS, DT) < added
-    assert sidestep.correct_speed(added, 0.05, 0.0, 0.0, 0.0, GAINS, DT) == 0.0
+    assert sidestep.correct_speed(added, -0.05, 0.1, 0.0, 0.0, 0.0, GAINS, DT) < added
+    assert sidestep.correct_speed(added, 0.05, 0.0, 0.0, 0.0, 0.0, GAINS, DT) == 0.0
     for turn in (0.1, -0.1):
-        assert sidestep.correct_speed(1.0, 0.0, 0.0, turn, 0.0, GAINS, DT) == pytest.approx(
+        assert sidestep.correct_speed(1.0, 0.0, 0.0, turn, 0.0, 0.0, GAINS, DT) == pytest.approx(
             0.1 * GAINS.sidestep_turning)
-    assert sidestep.correct_speed(1.0, 0.0, 0.0, 0.0, 0.25, GAINS, DT) == pytest.approx(
+    # A fast run drifts aside by itself.
+    assert sidestep.correct_speed(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, GAINS, DT) == 0.0
+    assert sidestep.correct_speed(1.0, 0.0, 0.0, 0.0, 0.0, 2.0, GAINS, DT) == pytest.approx(
+        GAINS.sidestep_fast)
+    assert sidestep.correct_speed(1.0, 0.0, 0.0, 0.0, 0.25, 0.0, GAINS, DT) == pytest.approx(
         0.2 * GAINS.sidestep_slope)
 
 

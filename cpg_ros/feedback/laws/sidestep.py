@@ -21,8 +21,9 @@ drifts sideways when it turns, and on a slope; the same integral acts then.
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, limited, low_passed, StateVariable
 
-#: LEVEL: largest angle of ground that counts as level, rad.
-LEVEL = 0.05
+#: LEVEL: largest angle of ground that counts as level, rad; FAST: forward speed above which a
+#: straight run drifts aside, m/s.
+LEVEL, FAST = 0.05, 1.0
 
 LAW = Law(
     'sidestep', 'follow the sideways speed of cmd_vel', True,
@@ -41,6 +42,9 @@ LAW = Law(
         'sidestep_slope': Gain(1.0, 10.0, 'm/s',
                                'and, on a slope, this times the angle of the ground above '
                                f'{LEVEL:g} rad'),
+        'sidestep_fast': Gain(0.1, 1.0, '',
+                              'and, forward, this times the speed above '
+                              f'{FAST:g} m/s'),
         'sidestep_filter': Gain(0.5, 5.0, 's', 'time constant of the filter on that turn')},
     memory={
         'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
@@ -88,7 +92,7 @@ def advance(displacement, swinging, target, stance, gains, dt):
 
 
 @jit
-def correct_speed(correction, missing, target, turn, slope, gains, dt):
+def correct_speed(correction, missing, target, turn, slope, forward, gains, dt):
     """Return the correction of the commanded speed to the left, m/s, dt in s later.
 
     It is 0 on level ground where neither a speed to the left nor a turn is commanded.
@@ -99,10 +103,12 @@ def correct_speed(correction, missing, target, turn, slope, gains, dt):
         target: commanded speed to the left, m/s.
         turn: commanded yaw rate, low-passed, rad/s.
         slope: angle of the ground, rad.
+        forward: commanded speed, m/s.
         gains: of the law.
         dt: s.
 
     """
     most = (gains.sidestep_more * abs(target) + gains.sidestep_turning * abs(turn)
-            + gains.sidestep_slope * max(slope - LEVEL, 0.0))
+            + gains.sidestep_slope * max(slope - LEVEL, 0.0)
+            + gains.sidestep_fast * max(forward - FAST, 0.0))
     return limited(correction + dt * gains.sidestep_rate * missing, most)

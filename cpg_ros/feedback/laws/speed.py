@@ -25,7 +25,10 @@ LAW = Law(
         'speed_rate': Gain(0.3, 3.0, '1/m',
                            'how much longer strides become per metre of missing distance'),
         'speed_most': Gain(0.3, 3.0, '',
-                           'the most by which speed changes the length of strides')},
+                           'the most by which speed changes the length of strides'),
+        'speed_faster': Gain(0.3, 3.0, '',
+                             'the most by which speed makes them faster, relative to their '
+                             'frequency, where they cannot be as long as it takes')},
     memory={
         'speed_integral': StateVariable('of the missing forward speed [m]')})
 
