@@ -26,6 +26,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # As in typing, which would take longer to load than all of this.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from cpg_ros.analysis.atlas.atlas import atlas
     from cpg_ros.common.errors import CpgError
     from cpg_ros.dynamics.arclength import NoOrbit
     from cpg_ros.dynamics.continuation import bifurcations, continue_orbit  # noqa: I300
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
 
 __version__ = '0.2.0'
 __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLine', 'Pattern',
-           'Preset', 'Range', 'Stepper', 'Symmetry', 'bifurcations', 'coexisting_orbits',
+           'Preset', 'Range', 'Stepper', 'Symmetry', 'atlas', 'bifurcations', 'coexisting_orbits',
            'continue_orbit', 'fit_recording', 'hopf_points', 'load_robot', 'multipliers',
            'phase_response', 'plan', 'read_bag', 'read_csv', 'read_recording', 'simulate',
            'solve_orbit', 'stability', 'verdicts', 'write_fitted']
@@ -63,7 +64,8 @@ _PLACES = {
     'ParameterLine': 'networks.network', 'Pattern': 'motion.pattern',
     'Preset': 'networks.presets', 'Range': 'networks.definition',
     'Stepper': 'dynamics.integration.stepper', 'Symmetry': 'networks.symmetry',
-    'bifurcations': 'dynamics.continuation', 'coexisting_orbits': 'dynamics.solve_orbit',
+    'atlas': 'analysis.atlas.atlas', 'bifurcations': 'dynamics.continuation',
+    'coexisting_orbits': 'dynamics.solve_orbit',
     'continue_orbit': 'dynamics.continuation', 'fit_recording': 'fitting.inversion.recording_fit',
     'hopf_points': 'dynamics.hopf', 'load_robot': 'motion.robot_file',
     'multipliers': 'dynamics.floquet', 'phase_response': 'dynamics.phase_response',

@@ -21,11 +21,13 @@ on the number of islands, but not on the number of workers.
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cpg_ros.analysis.objectives import (
     evaluate,
+    MOST_EXACT,
     objective_names,
+    pairs,
     phase_errors,
     Score,
     search_space,
@@ -173,19 +175,35 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
 EPOCH, MIGRANTS = 3, 0.1
 
 
+# The search of Rashidi et al. 2016, section 4.
+
+#: CROSSOVER, MUTATION: rates of two-point crossover and of the mutation of a bit, as printed;
+#: BITS: of a variable, ours: three decimals of a weight, as their Table 2 has them.
+CROSSOVER, MUTATION, BITS = 0.08, 0.03, 11
+
+
 @dataclass(frozen=True)
 class SearchSetup:
-    """Arguments of search_space for all islands; can be pickled."""
+    """Arguments of search_space for all islands, and whether as in the paper; can be pickled."""
 
     network: str
     gait: str
     bounds: Mapping[str, tuple[float, float]]
     fixed: Mapping[str, float]
+    paper: bool = False
 
     @property
     def space(self) -> Space:
         """Parameter sets among which the gait is searched for."""
         return search_space(self.network, self.gait, self.bounds, self.fixed)
+
+    def build(self, values: np.ndarray) -> Network:
+        """Return a network of the search: from its variables, or from their bits."""
+        if self.paper:
+            low, high = np.array([(variable.low, variable.high) for variable in self.space.free]).T
+            whole = values.reshape(-1, BITS) @ (1 << np.arange(BITS)[::-1])
+            values = low + (high - low) * whole / (2**BITS - 1)
+        return self.space.build(values)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -232,33 +250,48 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.core.evaluator import Evaluator
         from pymoo.core.problem import Problem
+        from pymoo.operators.crossover.pntx import TwoPointCrossover
+        from pymoo.operators.mutation.bitflip import BitflipMutation
+        from pymoo.operators.sampling.rnd import BinaryRandomSampling
         from pymoo.problems.static import StaticProblem
     except ImportError as error:
         raise MissingLibraryError('optimize needs pymoo: pip install pymoo') from error
-    space = epoch.setup.space
-    problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
-                      n_ieq_constr=1,
-                      xl=np.array([variable.low for variable in space.free]),
-                      xu=np.array([variable.high for variable in space.free]))
-    algorithm = (NSGA2(pop_size=epoch.population) if epoch.start is None
-                 else NSGA2(pop_size=epoch.population, sampling=epoch.start))
+    setup, options = epoch.setup, {}
+    space, paper = setup.space, setup.paper
+    if paper:
+        # Their objectives are the phase errors alone.
+        problem = Problem(n_var=BITS * len(space.free), n_obj=len(pairs(space.symmetry)), xl=0,
+                          xu=1, vtype=bool)
+        options = {'sampling': BinaryRandomSampling(),
+                   'crossover': TwoPointCrossover(prob=CROSSOVER),
+                   'mutation': BitflipMutation(prob=1.0, prob_var=MUTATION)}
+    else:
+        problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
+                          n_ieq_constr=1,
+                          xl=np.array([variable.low for variable in space.free]),
+                          xu=np.array([variable.high for variable in space.free]))
+    if epoch.start is not None:
+        options['sampling'] = epoch.start
+    algorithm = NSGA2(pop_size=epoch.population, **options)
     algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
     tried: dict[Network, Score] = {score.network: score for score in epoch.assessed}
     for generation in range(epoch.generations):
         population = algorithm.ask()
-        networks = [space.build(values) for values in population.get('X')]
+        networks = [setup.build(values) for values in population.get('X')]
         new = list(dict.fromkeys(network for network in networks if network not in tried))
         if new:
-            tried.update(zip(new, evaluate(new, space.gait, epoch.seed), strict=True))
+            scores = evaluate(new, space.gait, epoch.seed, 0 if paper else MOST_EXACT)
+            tried.update(zip(new, scores, strict=True))
         scores = [tried[network] for network in networks]
         # Sets whose waveforms miss their requirements come after all others.
-        static = StaticProblem(problem, F=np.array([score.objectives for score in scores]),
-                               G=np.array([[score.shortfall] for score in scores]))
+        static = StaticProblem(problem, F=np.array(
+            [score.objectives[:problem.n_obj] for score in scores]), **(
+                {} if paper else {'G': np.array([[score.shortfall] for score in scores])}))
         Evaluator().eval(static, population)
         algorithm.tell(infills=population)
         progress(generation + 1)
     values = algorithm.pop.get('X')
-    last = [tried[space.build(row)] for row in values]
+    last = [tried[setup.build(row)] for row in values]
     best = sorted(range(len(last)), key=lambda k: (
         last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
     return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
@@ -338,6 +371,7 @@ class Front:
         scores: Pareto front of all sets that were tried, best first.
         tried: all of them, in order.
         best: the first of them, with its exact orbit.
+        by_phase: of a search as in the paper: its Pareto front, of the phase errors alone.
 
     """
 
@@ -345,13 +379,18 @@ class Front:
     scores: tuple[Score, ...]
     tried: tuple[Score, ...]
     best: VerifiedGait
+    by_phase: tuple[Score, ...] = ()
 
 
 def optimise(network_name: str, gait: str, *, population: int = 60, generations: int = 12,
              seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
              fixed: Mapping[str, float] | None = None, progress: bool = True,
-             islands: int = 1, executor: Executor | None = None) -> Front:
+             islands: int = 1, executor: Executor | None = None, paper: bool = False) -> Front:
     """Search for weights that give a network a gait, by NSGA-II on islands.
+
+    As in the paper, weights are coded in bits, with the paper's rates of crossover and mutation,
+    and the objectives are the phase errors alone; other parameters are those of the gait's preset.
+    The sets of that front are then judged as those of any other search.
 
     Args:
         network_name: as search_space takes it.
@@ -365,6 +404,7 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
         islands: number of populations that evolve separately and exchange their best; the result
             depends on it, but not on the number of workers.
         executor: for the islands; None for this process.
+        paper: search as Rashidi et al. 2016 do.
 
     Raises:
         InputError: an unknown network, gait or variable, or an unusable bound.
@@ -372,7 +412,15 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
         NoGaitFound: no set passed.
 
     """
-    space = search_space(network_name, gait, bounds or {}, fixed or {})
+    bounds, fixed = dict(bounds or {}), dict(fixed or {})
+    space = search_space(network_name, gait, bounds, fixed)
+    if paper:
+        preset = space.network.presets()[gait].network.as_dict()
+        given = {*bounds, *fixed}
+        fixed |= {variable.name: preset[variable.members[0]] for variable in space.free
+                  if not given & {variable.name, *variable.members}
+                  and variable.members[0] not in space.network.couplings}
+        space = search_space(network_name, gait, bounds, fixed)
     if population < 4 or generations < 1:
         raise InputError(f'population {population} must be at least 4 and generations '
                          f'{generations} at least 1')
@@ -380,7 +428,7 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
         raise InputError(f'seed {seed} must not be negative')
     if islands < 1:
         raise InputError(f'islands {islands} must be at least 1')
-    setup = SearchSetup(network_name, gait, dict(bounds or {}), dict(fixed or {}))
+    setup = SearchSetup(network_name, gait, bounds, fixed, paper)
     with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
         if islands == 1:
             epoch = Epoch(setup, population, generations, seed, seed)
@@ -388,7 +436,11 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
                      else executor.submit(evolve, epoch).result()).tried
         else:
             tried = archipelago(setup, population, generations, seed, islands, executor, bar)
-    return _front(space, tried, seed)
+    if not paper:
+        return _front(space, tried, seed)
+    by_phase = non_dominated(list(tried), len(pairs(space.symmetry)))
+    judged = tuple(evaluate([score.network for score in by_phase], gait, seed, TRIALS))
+    return replace(_front(space, judged, seed), tried=tried, by_phase=tuple(by_phase))
 
 
 def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
@@ -398,7 +450,7 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
         best = min(tried, key=lambda score: (score.errors.max(), score.shortfall, score.stability))
         raise _nothing(space, tried, _closeness(best))
     for _ in range(TRIALS):
-        front = sorted(_non_dominated(left), key=_order)
+        front = sorted(non_dominated(left), key=_order)
         try:
             verified = polish(front[0], space.gait, seed)
         except NotVerified as error:
@@ -431,7 +483,8 @@ def _order(score: Score) -> tuple[float, float]:
     return np.ceil(score.errors.max() / SAME), score.stability
 
 
-def _non_dominated(scores: list[Score]) -> list[Score]:
-    values = np.array([score.objectives for score in scores])
+def non_dominated(scores: list[Score], objectives: int | None = None) -> list[Score]:
+    """Return the Pareto front of the first objectives, by default of all."""
+    values = np.array([score.objectives[:objectives] for score in scores])
     return [score for score, row in zip(scores, values, strict=True)
             if not ((values <= row).all(axis=1) & (values < row).any(axis=1)).any()]

@@ -328,13 +328,15 @@ def _proven(score: Score, cycle: settling.LimitCycle, gait: str) -> Score:
                    state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)
 
 
-def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
+def evaluate(networks: Sequence[Network], gait: str, seed: int,
+             most_exact: int = MOST_EXACT) -> list[Score]:
     """Simulate the parameter sets of a generation in a batch, and score each.
 
     Args:
         networks: of one kind.
         gait: one of theirs.
         seed: of the start.
+        most_exact: most sets whose orbit is solved for.
 
     """
     results = []
@@ -346,7 +348,7 @@ def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
     scores = [score for score, _ in results]
     worth = sorted((k for k, (_, cycle) in enumerate(results) if cycle is not None),
                    key=lambda k: scores[k].stability)
-    for k in worth[:MOST_EXACT]:
+    for k in worth[:most_exact]:
         cycle = results[k][1]
         assert cycle is not None
         scores[k] = _proven(scores[k], cycle, gait)

@@ -182,6 +182,9 @@ def _parser() -> Parser:
                         'populations that evolve separately and exchange their best members, one '
                         'job each; the result depends on this number, but not on the number of '
                         'workers (default: %(default)s)')
+    parser.add_argument('--paper', action='store_true', help='search as Rashidi et al. 2016: '
+                        'weights in bits, two-point crossover 0.08, mutation 0.03, the phase '
+                        'errors as the only objectives, and the preset for all but the weights')
     add_options(parser)
     parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
@@ -210,9 +213,19 @@ def selected_set(front: Front) -> str:
     rows.append(('leading multiplier', f'{best.leading:.4f}', 'a cycle'))
     if best.orbit.waves.max():
         rows.append(('waveforms differ by', f'{best.differences[0]:.3f}', 'of their RMS'))
+    if front.by_phase:
+        rows.append(('front by phases alone', f'{len(front.by_phase)} sets, '
+                     + ', '.join(phase_ranges(front)), 'degrees'))
     head = (f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
             f'{len(front.scores)} on the Pareto front; selected:')
     return '\n'.join([head, *(f'  {line}' for line in table(rows, '<><'))])
+
+
+def phase_ranges(front: Front) -> list[str]:
+    """Return the range of each phase error on the front of a search as in the paper, degrees."""
+    errors = np.array([score.errors for score in front.by_phase])
+    return [f'{low:.2f} to {high:.2f}' for low, high in
+            zip(errors.min(axis=0), errors.max(axis=0), strict=True)]
 
 
 def _optimize(args: argparse.Namespace) -> int:
@@ -227,7 +240,7 @@ def _optimize(args: argparse.Namespace) -> int:
                          generations=args.generations, seed=args.seed,
                          bounds=dict(args.bounds), fixed=dict(args.fix),
                          progress=executor is None and sys.stderr.isatty(),
-                         islands=args.islands, executor=executor)
+                         islands=args.islands, executor=executor, paper=args.paper)
     write_front(args.out / 'front.csv', front)
     draw_front(args.out / 'front.png', front)
     write_presets(args.out / 'preset.yaml', front.space.network, {name: front.best.preset},

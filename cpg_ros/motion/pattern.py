@@ -279,6 +279,23 @@ class Pattern:
         """Put the first leg at a phase in cycles, before the first advance."""
         self._newest.reseed(phase)
 
+    @property
+    def clock(self) -> float:
+        """Phase of the first leg by the clock, cycles; setting it moves the network, too."""
+        return float(self._newest.phase)
+
+    @clock.setter
+    def clock(self, phase: float) -> None:
+        self._newest.reseed(phase)
+
+    def like(self, other: 'Pattern') -> None:
+        """Take phase, strides and positions of another pattern in the same, full gait."""
+        self.clock = other.clock
+        for mine, its in ((self.position, other.position), (self.velocity, other.velocity)):
+            mine[:] = its
+        if self.strides is not None and other.strides is not None:
+            self.strides.state[:] = other.strides.state
+
     # -- requests from other threads ------------------------------------------------------
 
     def apply(self, plan: GaitPlan, transition: float) -> None:

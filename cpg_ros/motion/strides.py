@@ -38,13 +38,15 @@ class StrideCommand:
         stride: factor of each leg's stride, shape (legs,); 1 is the gait's own.
         rate: derivative of the strides, 1/s.
         pace: factor of the stride frequency.
+        state: strides and pace, and their rates, 1/s, shape (2, legs + 1).
 
     """
 
     def __init__(self, legs: int) -> None:
         # One row: the legs' strides and the pace.
-        self._now, self._goal = np.ones((2, legs + 1))
-        self._rate = np.zeros(legs + 1)
+        self.state = np.stack([np.ones(legs + 1), np.zeros(legs + 1)])
+        self._now, self._rate = self.state
+        self._goal = np.ones(legs + 1)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
         self._trim: np.ndarray | None = None
         self._struct = Smoother(self._now.ctypes.data, self._rate.ctypes.data,

@@ -20,7 +20,7 @@ x(t - delay); p)``; networks without delay ignore the second argument.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, TypeVar, Union
@@ -139,13 +139,16 @@ class Cell:
 
 
 class Parameters:
-    """Parameters in a network's equations: one number each, or one for each cell."""
+    """Parameters in a network's equations: one number each, or one for each cell; constants."""
 
-    def __init__(self, names: Iterable[str]) -> None:
-        """Define the parameters, and the groups with one parameter for each cell."""
-        self._known = set(names)
+    def __init__(self, names: Iterable[str], constants: Mapping[str, tuple[float, 'Range']]
+                 ) -> None:
+        """Define the parameters, the groups with one parameter for each cell, and constants."""
+        self._known, self._constants = set(names), constants
 
-    def __getattr__(self, name: str) -> Term:
+    def __getattr__(self, name: str) -> Number:
+        if name in self._constants:
+            return self._constants[name][0]
         if name not in self._known:
             raise AttributeError(f"'{name}' is not one of {', '.join(sorted(self._known))}")
         return Term(f'p_{name}')
@@ -186,6 +189,7 @@ class NetworkDefinition(ABC):
         step: integration step in real time, model time; the error on an orbit is about 1e-9 a
             cycle.
         ranges: parameter -> range at run time.
+        constants: constant of the equations -> value and range; see Network.varying.
         legs: assignment -> leg -> cells from 1; the first cell gives the leg's phase. The first
             assignment is the default.
         family: network from which this one was derived for another number of legs.
@@ -224,6 +228,7 @@ class NetworkDefinition(ABC):
     needed: ClassVar[dict[str, str]] = {}
     step: ClassVar[float]
     ranges: ClassVar[dict[str, Range]]
+    constants: ClassVar[dict[str, tuple[float, Range]]] = {}
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
     sides: ClassVar[dict[str, str]] = {}
     girdles: ClassVar[dict[str, str]] = {}
@@ -280,6 +285,9 @@ class NetworkDefinition(ABC):
 
         """
         members = cls.groups.get(name, (name,))
+        if name in cls.constants:
+            raise InputError(f"'{name}' is a constant of the network {cls.name}; it is a "
+                             f'parameter of {cls.name}+{name}')
         if not set(members) <= set(cls.parameters()):
             names = ', '.join((*cls.groups, *cls.parameters()))
             raise InputError(f"'{name}' is not one of {names}")

@@ -124,7 +124,8 @@ class Equations:
 
         """
         cell = Cell(network.variables, network.cells)
-        rates = network.equations(cell, Parameters((*network.parameters(), *network.by_cell())))
+        rates = network.equations(cell, Parameters(
+            (*network.parameters(), *network.by_cell()), network.constants))
         self.texts = tuple(term.text if isinstance(term, Term) else repr(float(term))
                            for term in rates)
         if len(self.texts) != network.variables:
@@ -140,7 +141,8 @@ class Equations:
         self.by_cell = network.by_cell()
         self.rows = tuple(dict.fromkeys(re.findall(r'\bp_(\w+)', text)))
         words = repr((self.texts, cell.arguments, network.cells))
-        self.key = f'{network.name}_{hashlib.sha256(words.encode()).hexdigest()[:16]}'
+        digest = hashlib.sha256(words.encode()).hexdigest()[:16]
+        self.key = f'{network.name.replace("+", "_")}_{digest}'
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -23,8 +23,8 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping
 import dataclasses
 from dataclasses import dataclass, replace
-from functools import lru_cache, wraps
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from functools import cache, lru_cache, wraps
+from typing import Any, ClassVar, NamedTuple, TypeAlias, TypeVar
 
 from cpg_ros.common.errors import InputError
 from cpg_ros.networks import presets as preset_files
@@ -50,7 +50,14 @@ class LeastCoupling(NamedTuple):
 
 
 class Network(NetworkDefinition):
-    """Parameters of a network, as a frozen dataclass of floats; see NetworkDefinition."""
+    """Parameters of a network, as a frozen dataclass of floats; see NetworkDefinition.
+
+    Attributes:
+        varied: network from which this one was derived by ``varying``, and the constants; or ().
+
+    """
+
+    varied: ClassVar[tuple[Any, ...]] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
@@ -58,6 +65,8 @@ class Network(NetworkDefinition):
             cls.symmetry = _of_cell(cls.symmetry)  # type: ignore[assignment,method-assign]
 
     def __reduce__(self) -> Any:
+        if self.varied:
+            return _unpickle, (*self.varied, tuple(self.as_dict().values()))
         if self.family is None:
             return super().__reduce__()
         return unpickle, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
@@ -100,6 +109,22 @@ class Network(NetworkDefinition):
         """Parameters as the kernel takes them, one value for each cell, shape (rows, cells)."""
         return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)],
                         dtype=float)
+
+    @classmethod
+    def varying(cls, *names: str) -> 'type[Network]':
+        """Return this network with constants of its equations as further parameters.
+
+        Its name is ``quadruped+current`` for the constant ``current`` of the network quadruped.
+
+        Raises:
+            InputError: a name is not that of a constant.
+
+        """
+        for name in names:
+            if name not in cls.constants:
+                raise InputError(f"'{name}' is not a constant of the network {cls.name}: "
+                                 f'{", ".join(cls.constants) or "it has none"}')
+        return _varying(cls, tuple(dict.fromkeys(names))) if names else cls
 
     @classmethod
     def presets(cls) -> dict[str, Preset]:
@@ -201,6 +226,31 @@ class Network(NetworkDefinition):
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else
                 'walk-like' if alike and apart == {0.5} else 'neither')
+
+
+@cache
+def _varying(network: type[Network], names: tuple[str, ...]) -> type[Network]:
+    values = {name: network.constants[name][0] for name in names}
+    limits = {name: network.constants[name][1] for name in names}
+
+    def presets(cls: type[Network]) -> dict[str, Preset]:
+        return {name: replace(preset, network=cls(**preset.network.as_dict()))
+                for name, preset in network.presets().items()}
+
+    return dataclass(frozen=True)(type(f'{network.__name__}With{"And".join(names)}', (network,), {
+        '__module__': network.__module__, '__doc__': network.__doc__,
+        '__annotations__': dict.fromkeys(names, float), **values,
+        'name': '+'.join((network.name, *names)), 'varied': (network, names),
+        'ranges': network.ranges | limits, 'presets': classmethod(presets),
+        'constants': {name: value for name, value in network.constants.items()
+                      if name not in names},
+        'searched': network.searched and network.searched | {
+            name: (value, value) for name, value in values.items()}}))
+
+
+def _unpickle(network: type[Network], names: tuple[str, ...], values: tuple[float, ...]
+              ) -> Network:
+    return network.varying(*names)(*values)
 
 
 def _of_cell(symmetry: Callable[[Any, str], Symmetry]) -> Callable[[Any, str], Symmetry]:

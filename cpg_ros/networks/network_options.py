@@ -15,6 +15,7 @@
 """The options --network, --presets, --preset and --set: a network and its parameters."""
 
 from argparse import ArgumentParser, Namespace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +36,8 @@ def add_network_options(parser: ArgumentParser) -> None:
     """Add the options to a parser."""
     parser.add_argument('--network', metavar='NAME',
                         help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
-                        f'one (default: {DEFAULT}, or that of --presets)')
+                        f'one; quadruped+current is the quadruped with its constant current as a '
+                        f'parameter (default: {DEFAULT}, or that of --presets)')
     parser.add_argument('--presets', type=Path, metavar='FILE', help='take --preset from this '
                         'file: preset.yaml of optimize, or the parameter file of inversion')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
@@ -44,7 +46,8 @@ def add_network_options(parser: ArgumentParser) -> None:
                             f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
                         metavar='PARAMETER=VALUE', help='parameter values, such as c=6.5 tau=0.4; '
-                        'w_a sets all four weights of the biped')
+                        'w_a sets all four weights of the biped; a constant of the equations '
+                        'becomes a parameter')
 
 
 def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
@@ -101,6 +104,10 @@ def preset_from(args: Namespace) -> tuple[Preset, Network]:
         wrong = f"'{name}' is not one of" if name else f'{args.presets} has several, choose from'
         raise InputError(f'--preset: {wrong} {", ".join(presets)}')
     preset = presets[name]
+    constants = [key for key, _ in args.set if key in kind.constants]
+    if constants:
+        kind = kind.varying(*constants)
+        preset = replace(preset, network=kind(**preset.network.as_dict()))
     network = preset.network
     for key, _ in args.set:
         if key not in (names := (*kind.groups, *kind.parameters())):

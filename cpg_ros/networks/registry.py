@@ -17,7 +17,8 @@
 A package offers a network by an entry point of the group ``cpg_ros.networks``: ``my_network =
 my_package.my_network:MyNetwork``. A file that defines one network class is named by its path; its
 presets stand in it, or beside it in a file of the same stem with the suffix .yaml. A number after
-the name of a network for any number of legs selects that number: ``delayed6``.
+the name of a network for any number of legs selects that number: ``delayed6``. Constants after a
+plus are parameters, too: ``quadruped+current``.
 """
 
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -198,6 +199,9 @@ class _Networks(Mapping[str, type[Network]]):
             KeyError: there is no network of this name.
 
         """
+        name, *constants = name.split('+')
+        if constants:
+            return _varying(self[name], constants)
         named = {**SHIPPED, **{network.name: network for network in self.files}}
         if name in named:
             return named[name]
@@ -243,6 +247,9 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
             message names the file and the reason.
 
     """
+    name, *constants = name.split('+')
+    if constants:
+        return _varying(find_network(name, folder), constants)
     if is_path(name):
         try:
             path = ((folder or Path()) / Path(name).expanduser()).resolve()
@@ -259,7 +266,8 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
 
 def reference(name: str) -> str:
     """Return the name or file by which find_network finds a network in another process."""
-    return str(NETWORKS.files.get(NETWORKS[name], name))
+    name, *constants = name.split('+')
+    return '+'.join((str(NETWORKS.files.get(NETWORKS[name], name)), *constants))
 
 
 def numbered(legs: int) -> tuple[type[Network], ...]:
@@ -277,6 +285,13 @@ def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]
         return with_legs(network, len(legs))
     except InputError:
         return network
+
+
+def _varying(network: type[Network], constants: list[str]) -> type[Network]:
+    try:
+        return network.varying(*constants)
+    except InputError as error:
+        raise NetworkError(str(error)) from error
 
 
 def _numbered(family: str, legs: int) -> type[Network]:

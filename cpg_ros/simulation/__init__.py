@@ -18,4 +18,5 @@ Imports ``analysis``, ``feedback`` and the rooms below them; knows nothing of RO
 """
 
 __all__ = ['biped_run', 'bodies', 'body', 'closed_loop', 'recorder', 'robot_model', 'robot_setup',
-           'run_metrics', 'scenario', 'sensors', 'terrain', 'tuning', 'urdf_model']
+           'run_metrics', 'scenario', 'sensors', 'stride_map', 'terrain', 'tuning',
+           'urdf_model']

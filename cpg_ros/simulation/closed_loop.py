@@ -24,7 +24,7 @@ import math
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.gains import Gains, VARIABLES
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.laws.virtual_stiffness import stretch
 from cpg_ros.feedback.tick import PlannedMotion
@@ -51,6 +51,7 @@ class Patterns:
     """As many patterns as runs, which know the same gaits.
 
     Attributes:
+        patterns: one a run.
         planned: the motion before any correction; its arrays are overwritten by plan.
 
     """
@@ -63,12 +64,12 @@ class Patterns:
         """
         self._plans, self._feedback, self._dt, self._trimmed = plans, feedback, dt, trimmed
         first, runs = next(iter(plans.values())), len(scenarios)
-        self._patterns = [Pattern(first, RAMP, strides=StrideCommand(len(first.robot.legs)))
+        self.patterns = [Pattern(first, RAMP, strides=StrideCommand(len(first.robot.legs)))
                           for _ in scenarios]
         self.planned = PlannedMotion.zeros(runs, len(first.robot.joints))
         self.planned.velocity[:, 0] = [scenario.speed for scenario in scenarios]
         self._position = self.planned.angles.copy()
-        for run, (pattern, scenario) in enumerate(zip(self._patterns, scenarios, strict=True)):
+        for run, (pattern, scenario) in enumerate(zip(self.patterns, scenarios, strict=True)):
             pattern.begin_at(scenario.phase)
             if any(scenario.pose):
                 pattern.body.go_to(scenario.pose, RAMP)
@@ -84,15 +85,15 @@ class Patterns:
 
     def _steer(self, run: int, plan: GaitPlan) -> None:
         if plan.motion.steering is not None:
-            self._patterns[run].steer(*plan.steer(self.planned.velocity[run, 0],
+            self.patterns[run].steer(*plan.steer(self.planned.velocity[run, 0],
                                                   self.planned.turn[run]))
         else:
-            self._patterns[run].steer(np.ones(len(plan.robot.legs)), 1.0)
+            self.patterns[run].steer(np.ones(len(plan.robot.legs)), 1.0)
 
     @property
     def level(self) -> float:
         """0 at the stand, 1 in the full gait: the least of all runs."""
-        return min(pattern.level for pattern in self._patterns)
+        return min(pattern.level for pattern in self.patterns)
 
     def plan(self) -> None:
         """Advance by one time step and fill the planned motion."""
@@ -100,14 +101,14 @@ class Patterns:
         self._time += self._dt
         while self._events and self._events[-1][0] <= self._time:
             _, run, name, command = self._events.pop()
-            plan = self._plans[name] if name else self._patterns[run].plan
+            plan = self._plans[name] if name else self.patterns[run].plan
             if name:
-                self._patterns[run].apply(plan, TRANSITION)
+                self.patterns[run].apply(plan, TRANSITION)
             else:
                 planned.velocity[run], planned.turn[run] = command[:2], command[2]
             self._steer(run, plan)
         planned.heading[:] += planned.turn * self._dt
-        for run, pattern in enumerate(self._patterns):
+        for run, pattern in enumerate(self.patterns):
             if self._trimmed:
                 pattern.frequency_scale = feedback.memory.frequency_scale[run]
             planned.angles[run] = pattern.plan_tick(self._dt)
@@ -118,7 +119,7 @@ class Patterns:
 
     def move(self, angles: np.ndarray) -> np.ndarray:
         """Return angles, rad, shape (runs, joints), within the joints' limits and speeds."""
-        for pattern, goal, position in zip(self._patterns, angles, self._position, strict=True):
+        for pattern, goal, position in zip(self.patterns, angles, self._position, strict=True):
             pattern.move(self._dt, goal)
             position[:] = pattern.position
         return self._position
@@ -157,6 +158,14 @@ class _Bodies:
         #: Runs that go on, as indices and as what selects their rows.
         self._going = np.arange(runs)
         self._some: slice | np.ndarray = slice(None)
+
+    @property
+    def parts(self) -> tuple[np.ndarray, ...]:
+        """State of the physics, what sensors show of it, the bases' last speeds; solver's start.
+
+        The first axis of each is the run; they may be changed.
+        """
+        return self._state, self._sensors, self._earlier, self._warm
 
     def measure(self, senses: SensorData) -> None:
         """Fill the sensors' exact values, and what is known of the bases."""
@@ -209,10 +218,92 @@ class _Bodies:
         return bool(self._going.size)
 
 
+class Walk:
+    """Bodies that walk off from the stand, their patterns and their feedback.
+
+    Attributes:
+        patterns, feedback, bodies: of all runs.
+        senses: exact measurements of the last tick.
+        state_of: estimate where there is no feedback.
+        indices, order: of the joints in ``Robot.order`` among the robot's, and the inverse.
+
+    """
+
+    def __init__(self, batch: 'ClosedLoopBatch', scenarios: Sequence[Scenario],
+                 gains: Gains | None, expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None,
+                 noise: SensorNoise | None = None) -> None:
+        """Stand; arguments as of ClosedLoopBatch.run."""
+        robot, runs, self._dt, self._gains = batch.robot, len(scenarios), batch.timestep, gains
+        if not isinstance(expected, Mapping):
+            expected = {} if expected is None else {batch.plan.name: expected}
+        self.feedback = Feedback(batch.geometry, gains, runs, len(robot.joints))
+        for name, plan in batch.plans.items():
+            self.feedback.learn(plan, expected.get(name))
+        self.state_of = BodyState(batch.geometry, runs)
+        self.patterns = Patterns(batch.plans, self.feedback, scenarios, self._dt,
+                                 gains is not None)
+        self._limits = np.stack([robot.column('lower'), robot.column('upper')])
+        self.indices = robot.order_indices
+        self.order = np.argsort(self.indices)
+        self.bodies = _Bodies(batch, scenarios, self.order)
+        self.senses = SensorData.zeros(runs, len(robot.legs), len(self.order))
+        self._noisy = None if noise is None else NoisySenses(noise, runs, len(robot.legs),
+                                                             self._dt)
+        self._delay = 0.0 if noise is None else noise.delay
+
+    def command(self) -> tuple[SensorData, np.ndarray]:
+        """Advance patterns and feedback by a tick.
+
+        Returns:
+            What the sensors show, and the targets of the joints, in ``Robot.order``, rad, shape
+                (runs, joints).
+
+        """
+        patterns, feedback, gains, dt = self.patterns, self.feedback, self._gains, self._dt
+        patterns.plan()
+        self.bodies.measure(self.senses)
+        noticed = self.senses if self._noisy is None else self._noisy(self.senses)
+        if gains is not None:
+            angles = feedback.advance(noticed, patterns.planned, dt, 1.0, patterns.level,
+                                      self._delay)
+        else:
+            angles = patterns.planned.angles
+            self.state_of.update(noticed, dt)
+        angles = patterns.move(angles)
+        if gains is not None and gains.virtual_stiffness:
+            stretch(angles, noticed.joint_positions, feedback.memory.stiff, gains, self._limits)
+        return noticed, angles[:, self.indices]
+
+    def go(self, ticks: int) -> None:
+        """Take some ticks without a push."""
+        for _ in range(ticks):
+            _, angles = self.command()
+            self.bodies.step(angles, np.zeros((len(angles), 2)), self.feedback.memory.kp_scale)
+
+    def take(self, other: 'Walk') -> None:
+        """Put all runs, which have not begun, into the state of another walk's only run.
+
+        That one is in its full gait, where no limit of a joint acts.
+        """
+        memory, (pattern,) = self.feedback.memory, other.patterns.patterns
+        for name, part, source in zip(memory._fields, memory, other.feedback.memory, strict=True):
+            if name in VARIABLES:
+                part[:] = source
+        for part, source in zip(self.bodies.parts, other.bodies.parts, strict=True):
+            part[:] = source
+        self.patterns.plan()
+        while self.patterns.level < 1.0:
+            self.patterns.move(np.tile(pattern.position, (len(memory.velocity), 1)))
+            self.patterns.plan()
+        for each in self.patterns.patterns:
+            each.like(pattern)
+
+
 class ClosedLoopBatch(BatchPhysics):
     """Bodies of one robot with feedback from their sensors.
 
     Attributes:
+        robot: that of the gaits.
         plans: the gaits that they know, by name; runs begin with the first.
         geometry: of the legs.
 
@@ -226,11 +317,11 @@ class ClosedLoopBatch(BatchPhysics):
             SimulationError: MuJoCo is missing, or the model cannot be used.
 
         """
-        self._robot = plans[0].robot
-        super().__init__(Body(name, self._robot, kp, kd, timestep, add_ground), threads)
+        self.robot = plans[0].robot
+        super().__init__(Body(name, self.robot, kp, kd, timestep, add_ground), threads)
         self.plans = {plan.name: plan for plan in plans}
-        self.geometry = geometry_of(self._robot, self._robot.geometry
-                                    or geometry_from(self._robot, load_description(name)))
+        self.geometry = geometry_of(self.robot, self.robot.geometry
+                                    or geometry_from(self.robot, load_description(name)))
 
     @property
     def plan(self) -> GaitPlan:
@@ -257,49 +348,28 @@ class ClosedLoopBatch(BatchPhysics):
                 joints); of a run that has ended they mean nothing.
 
         """
-        dt, runs, legs = self.timestep, len(scenarios), len(self._robot.legs)
-        if not isinstance(expected, Mapping):
-            expected = {} if expected is None else {self.plan.name: expected}
-        feedback = Feedback(self.geometry, gains, runs, len(self._robot.joints))
-        for name, plan in self.plans.items():
-            feedback.learn(plan, expected.get(name))
-        memory, state_of = feedback.memory, BodyState(self.geometry, runs)
-        pattern = Patterns(self.plans, feedback, scenarios, dt, gains is not None)
-        limits = np.stack([self._robot.column('lower'), self._robot.column('upper')])
-        indices = self._robot.order_indices
-        order, steps = np.argsort(indices), round(duration / dt)
-        bodies = _Bodies(self, scenarios, order)
-        senses = SensorData.zeros(runs, legs, len(order))
-        noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
+        dt, steps = self.timestep, round(duration / self.timestep)
+        walk = Walk(self, scenarios, gains, expected, noise)
+        memory, bodies, senses = walk.feedback.memory, walk.bodies, walk.senses
         forces = np.stack([scenario.forces(steps, dt) for scenario in scenarios], axis=1)
         signals = {'place': bodies.place, 'rpy': senses.rpy, 'velocity': bodies.velocity,
-                   'estimated': memory.velocity if gains is not None else state_of.velocity,
-                   'angular_velocity': senses.angular_velocity, 'phase': pattern.planned.phase,
+                   'estimated': memory.velocity if gains is not None else walk.state_of.velocity,
+                   'angular_velocity': senses.angular_velocity,
+                   'phase': walk.patterns.planned.phase,
                    'kp_scale': memory.kp_scale, 'stiff': memory.stiff}
         record = {key: np.zeros((steps, *value.shape)) for key, value in signals.items()}
-        work, delay = np.zeros((steps, runs)), 0.0 if noise is None else noise.delay
+        work = np.zeros((steps, len(scenarios)))
         kp, kd = np.array([(scenario.kp, scenario.kd) for scenario in scenarios]).T
         for k in range(steps):
-            pattern.plan()
-            bodies.measure(senses)
-            noticed = senses if noisy is None else noisy(senses)
-            if gains is not None:
-                angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
-            else:
-                angles = pattern.planned.angles
-                state_of.update(noticed, dt)
-            angles = pattern.move(angles)
-            if gains is not None and gains.virtual_stiffness:
-                stretch(angles, noticed.joint_positions, memory.stiff, gains, limits)
+            noticed, angles = walk.command()
             for key, value in signals.items():
                 record[key][k] = value
-            speeds = senses.joint_velocities[:, indices]
-            _, applied = torques(self.body.model, angles[:, indices],
-                                 senses.joint_positions[:, indices], speeds,
-                                 memory.kp_scale * kp, kd)
+            speeds = senses.joint_velocities[:, walk.indices]
+            _, applied = torques(self.body.model, angles, senses.joint_positions[:, walk.indices],
+                                 speeds, memory.kp_scale * kp, kd)
             work[k] = motor_power(applied, speeds)
-            observe(noticed, applied[:, order])
-            bodies.step(angles[:, indices], forces[k], memory.kp_scale)
+            observe(noticed, applied[:, walk.order])
+            bodies.step(angles, forces[k], memory.kp_scale)
             if not bodies.go_on(senses.rpy, goal, k * dt):
                 break
         for rows in (*record.values(), work):

@@ -180,6 +180,27 @@ def test_without_pymoo_it_says_how_to_get_it(tmp_path):
     assert process.stderr == 'optimize: optimize needs pymoo: pip install pymoo\n'
 
 
+def test_as_in_the_paper_weights_are_bits_and_phases_the_only_objectives(tmp_path, capsys):
+    assert optimize.main(['--paper', '--gait', 'run', '--population', '24', '--generations', '4',
+                          '--out', str(tmp_path)]) == 0
+    assert 'front by phases alone' in capsys.readouterr().out
+    front = nsga2.optimise('biped', 'run', population=24, generations=4, progress=False,
+                           paper=True)
+    preset = read_presets(tmp_path / 'preset.yaml', Biped)['run_optimised']
+    assert preset == front.best.preset
+    # All but the weights is as in the preset, and a weight is one of 2^11 in [-1, 1].
+    stated = PRESETS['run'].network
+    for score in front.tried:
+        assert (score.network.current, score.network.phi) == (stated.current, stated.phi)
+        assert not score.exact
+        steps = (np.array([score.network.w_21, score.network.w_31, score.network.w_41])
+                 + 1.0) * 2047 / 2
+        assert np.abs(steps - np.round(steps)).max() < 0.06
+    errors = np.array([score.errors for score in front.tried])
+    for score in front.by_phase:
+        assert not ((errors <= score.errors - 0.001).all(axis=1)).any()
+
+
 def test_help_names_all_gaits():
     process = run('--help')
     assert process.returncode == 0

@@ -17,11 +17,14 @@
 from dataclasses import replace
 from itertools import pairwise
 import math
+import pickle
 
+from cpg_ros.analysis import analyze
+from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 from depth import examples
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -29,7 +32,7 @@ from hypothesis.extra.numpy import arrays
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, root
 from vector_functions import exp, over
 
 KINDS = pytest.mark.parametrize('kind', [Quadruped, Biped])
@@ -181,3 +184,61 @@ def test_the_stand_of_the_quadruped():
     stand, network = on_nullcline(v), Quadruped(0.0, 0.0, 0.0, 0.0)
     assert np.trace(network.jacobian(stand)) / 8 == pytest.approx(-1.2407, abs=5e-5)
     assert np.abs(simulate(network, stand, 10.0, 0.01).x - stand).max() < 1e-13
+
+
+# -- constants of the cells ----------------------------------------------------------------------
+
+VARYING = NETWORKS['quadruped+current+v4+diffusion']
+
+
+@KINDS
+def test_constants_do_not_change_what_they_are_in(kind):
+    varying = kind.varying(*kind.constants)
+    assert not varying.constants
+    network = varying(**WALK[kind].as_dict())
+    x = START[kind] + 0.1
+    assert network.rates(x) == pytest.approx(WALK[kind].rates(x), abs=1e-13)
+    assert set(varying.presets()) == set(kind.presets())
+
+
+def test_a_constant_is_a_parameter_of_the_network_that_names_it():
+    network = VARYING(**WALK[Quadruped].as_dict(), current=0.7, v4=0.25, diffusion=0.3)
+    assert pickle.loads(pickle.dumps(network)) == network
+    v, w = START[Quadruped].reshape(2, -1)
+    p, cells = WALK[Quadruped], np.arange(8)
+    last, beside, across = (cells - 2) % 8, cells ^ 1, (cells + 4) % 8
+    rates = np.stack([
+        -3 * fraction(v, 0.2, 0.4) * (v - 1) - 0.6 * (v + 1.8) - 1.8 * w * (v + 0.8) + 0.7
+        + p.alpha * (v[last] - 0.3 * v) + p.gamma * (v[beside] - 0.3 * v)
+        + p.xi * (v[across] - 0.3 * v),
+        0.2 * np.cosh((v - 0.3) / 0.5) * (fraction(v, 0.3, 0.25) - w)
+        + p.beta * (w[last] - 0.3 * w) + p.delta * (w[beside] - 0.3 * w)
+        + p.eta * (w[across] - 0.3 * w)])
+    assert network.rates(START[Quadruped]) == pytest.approx(rates.ravel(), abs=1e-13)
+
+
+def test_diffusive_coupling_does_not_act_between_equal_cells():
+    network = VARYING(**WALK[Quadruped].as_dict(), diffusion=1.0)
+    alone = VARYING(0.0, 0.0, 0.0, 0.0)
+    equal = np.repeat([0.3, 0.1], 8)
+    assert network.rates(equal) == pytest.approx(alone.rates(equal), abs=1e-15)
+
+
+def test_hopf_points_over_the_current_are_those_of_the_linearised_cell():
+    network = NETWORKS['quadruped+current'](**PRESETS['quadruped']['trot'].network.as_dict())
+    point = next(point for point in hopf_points(network, 'current', 0.5, 1.5)
+                 if point.gait == 'trot')
+    at = network.replace(current=point.value)
+    rest = root(lambda cell: at.rates(np.repeat(cell, 8))[[0, 8]], (0.2, 0.4)).x
+    eigenvalues = np.linalg.eigvals(at.jacobian(np.repeat(rest, 8)))
+    assert np.abs(eigenvalues - 1j * point.omega).min() < 1e-6
+
+
+def test_constants_on_the_command_line(capsys):
+    assert analyze.main(['--network', 'quadruped', '--preset', 'trot', '--set', 'current=1.02',
+                         '--json']) == 0
+    assert '"current": 1.02' in capsys.readouterr().out
+    assert analyze.main(['--network', 'quadruped', '--along', 'current']) == 2
+    assert 'parameter of quadruped+current' in capsys.readouterr().err
+    assert analyze.main(['--network', 'quadruped+mass']) == 2
+    assert "'mass' is not a constant of the network quadruped" in capsys.readouterr().err

@@ -21,11 +21,15 @@ points, resonances of torus points, cusps.
 """
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
+from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 from pathlib import Path
 import sys
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from cpg_ros.analysis.atlas import hopf_curves
@@ -37,15 +41,17 @@ from cpg_ros.analysis.atlas.fold_curves import (
     fold_curves,
 )
 from cpg_ros.analysis.atlas.grid import assess_row, AtlasRow, GaitMap, refine, uncrossed_edges
-from cpg_ros.analysis.atlas.map import AtlasFolder, draw_map
+from cpg_ros.analysis.atlas.map import AtlasFolder, columns, draw_map
 from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.common.command_line import named_interval, note, Parser, refuse_repeated, run, say
+from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
-from cpg_ros.common.workers import add_options, KEPT, working
+from cpg_ros.common.workers import add_options, closing, KEPT, processes, working
 from cpg_ros.fitting.inversion.results import library
-from cpg_ros.networks.network import known
+from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.network_options import add_network_options, network_from
 from cpg_ros.networks.registry import reference
+import numpy as np
 
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
@@ -87,20 +93,80 @@ def _planned(args: argparse.Namespace) -> tuple[ParameterPlane, tuple[str, ...]]
             tuple(args.gaits or base.gaits()))
 
 
-def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecutor, folder: Path
-          ) -> tuple[dict[str, GaitMap], list[hopf_curves.Boundary], list[Path]]:
-    """Compute an atlas on a fleet, and write its table and its map.
+@dataclass(frozen=True, eq=False, repr=False)
+class Atlas(ShortRepr):
+    """Where gaits live over two parameters.
 
-    Raises:
-        InputError: the folder holds something else.
-        OSError: a file cannot be written.
+    Attributes:
+        plane: parameters and grid.
+        gaits: gait -> its map on the grid.
+        boundaries: exact curves.
 
     """
-    stored = AtlasFolder(folder, chart, gaits)
+
+    plane: ParameterPlane
+    gaits: dict[str, GaitMap]
+    boundaries: list[hopf_curves.Boundary]
+
+    def table(self) -> dict[str, np.ndarray]:
+        """Columns with a row for each gait and point, for numpy.savez or a data frame.
+
+        Gait, both parameters, whether the gait exists, its state in words, whether the point was
+        computed, and its numbers: period and lock in model units, amplitude, leading multiplier,
+        basin; nan where there is none.
+        """
+        parts = list(columns(self.plane, self.gaits))
+        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+    def boundary_table(self) -> dict[str, np.ndarray]:
+        """Columns with a row for each point of each boundary: its number, kind, gaits, values."""
+        sizes = [len(curve.points) for curve in self.boundaries]
+        values = np.concatenate([np.zeros((0, 2)), *(
+            curve.points[:, :2] for curve in self.boundaries)]).T
+        lines = str(self.plane.first.line), str(self.plane.second.line)
+        return {'boundary': np.repeat(np.arange(len(sizes)), sizes),
+                'kind': np.repeat([curve.kind for curve in self.boundaries], sizes),
+                'gaits': np.repeat([' '.join(curve.gaits) for curve in self.boundaries], sizes),
+                **dict(zip(lines, values, strict=True))}
+
+
+def atlas(network: Network, over: Mapping[str, tuple[float, float]], gaits: Sequence[str] = (),
+          points: tuple[int, int] = (40, 40), folder: str | Path | None = None,
+          executor: Executor | None = None) -> Atlas:
+    """Map where a network's gaits live over two parameters.
+
+    Args:
+        network: a shipped one, or one of a file; gives the other parameters.
+        over: the two parameters, or lines of them such as ``alpha=beta``, with their ranges.
+        gaits: to map; all by default.
+        points: of the grid along each.
+        folder: keeps finished parts; the same call with the same folder continues there, and
+            returns a finished atlas at once.
+        executor: of any kind; by default a process for each core.
+
+    Raises:
+        InputError: an unknown gait, or lines, ranges or points that cannot be used; the folder
+            holds something else.
+
+    """
+    for gait in gaits:
+        known(gait, network.gaits())
+    if len(over) != 2:
+        raise InputError(f'an atlas is over two parameters, not {len(over)}')
+    plane = chart_of(reference(network.name), network, list(over.items()), points)
+    with (TemporaryDirectory() as scratch, closing(processes(0)) if executor is None else
+          nullcontext(ResilientExecutor(executor)) as fleet):
+        stored = AtlasFolder(Path(folder or scratch), plane, tuple(gaits or network.gaits()))
+        return _computed(stored, fleet, quiet=True)
+
+
+def _computed(stored: AtlasFolder, fleet: ResilientExecutor, quiet: bool = False) -> Atlas:
+    """Compute an atlas on a fleet, and keep its parts; say how far it is unless quiet."""
+    chart, gaits = stored.chart, stored.gaits
 
     def run(jobs: Iterable[AtlasRow],
             count: int) -> Iterator[tuple[AtlasRow, list[dict[str, Any]]]]:
-        with JobProgress('rows', count) as tally:
+        with JobProgress('rows', count, not quiet) as tally:
             left = []
             for row in jobs:
                 done = stored.get(row)
@@ -117,20 +183,20 @@ def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecuto
 
     curves = stored.curves()
     if curves is None:
-        fleet.what = 'lines'
+        fleet.what = '' if quiet else 'lines'
         hopf = hopf_curves.hopf_curves(chart, gaits, fleet.map)
     else:
         hopf = [curve for curve in curves if curve.kind == 'Hopf']
     sheets = refine(chart, gaits, hopf, run)
     if curves is None:
-        fleet.what = 'edges'
+        fleet.what = '' if quiet else 'edges'
         missed = hopf_curves.curves_from(chart, chain(*fleet.map(hopf_curves.hopf_starts, [
             edge for gait, sheet in sheets.items()
             for edge in uncrossed_edges(chart, gait, sheet, hopf)])))
         if missed:
             hopf += missed
             sheets = refine(chart, gaits, hopf, run)
-        fleet.what = 'boundaries'
+        fleet.what = '' if quiet else 'boundaries'
         hopf = [*fleet.map(hopf_curves.with_degeneracies, [(chart, curve) for curve in hopf])]
         jobs: list[tuple[Any, ...]] = [
             *((bautin_folds, (chart, curve)) for curve in hopf),
@@ -140,9 +206,7 @@ def drawn(chart: ParameterPlane, gaits: tuple[str, ...], fleet: ResilientExecuto
               for gait, sheet in sheets.items())]
         curves = [*hopf, *distinct(chart, chain(*fleet.map(_called, jobs)))]
         stored.put_curves(curves)
-    table, picture = stored.write(sheets), folder / 'map.png'
-    draw_map(picture, chart, sheets, curves)
-    return sheets, curves, [table, folder / 'boundaries.json', picture]
+    return Atlas(chart, sheets, curves)
 
 
 def _called(job: tuple[Any, ...]) -> Any:
@@ -155,7 +219,11 @@ def _map(args: argparse.Namespace) -> int:
     library()
     chart, gaits = _planned(args)
     with working(args, '', partial(note, 'atlas')) as fleet:
-        sheets, curves, written = drawn(chart, gaits, fleet, args.out)
+        stored = AtlasFolder(args.out, chart, gaits)
+        result = _computed(stored, fleet)
+    sheets, curves, picture = result.gaits, result.boundaries, args.out / 'map.png'
+    written = [stored.write(sheets), args.out / 'boundaries.json', picture]
+    draw_map(picture, chart, sheets, curves)
     if args.interactive:
         # Only pages need it.
         from cpg_ros.analysis.atlas.map import write_page

@@ -144,7 +144,7 @@ class AtlasFolder:
             OSError: it cannot be made.
 
         """
-        self.folder, self.chart = folder, chart
+        self.folder, self.chart, self.gaits = folder, chart, gaits
         text = json.dumps({**chart.as_dict(), 'gaits': gaits}, indent=1)
         mark = folder / MARK
         if mark.exists():
@@ -199,7 +199,7 @@ class AtlasFolder:
         """
         arrow = library()
         path = self.folder / 'atlas.parquet'
-        tables = map(arrow.table, _columns(self.chart, sheets))
+        tables = map(arrow.table, columns(self.chart, sheets))
         first = next(tables)
         with (replacing(path) as beside,
               arrow.parquet.ParquetWriter(beside, first.schema) as writer):
@@ -208,13 +208,14 @@ class AtlasFolder:
         return path
 
 
-def _columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict[str, Any]]:
+def columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict[str, Any]]:
+    """Yield the table of each gait: name -> column with a row for each point."""
     first, second = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
     for gait, sheet in sheets.items():
         label = sheet.label.ravel()
-        yield {'gait': [gait] * label.size, str(chart.first.line): first.ravel(),
+        yield {'gait': np.repeat(gait, label.size), str(chart.first.line): first.ravel(),
                str(chart.second.line): second.ravel(), 'exists': label > 0,
-               'state': [LABEL_NAMES[k] for k in label], 'computed': sheet.computed.ravel(),
+               'state': np.array(LABEL_NAMES)[label], 'computed': sheet.computed.ravel(),
                **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
 
 

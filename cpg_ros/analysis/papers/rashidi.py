@@ -16,8 +16,11 @@
 
 from collections.abc import Iterator
 from functools import cache
+from importlib.util import find_spec
 from typing import cast
 
+from cpg_ros.analysis.nsga2 import Epoch, evolve, non_dominated, SearchSetup
+from cpg_ros.analysis.objectives import evaluate
 from cpg_ros.analysis.papers.row import (
     cell_constants,
     Citation,
@@ -48,6 +51,8 @@ PRINTED = printed_values('rashidi')
 SETTLING, CLOSE = 1500.0, 1.0
 #: SAME: difference in shape, over the RMS, up to which two waveforms are one.
 SAME = 0.02
+#: POPULATION, GENERATIONS: of the search; the paper prints none.
+POPULATION, GENERATIONS = 24, 4
 
 
 @cache
@@ -176,6 +181,31 @@ def primary() -> Iterator[ReproducedRow | Picture]:
         yield _drawn(f'Figure {figure}', name, start, 'From the initial values of Table 3.')
 
 
+def search() -> Iterator[ReproducedRow | Picture]:
+    """Section 4: NSGA-II with the printed operators and objectives, which needs pymoo."""
+    if find_spec('pymoo') is None:
+        return
+    at = Citation(AUTHORS, 'section 4')
+    for gait in PRIMARY:
+        current, phi, *_ = PRINTED['table_2'][gait]
+        setup = SearchSetup('biped', gait, {}, {'current': current, 'phi': phi}, paper=True)
+        tried = evolve(Epoch(setup, POPULATION, GENERATIONS, 0, 0)).tried
+        front = np.array([score.errors for score in non_dominated(list(tried), 3)])
+        ranges = ', '.join(f'{low:.2f} to {high:.2f}' for low, high in
+                           zip(front.min(axis=0), front.max(axis=0), strict=True))
+        theirs = evaluate([printed(gait)], gait, 0, 0)[0].errors
+        yield at.number(
+            f'largest objective of the best set that the search finds for the {named(gait)} '
+            '[degrees]', '0.00', float(front.max(axis=1).min()), within=CLOSE,
+            note=f'z_1 to z_3 of its front of {len(front)} sets, of {len(tried)} tried: {ranges}; '
+            'population and generations are ours')
+        yield at.holds(
+            f'no set that the search finds dominates the weights of Table 2, {named(gait)}',
+            not ((front <= theirs + CLOSE).all(axis=1)
+                 & (front < theirs - CLOSE).any(axis=1)).any(),
+            note=f'z_1 to z_3 with these {", ".join(f"{error:.2f}" for error in theirs)}')
+
+
 def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 5'), named(gait)
     h, k, response = PRINTED['table_5'][gait]
@@ -267,4 +297,4 @@ def kinds() -> Iterator[ReproducedRow | Picture]:
 PAPER = Paper('rashidi', AUTHORS,
               'S. F. Rashidi, M. S. Noorani, M. Shoaran: Optimization of coupling weights in a '
               '4-cell central pattern generator network for bipedal locomotion gait generation '
-              '(2016)', (cell, primary, secondary, predicted, kinds))
+              '(2016)', (cell, primary, search, secondary, predicted, kinds))

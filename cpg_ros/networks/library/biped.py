@@ -25,14 +25,11 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from cpg_ros.networks.definition import Cell, Number, Range
-from cpg_ros.networks.library.morris_lecar import MorrisLecar
+from cpg_ros.networks.library.morris_lecar import constants, excess, rates
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.symmetry import D2, Symmetry
 
 CELLS = 4
-#: Constants of Table 1.
-CELL = MorrisLecar(g_ca=0.9, v_ca=1.0, g_k=2.0, v_k=-0.7, g_l=0.5, v_l=-0.5,
-                   v1=0.01, v2=0.15, v3=0.10, v4=0.15, base=1.0)
 
 #: Partner of each cell (from 0) along a, b and c.
 PARTNERS = {'a': (1, 0, 3, 2), 'b': (2, 3, 0, 1), 'c': (3, 2, 1, 0)}
@@ -84,6 +81,10 @@ class Biped(Network):
         'phi': Range(0.01, 2.0, 'speed of the slow variable'),
         **{name: Range(-2.0, 2.0, f'weight from cell {name[2]} to cell {name[3]}')
            for names in WEIGHTS.values() for name in names}}
+    #: Those of Table 1.
+    constants: ClassVar[dict[str, tuple[float, Range]]] = constants(
+        g_ca=0.9, v_ca=1.0, g_k=2.0, v_k=-0.7, g_l=0.5, v_l=-0.5, v1=0.01, v2=0.15, v3=0.10,
+        v4=0.15, base=1.0, diffusion=1.0)
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'ankle': {'left': (1, 3), 'right': (2, 4)}}
     sides: ClassVar[dict[str, str]] = {'left': 'left', 'right': 'right'}
@@ -114,11 +115,11 @@ class Biped(Network):
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
         """Eqs. 1 to 4, the sign of u' mended; see the module."""
         v, u = cell.now()
-        dv, du = CELL.rates(v, u, p.current, p.phi)
+        dv, du = rates(v, u, p)
         for weight, partner in ((p.w_a, PARTNERS['a']), (p.w_b, PARTNERS['b']),
                                 (p.w_c, PARTNERS['c'])):
             v_j, _ = cell.now(partner)
-            dv = dv - weight * (v - v_j)
+            dv = dv - weight * excess(v, v_j, p)
         return dv, du
 
     @classmethod

@@ -25,16 +25,11 @@ from typing import Any, ClassVar
 
 from cpg_ros.networks.definition import Cell, Number, Range
 from cpg_ros.networks.leg_numbers import leg_positions
-from cpg_ros.networks.library.morris_lecar import MorrisLecar
+from cpg_ros.networks.library.morris_lecar import constants, excess, rates
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
 
 CELLS = 8
-#: CURRENT: current i into the cells; PHI: rate of w.
-CURRENT, PHI = 1.0, 0.2
-#: Constants of section 6.
-CELL = MorrisLecar(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
-                   v1=0.2, v2=0.4, v3=0.3, v4=0.2, base=0.0)
 
 #: The inputs of cell i: i - 2 behind it, s(i) on the other side, i + 4 across its ring.
 BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))
@@ -65,6 +60,10 @@ class Quadruped(Network):
             ('beta', 'w', 'the preceding cell on the same side'),
             ('gamma', 'v', 'the opposite cell'), ('delta', 'w', 'the opposite cell'),
             ('xi', 'v', 'the cell across its ring'), ('eta', 'w', 'the cell across its ring'))}
+    #: Those of section 6.
+    constants: ClassVar[dict[str, tuple[float, Range]]] = constants(
+        g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8, v1=0.2, v2=0.4, v3=0.3, v4=0.2,
+        base=0.0, current=1.0, phi=0.2, diffusion=0.0)
     couplings: ClassVar[tuple[str, ...]] = ('alpha', 'beta', 'gamma', 'delta', 'xi', 'eta')
     #: The assignments of Table 3 and of Theorem 3.3 (Table 4).
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
@@ -89,11 +88,11 @@ class Quadruped(Network):
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
         """Section 6 and eq. 4.4; see the module."""
         v, w = cell.now()
-        dv, dw = CELL.rates(v, w, CURRENT, PHI)
+        dv, dw = rates(v, w, p)
         for source, a, b in ((BEHIND, p.alpha, p.beta), (ACROSS, p.gamma, p.delta),
                              (OPPOSITE, p.xi, p.eta)):
             v_j, w_j = cell.now(source)
-            dv, dw = dv + a * v_j, dw + b * w_j
+            dv, dw = dv - a * excess(v, v_j, p), dw - b * excess(w, w_j, p)
         return dv, dw
 
     @classmethod

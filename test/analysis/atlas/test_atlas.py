@@ -17,6 +17,7 @@
 from dataclasses import replace
 import json
 
+import cpg_ros
 from cpg_ros.analysis.atlas import atlas, fold_curves, grid
 from cpg_ros.analysis.atlas import orbit_curves as curves
 from cpg_ros.analysis.atlas.chart import chart_of
@@ -289,3 +290,28 @@ def test_a_group_can_be_set_as_for_analyze(capsys):
                         (['w_a=inf'], 'it must be finite')):
         assert atlas.main([*words, '--set', *given]) == 2
         assert said in capsys.readouterr().err
+
+
+def test_an_atlas_in_python_is_that_of_the_executable_as_tables(drawn, tmp_path):
+    found = cpg_ros.atlas(TROT, {'c': (4.0, 8.0), 'tau': (0.2, 0.8)}, ('trot', 'pace'), (7, 7),
+                          drawn[0])
+    table, written = found.table(), parquet.read_table(drawn[0] / 'atlas.parquet').to_pydict()
+    assert list(table) == list(written)
+    for name, column in written.items():
+        np.testing.assert_array_equal(
+            table[name], np.array([np.nan if value is None else value for value in column]))
+    np.savez(tmp_path / 'atlas.npz', **table)
+    with np.load(tmp_path / 'atlas.npz') as again:
+        np.testing.assert_array_equal(again['leading'], table['leading'])
+    lines = found.boundary_table()
+    assert lines['boundary'].max() + 1 == len(found.boundaries)
+    hopf = (lines['kind'] == 'Hopf') & (lines['gaits'] == 'trot')
+    _, tau = critical(lines['c'][hopf], 2, 1, True, 0)
+    assert np.isclose(lines['tau'][hopf], tau, atol=1e-6).any()
+
+
+def test_an_atlas_in_python_takes_two_parameters_of_a_known_network():
+    with pytest.raises(InputError, match='over two parameters, not 1'):
+        cpg_ros.atlas(TROT, {'c': (4.0, 8.0)})
+    with pytest.raises(InputError, match="'gallop' is not one of"):
+        cpg_ros.atlas(TROT, dict(OVER), ('gallop',))
