@@ -135,10 +135,10 @@ class Posture:
         length, log = float(np.linalg.norm(numbers)), self._node.get_logger()
         if not (math.isfinite(length + position.z) and abs(length - 1.0) < 0.01):
             log.warning(f'body_pose ignored: z {position.z} m, orientation {numbers[1:]} {q.w} is '
-                        'not finite or has not the length 1', throttle_duration_sec=QUIET)
+                        'not finite, or its length is not 1', throttle_duration_sec=QUIET)
             return
         if position.x or position.y:
-            log.warning('body_pose asks for a way forward or to the left: x and y are ignored',
+            log.warning('body_pose: x and y are ignored, only z and the orientation count',
                         once=True)
         pose = tuple(np.round([position.z, *rpy_of(numbers)], 5).tolist())
         if pose == self._pose:

@@ -67,37 +67,29 @@ def unit(text: str) -> str:
 HEALTH = {'/diagnostics': (DiagnosticArray, best_effort(20))}
 
 
-class Subscriptions:
-    """Topics that are subscribed to and polled."""
+class Subscriptions(dict[str, PolledSubscription]):
+    """Topics that are subscribed to and polled, by name."""
 
     def __init__(self, watch: Node) -> None:
         """Follow no topic; ``watch`` subscribes, and is not spun."""
+        super().__init__()
         self._watch = watch
-        self._topics: dict[str, PolledSubscription] = {}
 
     def subscribe_to(self, topics: Mapping[str, tuple[type, QoSProfile | None]]) -> None:
         """Subscribe to these topics, name -> type and quality, and to no others."""
-        for name in set(self._topics) - set(topics):
-            self._topics.pop(name).close()
-        for name, (kind, quality) in topics.items():
-            if name not in self._topics:
-                self._topics[name] = PolledSubscription(self._watch, kind, name, quality,
-                                                        overridable=False)
-
-    @property
-    def names(self) -> list[str]:
-        """Names of the topics."""
-        return list(self._topics)
+        for name in set(self) - set(topics):
+            self.pop(name).close()
+        for name in set(topics) - set(self):
+            self[name] = PolledSubscription(self._watch, topics[name][0], name, topics[name][1],
+                                            overridable=False)
 
     def receive(self, name: str) -> list[Any]:
         """Return the messages that have arrived on a topic; none if it is not followed."""
-        topic = self._topics.get(name)
-        return [message for message, _ in topic.receive()] if topic else []
+        return [message for message, _ in self[name].receive()] if name in self else []
 
     def newest(self, name: str) -> Any:
         """Return the newest message that has arrived on a topic, None for none."""
-        topic = self._topics.get(name)
-        return topic.newest() if topic else None
+        return self[name].newest() if name in self else None
 
 
 class Controls:
@@ -341,9 +333,8 @@ class RobotView:
         """Return the values that changed since the last frame."""
         values: dict[str, Any] = {}
         fresh = False
-        for name in self._topics.names:
-            if (name.endswith('/joint_states')
-                    and (joints := self._topics.newest(name)) is not None):
+        for name, topic in self._topics.items():
+            if name.endswith('/joint_states') and (joints := topic.newest()) is not None:
                 self._joints.update(zip(joints.name, joints.position, strict=False))
                 values['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
                 fresh = True
@@ -463,8 +454,7 @@ class BridgeViews:
         self._services, self._states = services, Subscriptions(watch)
         self._shown: dict[str, dict[str, Any]] = {}
         self._when: dict[str, float] = {}
-        self.message: dict[str, Any] = {}
-        self._update()
+        self.message: dict[str, Any] = {'type': 'bridges', 'bridges': {}}
 
     def update(self, names: Iterable[str], listening: bool) -> None:
         """Subscribe to these bridges, or to none if no page is open."""
@@ -495,9 +485,6 @@ class BridgeViews:
         for name, when in self._when.items():
             if now > when + STALE:
                 self._shown[name].update(level='stale', text=f'no status for {STALE:g} s')
-        return self._update()
-
-    def _update(self) -> dict[str, Any] | None:
         message = {'type': 'bridges', 'bridges': {name: dict(self._shown[name])
                                                   for name in sorted(self._shown)}}
         if message == self.message:

@@ -155,7 +155,7 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
     legs = legs_in(description, bool(args.forward), _given(args.legs))
     robot, notes = robot_from(description, args.make.stem, legs)
     if faults := walking_faults(robot, description):
-        raise DescriptionError(f'nothing is written, as what would be does not walk: {faults[0]}')
+        raise DescriptionError(f'no file is written: the robot would not walk: {faults[0]}')
     if len(robot.legs) == 2:
         robot, feet = _biped(args, robot, description)
     else:

@@ -94,9 +94,9 @@ class Benefit:
 
     def __str__(self) -> str:
         pushes, calm = self.pushes, self.undisturbed
-        verdict = ('it fells the robot without a push' if calm.lost else
+        verdict = ('it makes the robot fall without a push' if calm.lost else
                    'it helps' if pushes.better else
-                   'it fells the robot after pushes' if pushes.worse else
+                   'it makes the robot fall after pushes' if pushes.worse else
                    'cannot tell whether it helps')
         late = [f'{1e3 * delay:.2g}' for delay in self.delays]
         falls = ''.join(f'; run {k + 1}, sensors {late[k % len(late)]} ms late, falls after '

@@ -188,7 +188,7 @@ class Tuner:
         self.batch = OpenLoopBatch(model, robot, kp, kd, threads=threads, say=say)
         body = self.batch.body
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
-            + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
+            + (f', estimated from the mass of {body.mass:.1f} kg' if None in (kp, kd) else ''))
         self.feet = FootTrajectoryFit(robot, model)
         self.scale = self.feet.length / LENGTH
         # Designs are of robots whose feet bear alike.

@@ -54,7 +54,8 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
     own = OwnFeedback(laws={'placement': False}, gains={'roll': 15.0, 'pitch': 11.0})
     monkeypatch.setattr(feedback, 'WITHOUT', ((), ('reflexes',)))
     robot, (one,) = evaluate_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
-    assert not one.helps and one.undisturbed.lost and ': it fells the robot without' in str(one)
+    assert not one.helps and one.undisturbed.lost
+    assert ': it makes the robot fall without' in str(one)
     assert robot.feedback == replace(own, enabled=False, made=f'in simulation, {one}')
 
 
@@ -84,16 +85,17 @@ UP = math.inf
 @pytest.mark.parametrize(('calm', 'pushes', 'enabled', 'said'), [
     # One undisturbed run falls, with feedback only: what pushes say is told all the same.
     (([UP] * 4, [UP, 1.52, UP, UP]), (12, 20), False,
-     'trot: it fells the robot without a push: 20 of 24 pushes survived (without feedback 12; 8 '
-     'with it only, 0 without it only), 3 of 4 undisturbed runs (without 4; run 2, sensors 20 ms '
-     'late, falls after 1.5 s), sensors 10 and 20 ms late'),
+     'trot: it makes the robot fall without a push: 20 of 24 pushes survived (without feedback '
+     '12; 8 with it only, 0 without it only), 3 of 4 undisturbed runs (without 4; run 2, sensors '
+     '20 ms late, falls after 1.5 s), sensors 10 and 20 ms late'),
     # A gait that falls by itself does not fall by its feedback.
     (([UP, UP, 2.0, UP], [UP, UP, 2.5, UP]), (12, 20), True,
      'trot: it helps: 20 of 24 pushes survived (without feedback 12; 8 with it only, 0 without it '
      'only), 3 of 4 undisturbed runs (without 3; run 3, sensors 10 ms late, falls after 2.5 s), '
      'sensors 10 and 20 ms late'),
     (([UP] * 4, [UP] * 4), (24, 24), False, 'trot: cannot tell whether it helps: 24 of 24'),
-    (([UP] * 4, [UP] * 4), (20, 12), False, 'trot: it fells the robot after pushes: 12 of 24')])
+    (([UP] * 4, [UP] * 4), (20, 12), False,
+     'trot: it makes the robot fall after pushes: 12 of 24')])
 def test_which_run_fell_is_said_and_pushes_are_judged(monkeypatch, calm, pushes, enabled, said):
     monkeypatch.setattr(feedback, 'FeedbackTrial', Trial)
     monkeypatch.setattr(Trial, 'calm', calm)

@@ -104,7 +104,7 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp
     # Half a trot's stride is not what a trot is aimed at.
     assert 'distance [m]' in said.out
     assert re.search(r'verdict\ntrot .* poor: 0\.\d\d m/s\n', said.out)
-    assert 'kp 60 N m/rad and kd 2 N m s/rad, a guess from 15.2 kg' in said.err
+    assert 'kp 60 N m/rad and kd 2 N m s/rad, estimated from the mass of 15.2 kg' in said.err
     assert said.err.endswith('tune: no gait is good\n')
 
 

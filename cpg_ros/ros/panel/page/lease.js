@@ -1,8 +1,7 @@
 // Who has control of the robot, and the click that takes it over.
 
 const at = (id) => document.getElementById(id);
-const listed = (names) => names.length < 2 ? names.join('')
-  : `${names.slice(0, -1).join(', ')} and ${names.at(-1)}`;
+const listed = new Intl.ListFormat('en-GB');
 
 export class Lease {
   now = null;
@@ -32,7 +31,7 @@ export class Lease {
     else if (now.lost_to === now.holder) lines.push(`${holder} took over. This page only watches.`);
     else lines.push(`${holder} has control. This page only watches.`);
     if (now.others.length) {
-      lines.push(`cmd_vel is also published by ${listed(now.others)}${now.confirmed
+      lines.push(`cmd_vel is also published by ${listed.format(now.others)}${now.confirmed
         ? ': both steer.' : '. To steer, take over.'}`);
     }
     if (now.round_trip !== null) {
