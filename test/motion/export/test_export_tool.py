@@ -142,6 +142,9 @@ def test_the_sketch_compiles_for_a_board(tmp_path, board, chip):
                   ['avr-gcc', '-std=gnu11', 'src/gait_data.c', '-o', 'gait_data.o']):
         done = subprocess.run([*words, *common], cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
+    done = subprocess.run(['avr-gcc', '-std=c99', 'src/cpg.c', *common], cwd=tmp_path,
+                          capture_output=True, text=True)
+    assert done.returncode and 'compile with -std=gnu99' in done.stderr
 
 
 #: A board without time, whose servos print what they are told.

@@ -116,7 +116,7 @@ void cpg_network_step(cpg_track *t);
 #ifdef CPG_INTERNAL
 /* Constants are in flash memory where that is an address space of its own. */
 #if defined(__AVR__)
-#ifndef __FLASH
+#ifdef __STRICT_ANSI__
 #error "compile with -std=gnu99 or later, as the Arduino IDE does: -std=c99 leaves out __flash"
 #endif
 #define CPG_ROM const __flash
