@@ -14,13 +14,20 @@
 
 """Nothing that is said of a network depends on the units of its variables and of its time."""
 
+from dataclasses import dataclass
+
 from cpg_ros.dynamics.continuation import bifurcations, continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import hopf_points
+from cpg_ros.dynamics.phase_response import phase_response
 from cpg_ros.dynamics.solve_orbit import coexisting_orbits
+from cpg_ros.dynamics.stability import stability
+from cpg_ros.networks.definition import Range, tanh
 from cpg_ros.networks.network import ParameterLine
+from cpg_ros.networks.presets import Preset
 import numpy as np
 import pytest
+from two_sided import OTHER, TwoSided
 from van_der_pol import van_der_pol
 
 #: Units of the variables and of time.
@@ -41,6 +48,10 @@ def said(size, time):
         numbers += [[orbit.period / time, orbit.levels[0, 0, 1] / size, spectrum.leading]
                     for orbit, spectrum in zip(found.orbits, spectra, strict=True)]
         words.append([gait, found.searched, *(spectrum.attracts for spectrum in spectra)])
+        for orbit in found.orbits:
+            judged, response = stability(orbit), phase_response(orbit)
+            words.append(judged.reason)
+            numbers += [[judged.enough * time, *response(0.3 * orbit.period)[0] * size]]
         branch = continue_orbit(found.orbits[0], line, -0.5, 2.0, longest_step=0.5)
         born = continue_from_hopf(next(point for point in points if point.gait == gait), line,
                                   -0.5, 1.0, longest_step=0.5)
@@ -54,9 +65,73 @@ def said(size, time):
     return np.array(numbers), words
 
 
+def late(size, time):
+    """Return the class of a pair x' = -x - c tanh(x_other(t - tau))."""
+    @dataclass(frozen=True)
+    class Late(TwoSided):
+        c: float
+        tau: float
+
+        name = f'late_{size:g}_{time:g}'.translate(str.maketrans('-.+', '___'))
+        states = ('x',)
+        readout = 'waveform'
+        step = 0.01 * time
+        delay_parameter = 'tau'
+        longest_delay = 10.0 * time
+        ranges = {'c': Range(-10.0, 10.0, 'weight'), 'tau': Range(step, 10.0 * time, 'delay')}
+        couplings = ('c',)
+        usual_gait = 'hop'
+        free = ('c',)
+        line = 'tau'
+
+        @staticmethod
+        def equations(cell, p):
+            (x,), (other,) = cell.now(), cell.past(OTHER)
+            return (-(x + size * p.c * tanh(other / size)) / time,)
+
+        @classmethod
+        def presets(cls):
+            return {gait: Preset(gait, cls(2.0, 4.0 * time)) for gait in ('hop', 'walk')}
+
+    return Late
+
+
+def said_with_delay(size, time):
+    """Return what is said of the pair with a delay, likewise."""
+    network = late(size, time)(2.0, 4.0 * time)
+    points = hopf_points(network, 'tau', 0.01 * time, 6.0 * time)
+    numbers = [[point.value / time, point.omega * time, 0.0] for point in points]
+    words = [[point.gait, point.simple, point.stable, point.supercritical] for point in points]
+    for gait in network.gaits():
+        found = coexisting_orbits(network, gait, everything=False)
+        words.append([gait, found.searched, len(found.orbits)])
+        for orbit in found.orbits:
+            spectrum, judged = multipliers(orbit), stability(orbit)
+            numbers += [[orbit.period / time, orbit.levels[0, 0, 1] / size, spectrum.leading],
+                        [judged.enough * time, phase_response(orbit)(0.3 * orbit.period)[0, 0]
+                         * size, 0.0]]
+            words.append([spectrum.attracts, judged.reason])
+        branch = continue_orbit(found.orbits[0], 'tau', 3.5 * time, 5.0 * time,
+                                longest_step=0.5 * time)
+        words.append([len(branch.folds), [end.why for end in branch.ends]])
+    return np.array(numbers), words
+
+
 @pytest.fixture(scope='module')
 def in_units_of_one():
     return said(1.0, 1.0)
+
+
+@pytest.fixture(scope='module')
+def late_in_units_of_one():
+    return said_with_delay(1.0, 1.0)
+
+
+@pytest.mark.parametrize(('size', 'time'), UNITS)
+def test_units_change_nothing_with_a_delay(size, time, late_in_units_of_one):
+    numbers, words = said_with_delay(size, time)
+    assert words == late_in_units_of_one[1]
+    assert numbers == pytest.approx(late_in_units_of_one[0], rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize(('size', 'time'), UNITS)
