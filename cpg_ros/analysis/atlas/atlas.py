@@ -22,8 +22,7 @@ points, resonances of torus points, cusps.
 
 import argparse
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
-from contextlib import nullcontext
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -46,7 +45,7 @@ from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.common.command_line import named_interval, note, Parser, refuse_repeated, run, say
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
-from cpg_ros.common.workers import add_options, closing, KEPT, processes, working
+from cpg_ros.common.workers import add_options, KEPT, working
 from cpg_ros.fitting.inversion.results import library
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.network_options import add_network_options, network_from
@@ -142,7 +141,7 @@ def atlas(network: Network, over: Mapping[str, tuple[float, float]], gaits: Sequ
         points: of the grid along each.
         folder: keeps finished parts; the same call with the same folder continues there, and
             returns a finished atlas at once.
-        executor: of any kind; by default a process for each core.
+        executor: for the rows and curves; None for this process.
 
     Raises:
         InputError: an unknown gait, or lines, ranges or points that cannot be used; the folder
@@ -154,10 +153,9 @@ def atlas(network: Network, over: Mapping[str, tuple[float, float]], gaits: Sequ
     if len(over) != 2:
         raise InputError(f'an atlas is over two parameters, not {len(over)}')
     plane = chart_of(reference(network.name), network, list(over.items()), points)
-    with (TemporaryDirectory() as scratch, closing(processes(0)) if executor is None else
-          nullcontext(ResilientExecutor(executor)) as fleet):
+    with TemporaryDirectory() as scratch, ThreadPoolExecutor(1) as here:
         stored = AtlasFolder(Path(folder or scratch), plane, tuple(gaits or network.gaits()))
-        return _computed(stored, fleet, quiet=True)
+        return _computed(stored, ResilientExecutor(executor or here), quiet=True)
 
 
 def _computed(stored: AtlasFolder, fleet: ResilientExecutor, quiet: bool = False) -> Atlas:
