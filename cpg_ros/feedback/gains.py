@@ -39,7 +39,7 @@ import numpy as np
 #: All laws, in the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [import_module(f'cpg_ros.feedback.laws.{name}').LAW for name in (
     'posture', 'placement', 'pace', 'stiffen', 'virtual_stiffness', 'reflexes', 'clearance',
-    'slope', 'heading', 'speed', 'sidestep', 'touchdown', 'tegotae')]
+    'slope', 'heading', 'speed', 'sidestep')]
 #: Gains that all laws share.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}
@@ -86,7 +86,6 @@ VARIABLES = {name: variable for part in (COMMON_MEMORY, *(law.memory for law in 
              for name, variable in part.items()}
 #: Arrays that pass values on within a tick; they have no axis for the runs.
 SCRATCH = {
-    'previous_contact': StateVariable('contact before this tick', ('legs',), False),
     'leg_velocities': StateVariable("see estimate.update; then the planned feet's places [m]",
                                     ('legs', 4)),
     'scratch': StateVariable('see estimate.update', (4, 3)),

@@ -33,8 +33,6 @@ from cpg_ros.feedback.laws import (
     slope,
     speed,
     stiffen,
-    tegotae,
-    touchdown,
     virtual_stiffness,
 )
 from cpg_ros.feedback.laws.law import limited, low_passed
@@ -44,8 +42,6 @@ import numpy as np
 LEAD = 0.04
 #: APPROACH: time constant with which the wanted velocity is approached, s.
 APPROACH = 0.2
-#: SLOWEST: least factor of the stride frequency.
-SLOWEST = 0.2
 
 
 class PlannedMotion(NamedTuple):
@@ -293,19 +289,17 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
 
 
 @jit
-def _move_feet(legs, tables, gains, memory, sensors, planned, run, slot, off, intent, step, out):
+def _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, step, out):
     """Move the feet of a run; out are its angles, rad, shape (joints,).
 
-    Returns:
-        Sum of the changes of the legs' phase rates, rad/s, and number of feet that stumble.
-
+    Returns the number of feet that stumble.
     """
     rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
     quick, phase = 1.0 - math.exp(-dt / gains.smooth), planned.phase[run]
     foot, feet = memory.scratch[0], memory.leg_velocities
     row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
     now = int(phase % 1.0 * POINTS) % POINTS
-    phase_rate, standing, mean_x, mean_y, stumbling = 0.0, 0, 0.0, 0.0, 0.0
+    standing, mean_x, mean_y, stumbling = 0, 0.0, 0.0, 0.0
     for leg in range(rows.shape[0]):
         feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
             rows[leg], out[columns[leg, 0]], out[columns[leg, 1]], out[columns[leg, 2]])
@@ -315,23 +309,17 @@ def _move_feet(legs, tables, gains, memory, sensors, planned, run, slot, off, in
     middle = mean_x / max(standing, 1), mean_y / max(standing, 1)
     for leg in range(rows.shape[0]):
         foot[0], foot[1], foot[2] = feet[leg, 0], feet[leg, 1], feet[leg, 2]
-        contact, swings_now, progress = (memory.contact[run, leg], tables.swinging[slot, now, leg],
-                                         tables.progress[slot, now, leg])
         way = _displacement(tables, gains, memory, (run, leg, slot, row, now), foot, middle, off,
                             intent, dt)
         if gains.clearance:
-            stumbling += clearance.stumbles(contact, swings_now, progress)
-        if gains.tegotae:
-            phase_rate += tegotae.rate(max(sensors.foot_forces[run, leg], 0.0) / legs.weight,
-                                       swings_now, progress, gains)
-        if gains.touchdown and contact and not memory.previous_contact[leg]:
-            memory.phase_correction[run] += touchdown.phase_change(
-                swings_now, progress, tables.duty[slot, leg], gains) / rows.shape[0]
+            stumbling += clearance.stumbles(
+                memory.contact[run, leg], tables.swinging[slot, now, leg],
+                tables.progress[slot, now, leg])
         displacement = memory.displacement[run, leg]
         for k in range(3):
             displacement[k] += quick * (fraction * way[k] - displacement[k])
         move_foot(rows[leg], columns[leg], out, foot, displacement)
-    return phase_rate, stumbling
+    return stumbling
 
 
 @jit
@@ -356,19 +344,13 @@ def _stiffen(gains, memory, run, intent, step):
 
 
 @jit
-def _change_frequency(gains, memory, run, steered, intent, faster, phase_rate, step):
-    """Fill the factor of the stride frequency; phase_rate is the legs' sum, rad/s."""
-    scale, (dt, fraction, _, _) = 1.0, step
-    frequency = max(intent.strode / dt, 0.1)
+def _change_frequency(gains, memory, run, steered, intent, faster, step):
+    """Fill the factor of the stride frequency, which the speed makes faster by a fraction."""
+    quicker, (dt, fraction, _, _) = 0.0, step
     if gains.pace and steered:
-        scale += fraction * pace.frequency_change(intent.error, memory.fatigue[run], gains)
-    memory.fatigue[run] = low_passed(memory.fatigue[run], scale - 1.0, gains.pace_memory, dt)
-    scale += faster + fraction * phase_rate / (2.0 * math.pi * frequency * memory.stride.shape[1])
-    if gains.touchdown:
-        change = fraction * touchdown.frequency_change(memory.phase_correction[run], frequency)
-        memory.phase_correction[run] -= change * intent.strode
-        scale += change
-    memory.frequency_scale[run] = max(scale, SLOWEST)
+        quicker = fraction * pace.frequency_change(intent.error, memory.fatigue[run], gains)
+    memory.fatigue[run] = low_passed(memory.fatigue[run], quicker, gains.pace_memory, dt)
+    memory.frequency_scale[run] = 1.0 + quicker + faster
 
 
 @jit_entry
@@ -389,7 +371,6 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
     """
     dt, fraction, level, _ = step
     for run in range(out.shape[0]):
-        memory.previous_contact[:] = memory.contact[run]
         update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run], memory.doubt,
                memory.leg_velocities, memory.scratch)
         target = memory.wanted_velocity[run]
@@ -397,13 +378,12 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         off = _deviation(tables, memory, sensors, planned, run, level)
         slot, intent = _intend(tables, gains, memory, planned, run, off, step)
         out[run] = planned.angles[run]
-        phase_rate, stumbling = _move_feet(legs, tables, gains, memory, sensors, planned, run,
-                                           slot, off, intent, step, out[run])
+        stumbling = _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, step,
+                               out[run])
         memory.clearance_share[run] = clearance.update(
             memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
         _stiffen(gains, memory, run, intent, step)
         faster = _change_strides(tables, gains, memory, run, slot, -off.vx,
                                  wrapped(planned.heading[run] - sensors.rpy[run, 2]
                                          + planned.lean[run, 2]), step)
-        _change_frequency(gains, memory, run, tables.steered[slot], intent, faster, phase_rate,
-                          step)
+        _change_frequency(gains, memory, run, tables.steered[slot], intent, faster, step)

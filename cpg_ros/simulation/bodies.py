@@ -86,7 +86,7 @@ class BatchPhysics:
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
         """Return the model of a body in a scenario, with the servos' kp scaled."""
-        kp = scenario.kp * round(kp_scale, KP_DIGITS)
+        kp = scenario.kp * kp_scale
         key = (scenario.friction, scenario.mass, scenario.payload, scenario.terrain, kp,
                scenario.kd)
         if key not in self._models:

@@ -31,7 +31,7 @@ from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import StrideCommand
-from cpg_ros.simulation.bodies import BatchPhysics
+from cpg_ros.simulation.bodies import BatchPhysics, KP_DIGITS
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 from cpg_ros.simulation.run_metrics import BEGINNING, cost_of_transport, motor_power, torques
@@ -365,11 +365,12 @@ class ClosedLoopBatch(BatchPhysics):
             for key, value in signals.items():
                 record[key][k] = value
             speeds = senses.joint_velocities[:, walk.indices]
+            kp_scale = memory.kp_scale.round(KP_DIGITS)
             _, applied = torques(self.body.model, angles, senses.joint_positions[:, walk.indices],
-                                 speeds, memory.kp_scale * kp, kd)
+                                 speeds, kp_scale * kp, kd)
             work[k] = motor_power(applied, speeds)
             observe(noticed, applied[:, walk.order])
-            bodies.step(angles, forces[k], memory.kp_scale)
+            bodies.step(angles, forces[k], kp_scale)
             if not bodies.go_on(senses.rpy, goal, k * dt):
                 break
         for rows in (*record.values(), work):

@@ -69,12 +69,12 @@ def test_scaled_gains_keep_to_their_limits():
 
 
 def test_own_gains_are_shares_of_the_length_and_of_the_time_of_its_pendulum():
-    own = OwnFeedback(laws={'reflexes': False, 'touchdown': True},
+    own = OwnFeedback(laws={'reflexes': False, 'virtual_stiffness': True},
                       gains={'step_most': 0.4, 'step': 0.5, 'roll': 2.0, 'pace_from': 0.1})
     for ratio in (0.25, 1.0):
         length = ratio * LENGTH
         found = robot_gains(replace(of_size(ratio), feedback=own))
-        assert not found.reflexes and found.touchdown and found.posture
+        assert not found.reflexes and found.virtual_stiffness and found.posture
         assert found.step_most == pytest.approx(0.4 * length)
         assert found.step == pytest.approx(0.5 * math.sqrt(length / 9.81))
         assert found.roll == 2.0

@@ -29,7 +29,6 @@ from cpg_ros.feedback.laws import (
     slope,
     speed,
     stiffen,
-    touchdown,
     virtual_stiffness,
 )
 from cpg_ros.feedback.laws.law import low_passed
@@ -233,17 +232,3 @@ def test_reflexes_lift_reach_hold_and_fade():
     reflex(landed, True, True, 0.8, height=-0.27, steps=1)
     assert reflex(landed, True, True, 0.9, height=-0.30, steps=1) == pytest.approx(0.03)
     assert abs(reflex(landed, True, False, 0.5, steps=1000)) < 1e-6
-
-
-def test_a_stance_begins_with_its_touchdown():
-    """A fraction of the error in phase is corrected: forward of a foot that lands early."""
-    duty = 0.6
-    early = touchdown.phase_change(True, 0.8, duty, GAINS)
-    assert early == pytest.approx(GAINS.touchdown_gain * 0.2 * 0.4)
-    late = touchdown.phase_change(False, 0.1, duty, GAINS)
-    assert late == pytest.approx(-GAINS.touchdown_gain * 0.1 * 0.6)
-    # What a foot meets in the first half of its swing, or leaves in stance, is no touchdown.
-    assert touchdown.phase_change(True, 0.3, duty, GAINS) == 0.0
-    assert touchdown.phase_change(False, 0.7, duty, GAINS) == 0.0
-    assert touchdown.frequency_change(0.01, 2.0) == pytest.approx(0.1)
-    assert touchdown.frequency_change(-1.0, 2.0) == -touchdown.MOST

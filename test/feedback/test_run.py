@@ -49,8 +49,7 @@ def test_it_runs_as_fast_as_asked_and_straight(loop):
     last = round(10.0 / DT)
     assert ran.upright.all()
     np.testing.assert_allclose(ran.velocity[:, -last:, 0].mean(axis=1), speeds, rtol=0.05)
-    # At 2 m/s it still turns back from where it has been turned as it got faster.
-    assert (np.abs(ran.place[:, -1, 1] - ran.place[:, -last, 1]) < (0.3, 0.3, 0.8)).all()
+    assert (np.abs(ran.place[:, -1, 1] - ran.place[:, -last, 1]) < 0.3).all()
     # Servos as stiff as its table has them, and as they are where it is slow.
     table = GO2.motions['run'].steering
     np.testing.assert_allclose(ran.kp_scale[:, -1], np.interp(speeds, table.speed,
@@ -78,6 +77,19 @@ def test_it_changes_from_trot_to_run_and_back_ten_times():
     assert ran.upright.all()
     fast = ran.velocity[:, np.round((begins + 1.5) / DT).astype(int), 0]
     assert fast.mean() > 1.2
+
+
+def test_strides_that_cannot_be_longer_become_faster():
+    """A body that stands still, asked for 0.2 m/s of short strides and 1 m/s of full ones."""
+    feedback = Feedback(geometry_of(GO2), GAINS._replace(
+        **{law.name: law.name in ('speed', 'heading') for law in LAWS}), 2)
+    planned, sensed = PlannedMotion.zeros(2, 12), SensorData.zeros(2, 4, 12)
+    planned.gaits[:] = feedback.learn(program('trot'))
+    planned.angles[:], planned.velocity[:, 0] = GO2.column('offset'), (0.2, 1.0)
+    for _ in range(round(6.0 / DT)):
+        feedback.advance(sensed, planned, DT)
+    np.testing.assert_allclose(feedback.memory.stride[:, 0], [GAINS.speed_most, 0.0], atol=1e-9)
+    np.testing.assert_allclose(feedback.memory.frequency_scale, [1.0, 1.0 + GAINS.speed_faster])
 
 
 def test_posture_goes_with_the_stiffness():

@@ -15,4 +15,4 @@
 """The feedback laws of legs with point feet, one file each."""
 
 __all__ = ['clearance', 'heading', 'law', 'pace', 'placement', 'posture', 'reflexes', 'sidestep',
-           'slope', 'speed', 'stiffen', 'tegotae', 'touchdown', 'virtual_stiffness']
+           'slope', 'speed', 'stiffen', 'virtual_stiffness']
