@@ -278,7 +278,8 @@ class Walk:
         """Take some ticks without a push."""
         for _ in range(ticks):
             _, angles = self.command()
-            self.bodies.step(angles, np.zeros((len(angles), 2)), self.feedback.memory.kp_scale)
+            self.bodies.step(angles, np.zeros((len(angles), 2)),
+                             self.feedback.memory.kp_scale.round(KP_DIGITS))
 
     def take(self, other: 'Walk') -> None:
         """Put all runs, which have not begun, into the state of another walk's only run.
