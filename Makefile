@@ -149,7 +149,9 @@ $(INSTALLED): pyproject.toml .ci/constraints.txt
 		echo 'numba cannot be installed here: the generator will step its network in C, without feedback'
 	@touch $(VENV)/COLCON_IGNORE $@
 
+# colcon installs over what is there: modules that have been deleted would stay.
 install/.built: $(INSTALLED) $(SOURCES)
+	@find build/*/build/lib install/*/lib/python3*/*-packages/cpg_ros -name '*.py' -delete 2>/dev/null || :
 	@source $(VENV)/bin/activate; \
 		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
 	@touch $@
