@@ -361,9 +361,10 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[
     for link in shape.links:
         ends.setdefault(link.parent, []).append(link.position)
     errors, replaced = [], []
+    kind = 'collision' if tree.find('link/visual') is None else 'visual'
     for index, link in enumerate(shape.links):
         element = elements.get(link.name, Xml.Element('link'))
-        failed = drawing.add_all(link, element.findall('visual'))
+        failed = drawing.add_all(link, element.findall(kind))
         if failed and not link.parts:
             replaced.append(link.name)
             drawing.add_all(link, element.findall('collision'))
@@ -373,6 +374,8 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[
                 link.parts.append(Part('box', np.maximum(0.5 * (high - low), THIN), None, GREY,
                                        0.5 * (low + high)))
         errors += failed
+    if kind == 'collision' and any(link.parts for link in shape.links):
+        report(f'drawn by its collision shapes: URDF {source} has no visual ones')
     if errors:
         more = f' (and {len(errors) - 1} more like it)' if len(errors) > 1 else ''
         instead = '; drawn by their collision shapes or as boxes: ' + ', '.join(replaced)

@@ -294,6 +294,16 @@ def test_links_without_their_meshes_are_drawn_by_collision_shapes_or_as_boxes():
     assert said[0].endswith('; drawn by their collision shapes or as boxes: base, arm')
 
 
+def test_a_robot_without_visual_shapes_is_drawn_by_its_collision_shapes():
+    text = URDF.replace('visual>', 'collision>').replace(
+        '<mesh filename="{mesh}"\n  scale="0.5 0.5 0.5"/>', '<box size="1 2 3"/>')
+    said = []
+    base, arm = shapes.from_text(text, 'robot_description', said.append).links
+    assert np.ptp(base.corners, axis=0) == pytest.approx([1.0, 2.0, 3.0]) and not arm.parts
+    assert said[0] == ('drawn by its collision shapes: URDF robot_description has no visual ones')
+    assert 'package://no/x.stl' in said[1]
+
+
 def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
     (tmp_path / 'bad.urdf').write_text('<sdf/>')
     said = []
