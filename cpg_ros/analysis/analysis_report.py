@@ -23,7 +23,15 @@ from typing import Any, cast
 from cpg_ros.common.command_line import table
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
+from cpg_ros.dynamics.equilibrium import (
+    all_equilibria,
+    continue_equilibrium,
+    Crossing,
+    Equilibrium,
+    equilibrium,
+    named,
+    odd,
+)
 from cpg_ros.dynamics.hopf import hopf_points, HopfPoint
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.dynamics.phase_response import locking, phase_diffusion, phase_response, PhaseResponse
@@ -142,8 +150,9 @@ class Analysis(ShortRepr):
         """Return Hopf points, blocks and equilibrium, or why there are none."""
         try:
             rest = equilibrium(self.network)
+            levels = rest.reshape(self.network.variables, -1)
             on = [name for name in self.network.kinks
-                  if abs(named(self.network, rest)[name]) < ON_KINK]
+                  if np.abs(levels[self.network.states.index(name)]).min() < ON_KINK]
             if on:
                 return [], (), np.array([]), (f'it lies on a kink of the rates, where '
                                               f'{" and ".join(on)} is 0: they have no '
@@ -347,6 +356,90 @@ class Analysis(ShortRepr):
         if self.delay and not self.existing:
             text['nearest_threshold'] = nearest_threshold(self.network)
         return text
+
+
+#: Difference of values, over their range, at which two branches cross the same point.
+SAME_VALUE = 1e-6
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumReport(ShortRepr):
+    """The equilibria of an analysis, and where their branches bifurcate.
+
+    Attributes:
+        equilibria: one of each set that symmetries map to one another.
+        crossings: on their branches, by ascending value, with the number of the equilibrium.
+        line: parameters that vary along the branches.
+
+    """
+
+    equilibria: list[Equilibrium]
+    crossings: list[tuple[int, Crossing]]
+    line: ParameterLine
+
+    @classmethod
+    def of(cls, analysis: Analysis) -> 'EquilibriumReport':
+        """Find the equilibria and follow them along the line of the analysis."""
+        found = all_equilibria(analysis.network)
+        line, (low, high) = analysis.along, analysis.span
+        value = line.value(analysis.network)
+        low, high = min(low, value), max(high, value)
+        crossings: list[tuple[int, Crossing]] = []
+        for k, start in enumerate(found):
+            try:
+                branch = continue_equilibrium(start, line, low, high)
+            except NoOrbit:
+                continue
+            # A branch that has turned round may pass the images of its points.
+            for one in branch.crossings:
+                if not any(k == other and (one.kind, one.block.mode) == (met.kind, met.block.mode)
+                           and abs(one.value - met.value) <= SAME_VALUE * (high - low)
+                           for other, met in crossings):
+                    crossings.append((k, one))
+        return cls(found, sorted(crossings, key=lambda pair: pair[1].value), line)
+
+    def _pose(self, one: Equilibrium) -> str:
+        """Return the first variable of the cells of each level."""
+        network = one.network
+        levels = one.state[:network.cells]
+        places: dict[float, list[str]] = {}
+        for cell, level in enumerate(levels):
+            key = next((other for other in places if abs(other - level) < 1e-6), float(level))
+            places.setdefault(key, []).append(str(cell + 1))
+        alike = len(places) == 1
+        return f'{network.states[0]} ' + ', '.join(
+            f'{level:.4f}' + ('' if alike else f' in {" ".join(cells)}')
+            for level, cells in places.items())
+
+    def text(self) -> str:
+        """Return tables of the equilibria and of the bifurcations."""
+        if not self.equilibria:
+            return 'Equilibria: none was found.'
+        rows: list[tuple[str, ...]] = [('', 'fixed by', 'state of the cells', 'unstable',
+                                        'rightmost root', 'attracts')]
+        rows += [(str(k), one.label, self._pose(one), str(one.unstable), _root(one.leading),
+                  _yes(one.attracts)) for k, one in enumerate(self.equilibria, 1)]
+        lines = ['Equilibria (one of each set of images; the symmetries that fix it; number of '
+                 'unstable roots,', 'the rightmost per model time; where one attracts, the '
+                 'network can freeze):', *(f'  {line}' for line in table(rows, '><<><<'))]
+        if not self.crossings:
+            return '\n'.join([*lines, f'  No bifurcation of them along {self.line}.'])
+        rows = [('of', str(self.line), 'type', 'class', 'gait', 'omega')]
+        rows += [(str(k + 1), f'{one.value:.6f}', one.kind, one.block.name, one.block.gait,
+                  f'{one.omega:.4f}' if one.omega else '') for k, one in self.crossings]
+        return '\n'.join([*lines, f'Their bifurcations along {self.line}:',
+                          *(f'  {line}' for line in table(rows, '>><<<>'))])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return everything in plain types."""
+        return {'equilibria': [{
+            'fixed_by': list(one.group.elements), 'state': one.state.tolist(),
+            'unstable_roots': one.unstable, 'leading_real': one.leading.real,
+            'leading_imag': one.leading.imag, 'attracts': one.attracts}
+            for one in self.equilibria], 'along': str(self.line), 'bifurcations': [{
+                'equilibrium': k, 'value': one.value, 'type': one.kind,
+                'mode': list(one.block.mode), 'gait': one.block.gait, 'omega': one.omega}
+                for k, one in self.crossings]}
 
 
 #: CURVE_POINTS: points of a cycle in JSON; FINE: points among which extremes are searched for.

@@ -23,7 +23,7 @@ from contextlib import suppress
 from pathlib import Path
 import sys
 
-from cpg_ros.analysis.analysis_report import Analysis, PhaseReport
+from cpg_ros.analysis.analysis_report import Analysis, EquilibriumReport, PhaseReport
 from cpg_ros.common.command_line import as_json, interval, number, Parser, progress_bar, run, say
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import write_atomically
@@ -43,6 +43,7 @@ examples:
   analyze --presets optimized/preset.yaml --all-orbits
   analyze --network quadruped --preset trot --prc trot_prc.png
   analyze --network biped --preset run --basin 200 --seed 1
+  analyze --network delayed --preset liu2024_trot --equilibria --along c --range 1:8
 
 exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
 #: LONGEST: largest delay up to which Hopf points can be searched for, model time.
@@ -68,6 +69,9 @@ def _parser() -> Parser:
     parser.add_argument('--all-orbits', action='store_true', help='look for all coexisting orbits '
                         'of every gait, from more starts, on the branches of its Hopf points '
                         'and by deflation; takes 1 to 3 s a gait')
+    parser.add_argument('--equilibria', action='store_true', help='also find the equilibria at '
+                        'which cells differ, in which a network can freeze, and the folds, '
+                        'pitchforks and Hopf points of all along --along')
     parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the branches, the roots, '
                         'trajectories and footfalls (.png, .pdf or .svg)')
@@ -132,6 +136,10 @@ def _analyze(args: Namespace) -> int:
         losses = [loss for branch in assessed for loss in branch.losses]
         answer['stability_losses'] = [loss.as_dict() for loss in losses]
         text += ['', *(loss.text(str(analysis.along)) for loss in losses)] if losses else []
+    if args.equilibria:
+        equilibria = EquilibriumReport.of(analysis)
+        answer['equilibria'] = equilibria.as_dict()
+        text += ['', equilibria.text()]
     if args.prc is not None:
         response = PhaseReport.of(analysis)
         if curves is not None:

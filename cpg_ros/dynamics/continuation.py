@@ -337,7 +337,7 @@ def continue_from_hopf(point: HopfPoint, along: ParameterLine, low: float, high:
     vector = point.natural_amplitude * vector
     sizes = _sizes(np.abs(vector).reshape(-1, point.network.cells).max(axis=1))
     branch = continue_from_disturbance(
-        point.network, point.block.symmetry, along, low, high,
+        point.network, point.symmetry, along, low, high,
         lambda theta: np.tile(point.state, (theta.size, 1)),
         lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
         amplitude=amplitude, sizes=sizes, **limits)

@@ -12,22 +12,38 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Equilibria at which all cells are equal.
+"""Equilibria that every symmetry of the network fixes, and all others.
 
-Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are the
-equilibria of a cell that is its own input. Where its rates are linear in all variables but one, x,
-they are ``f0(x) + F1(x) y``, couplings included, and equilibria are roots of ``det(f0, F1)`` in x,
-which has no poles.
+The first are those of one cell of each orbit of cells (Buono & Golubitsky 2001, section 5.1);
+where all cells are alike, of a cell that is its own input. Where its rates are linear in all
+variables but one, x, they are ``f0(x) + F1(x) y``, couplings included, and equilibria are roots of
+``det(f0, F1)`` in x, which has no poles.
+
+Where cells differ at an equilibrium, the network freezes in a pose. Newton's method finds these in
+the fixed-point space of each subgroup. A branch is followed by pseudo-arclength in the space of
+its own symmetries, past folds; where a root of another class crosses 0, branches with less
+symmetry begin.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import cache, lru_cache
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, lru_cache, partial
 
-from cpg_ros.common.errors import CpgError, InputError
-from cpg_ros.dynamics.arclength import crossings
-from cpg_ros.networks.equations import equations_of, Field
-from cpg_ros.networks.network import Network
+from cpg_ros.common.errors import CpgError, InputError, ShortRepr
+from cpg_ros.dynamics.arclength import (
+    continue_curve,
+    correct_point,
+    crossings,
+    CurvePoint,
+    fixed_unknown,
+    locate,
+    NoOrbit,
+    predict_and_correct,
+)
+from cpg_ros.dynamics.isotypic import Block, blocks, everywhere, group_of
+from cpg_ros.networks.equations import equations_of, Field, values_of
+from cpg_ros.networks.network import Network, ParameterLine
+from cpg_ros.networks.symmetry import Group, label, subgroups
 import numpy as np
 
 #: Grid of x on which equilibria are searched: dense where the cell's functions bend.
@@ -48,18 +64,26 @@ class NoEquilibrium(CpgError):
 
 
 class Quotient(Field[Network]):
-    """A network with all cells equal: a cell that is its own input, now and a delay ago.
+    """A network with one cell of each class, now and a delay ago."""
 
-    If cells differ in a parameter, the first cell's value counts.
-    """
+    def __init__(self, network: Network, classes: np.ndarray | None = None) -> None:
+        """Prepare for a network, with all of its couplings.
 
-    def __init__(self, network: Network) -> None:
-        """Prepare for a network, with all of its couplings."""
-        super().__init__(network, np.zeros(network.cells, dtype=int))
-        self._whole = self._p = [value.flat[0] for value in self._p]
+        Args:
+            network: parameters.
+            classes: of equal cells, shape (cells,); by default the orbits of the network's group.
+
+        """
+        super().__init__(network, group_of(network).orbits if classes is None else classes)
+        self._whole = self._p
         equations = self._equations
         self._coupled = [equations.by_cell.get(row, (row,))[0] in network.couplings
                          for row in equations.rows]
+
+    def take(self, cell: int) -> None:
+        """Take the parameters of a cell, from 0, for all."""
+        self._whole = self._p = [value[[cell]] if value.ndim else value
+                                 for value in values_of(self.network)]
 
     def set_coupling(self, fraction: float) -> None:
         """Multiply all couplings by a fraction."""
@@ -77,7 +101,7 @@ class Quotient(Field[Network]):
         slopes = self._equations.by_parameter(self._arguments(state, None), self._p)
         for (v, r), slope in slopes.items():
             if self._coupled[r]:
-                out[v] += (slope * self._whole[r]).item()
+                out[v * self.size:(v + 1) * self.size] += slope * self._whole[r]
         return out
 
     def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
@@ -103,48 +127,48 @@ class Quotient(Field[Network]):
         return np.concatenate([*arrived, states[sizes < 1e-11]])
 
 
-def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
-    """Return the network's state with all cells in one state, shape (..., components)."""
-    return np.repeat(cell, network.cells, axis=-1)
-
-
 def odd(network: Network) -> bool:
     """Return whether the network has the symmetry x -> -x."""
     return network.symmetry(network.gaits()[0]).odd
 
 
 def named(network: Network, cell: np.ndarray) -> dict[str, float]:
-    """Name the variables of a cell: variable -> value."""
-    names = network.states
+    """Name the variables of a cell of each orbit: variable, and cell if several -> value."""
+    orbits = np.unique(group_of(network).orbits, return_index=True)[1]
+    names = [name if cell.size == network.variables else f'{name}{first + 1}'
+             for name in network.states for first in orbits[:cell.size // network.variables]]
     return dict(zip(names, map(float, cell), strict=True))
 
 
 def equilibria(network: Network) -> np.ndarray:
-    """Find equilibria with equal cells, states of a cell by ascending first variable.
+    """Find the equilibria that all symmetries fix, by ascending first variable.
 
-    These are all with x from -100 to 100 where the rates are linear in all variables but an x;
-    otherwise those that Newton's method reaches from many states.
+    These are all with x from -100 to 100 where all cells are alike and the rates are linear in all
+    variables but an x; otherwise those that Newton's method reaches from many states.
 
     Returns:
-        States, shape (n, variables).
+        States of a cell of each orbit, shape (n, variables orbits).
 
     Raises:
         InputError: a parameter is not finite.
 
     """
     _check(network)
-    cell, scanned = Quotient(network), _scanned(type(network))
+    return _found(Quotient(network))
+
+
+def _found(cell: Quotient) -> np.ndarray:
+    scanned = _scanned(type(cell.network)) if cell.size == 1 else None
     if scanned is None:
-        reached = cell.newton_from_all(_scattered(network.variables))
+        reached = cell.newton_from_all(_scattered(cell.kept.size))
     else:
         solved = [cell.newton(start) for start in _roots(cell, scanned)]
-        reached = np.array([state for state in solved if state is not None]
-                           ).reshape(-1, network.variables)
+        reached = np.array([state for state in solved if state is not None])
     states: list[np.ndarray] = []
     while len(reached):
         states.append(reached[0])
         reached = reached[~np.isclose(reached, reached[0], 1e-9, 1e-9).all(axis=1)]
-    return np.array(sorted(states, key=tuple)).reshape(-1, network.variables)
+    return np.array(sorted(states, key=tuple)).reshape(-1, cell.kept.size)
 
 
 @cache
@@ -185,13 +209,13 @@ def _roots(cell: Quotient, scanned: int) -> Iterator[np.ndarray]:
         yield state
 
 
-def _scattered(n: int) -> np.ndarray:
+def _scattered(n: int, count: int = STARTS) -> np.ndarray:
     rng = np.random.default_rng(0)
-    return rng.uniform(-1.0, 1.0, (STARTS, n)) * rng.choice([1.0, 3.0, 30.0], (STARTS, 1))
+    return rng.uniform(-1.0, 1.0, (count, n)) * rng.choice([1.0, 3.0, 30.0], (count, 1))
 
 
 def equilibrium(network: Network) -> np.ndarray:
-    """Find the equilibrium that continues that of the uncoupled cells, shape (variables,).
+    """Find the equilibrium that continues that of the uncoupled cells, (variables orbits,).
 
     All couplings grow from 0 to their values (Buono & Golubitsky 2001, proposition 5.1). Diffusive
     coupling does not move it; with the symmetry x -> -x it is 0.
@@ -212,7 +236,7 @@ def equilibrium(network: Network) -> np.ndarray:
     cell = Quotient(network)
     cell.set_coupling(0.0)
     state = _uncoupled(replace(  # type: ignore[type-var]
-        network, **dict.fromkeys(network.couplings, 0.0)))
+        network, **dict.fromkeys(network.couplings, 0.0)), tuple(cell.kept[:cell.size]))
     fraction, step, grow = 0.0, 0.25, 2.0
     slope = cell.together(state)[1]
     while fraction < 1.0:
@@ -241,14 +265,322 @@ def equilibrium(network: Network) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _uncoupled(alone: Network) -> np.ndarray:
-    states = equilibria(alone)
-    if len(states) != 1:
-        raise NoEquilibrium(f'an uncoupled cell has {len(states)} equilibria: none is the stand')
-    return states[0]
+def _uncoupled(alone: Network, cells: tuple[int, ...]) -> np.ndarray:
+    """Return the states of some uncoupled cells, (variables cells,)."""
+    rest = []
+    for first in cells:
+        cell = Quotient(alone, np.zeros(alone.cells, dtype=int))
+        cell.take(first)
+        states = _found(cell)
+        if len(states) != 1:
+            raise NoEquilibrium(f'an uncoupled cell has {len(states)} equilibria: none is the '
+                                'stand')
+        rest.append(states[0])
+    return np.array(rest).T.ravel()
 
 
 def _check(network: Network) -> None:
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
             raise InputError(f'{name} is {value}')
+
+
+# All equilibria, and their branches.
+
+#: Starts of Newton's method in each fixed-point space.
+IN_EACH = 100
+#: Relative difference of equal states, and of those next to a pitchfork; root over the largest
+#: that is 0.
+SAME, NEAR, ZERO = 1e-6, 1e-3, 1e-7
+#: Rate of the value along a branch, and part of a root over the largest, that is not 0.
+TURNS = 1e-4
+#: MOST: points of a branch, in either direction; STEP: longest, over the range of the parameter.
+MOST, STEP = 200, 0.05
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(ShortRepr):
+    """A state at which a network rests.
+
+    Attributes:
+        network: parameters.
+        state: of all cells, shape (components,).
+        group: of the symmetries that fix the state.
+
+    """
+
+    network: Network
+    state: np.ndarray
+    group: Group
+
+    def _summary(self) -> str:
+        return f'{self.network.name}, fixed by {self.label}, {self.unstable} unstable roots'
+
+    @property
+    def label(self) -> str:
+        """Name of the group, by generators."""
+        return label(self.group, tuple(self.group.elements))
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The linearisation, by class of the symmetries that fix the state."""
+        return blocks(self.network, self.state, self.group)
+
+    @property
+    def unstable(self) -> int:
+        """Number of roots with positive real part."""
+        return sum(len(block.right_of(0.0)) * block.copies for block in self.blocks)
+
+    @property
+    def leading(self) -> complex:
+        """Rightmost root, 1/model time; one of a conjugate pair."""
+        return max((block.leading for block in self.blocks), key=lambda root: root.real)
+
+    @property
+    def attracts(self) -> bool | None:
+        """Whether small disturbances decay; None: cannot tell, as a root is 0 up to rounding."""
+        scale = max(np.abs(block.now).max() for block in self.blocks)
+        root = self.leading.real
+        return None if abs(root) <= ZERO * scale else root < 0.0
+
+
+def _images(network: Network, state: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the images of a state by the network's symmetries, with x -> -x if it has it."""
+    odd = network.symmetry(network.gaits()[0]).odd
+    for name, element in group_of(network).elements.items():
+        image = np.empty_like(state).reshape(network.variables, -1)
+        image[:, list(element)] = state.reshape(network.variables, -1)
+        yield name, image.ravel()
+        if odd:
+            yield '', -image.ravel()
+
+
+def _equal(one: np.ndarray, other: np.ndarray, same: float = SAME) -> bool:
+    return bool(np.abs(one - other).max() <= same * (1.0 + np.abs(one).max()))
+
+
+def at_state(network: Network, state: np.ndarray) -> Equilibrium:
+    """Return the equilibrium at a state of all cells, with the symmetries that fix it."""
+    kept = [name for name, image in _images(network, state) if name and _equal(image, state)]
+    return Equilibrium(network, state, group_of(network).subgroup(tuple(kept)))
+
+
+def all_equilibria(network: Network) -> list[Equilibrium]:
+    """Find the equilibria of a network, one of each set that its symmetries map to one another.
+
+    Those that all symmetries fix come from ``equilibria``, the others from Newton's method at many
+    states: some may be missed. The most symmetric ones come first.
+
+    Args:
+        network: parameters.
+
+    Raises:
+        InputError: a parameter is not finite.
+
+    """
+    if not network.rests:
+        return []
+    group, found = group_of(network), list[Equilibrium]()
+    alike = everywhere(network, equilibria(network))
+    middle = alike[0] if len(alike) else np.zeros(network.components)
+    for names in reversed(subgroups(group)):
+        cell = Quotient(network, group.subgroup(names).orbits)
+        starts = _scattered(cell.kept.size, IN_EACH)
+        starts = np.concatenate([starts, middle[cell.kept] + starts
+                                 * (1.0 + np.abs(middle[cell.kept])) / 3.0])
+        reached = [*alike] if names == tuple(group.elements) else [
+            *cell.newton_from_all(starts)[:, cell.columns]]
+        for state in reached:
+            if np.isfinite(state).all() and not any(
+                    _equal(other.state, image) for other in found
+                    for _, image in _images(network, state)):
+                found.append(at_state(network, state))
+    return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumCurve(ShortRepr):
+    """Equilibria along a line: unknowns are a state of the quotient, 1 for a period, the value.
+
+    Attributes:
+        network: any on the line.
+        group: of the symmetries that fix the states.
+        along: the line.
+        scale: of the value.
+        size: of the states.
+
+    """
+
+    network: Network
+    group: Group
+    along: ParameterLine
+    scale: float
+    size: float
+
+    def _quotient(self, z: np.ndarray) -> Quotient:
+        return Quotient(self.along.at(self.network, float(z[-1])), self.group.orbits)
+
+    def _weights(self, size: int) -> np.ndarray:
+        weights = np.full(size, self.size**-2.0 / (size - 2))
+        weights[-2:] = 1.0, self.scale**-2.0
+        return weights
+
+    def product(self, first: np.ndarray, second: np.ndarray) -> float:
+        """Mean over the components plus value."""
+        return float(self._weights(first.size) * first @ second)
+
+    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's increment normal to the border, and the tangent."""
+        cell, n = self._quotient(z), z.size - 2
+        rates, slopes = cell.together(z[:n])
+        matrix, right = np.zeros((n + 2, n + 2)), np.zeros((n + 2, 2))
+        matrix[:n, :n] = slopes
+        matrix[:n, -1] = cell.by_parameter(z[:n]) @ self.along.direction(self.network)
+        matrix[n, n] = 1.0
+        matrix[-1] = self._weights(z.size) * border
+        right[:n, 0], right[-1, 1] = -rates, 1.0
+        increment, tangent = np.linalg.solve(matrix, right).T
+        return increment, tangent
+
+    def amplitude(self, z: np.ndarray) -> float:
+        """Return 1: equilibria have no birth."""
+        return 1.0
+
+    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool) -> None:
+        """Return None: a state needs no finer discretisation."""
+
+    def orbit(self, z: np.ndarray) -> Equilibrium:
+        """Return the equilibrium of a solution."""
+        cell = self._quotient(z)
+        return Equilibrium(cell.network, z[:-2][cell.columns], self.group)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Crossing(ShortRepr):
+    """A point of a branch at which roots cross the imaginary axis.
+
+    Attributes:
+        kind: 'fold', 'pitchfork', 'branch point' or 'Hopf'.
+        value: of the parameters.
+        equilibrium: there.
+        block: of the critical class.
+        omega: of the critical roots, 0 unless they are a pair.
+
+    """
+
+    kind: str
+    value: float
+    equilibrium: Equilibrium
+    block: Block
+    omega: float
+
+    def _summary(self) -> str:
+        return f'{self.kind} at {self.value:.7g}'
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumBranch(ShortRepr):
+    """Equilibria along a line of parameters.
+
+    Attributes:
+        along: the line.
+        points: values and equilibria, in order along the branch.
+        crossings: where their number of unstable roots changes, in the same order.
+
+    """
+
+    along: ParameterLine
+    points: tuple[tuple[float, Equilibrium], ...]
+    crossings: tuple[Crossing, ...]
+
+    def _summary(self) -> str:
+        return f'{len(self.points)} equilibria, ' + ', '.join(map(str, self.crossings))
+
+
+def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: float, high: float
+                         ) -> EquilibriumBranch:
+    """Follow an equilibrium along a line of parameters, both ways and past folds.
+
+    Args:
+        start: on the line, with a value from low to high.
+        line: line of parameters, or its text.
+        low: least value.
+        high: greatest value.
+
+    Raises:
+        NoOrbit: the start is no equilibrium, or not isolated.
+
+    """
+    line = ParameterLine.of(line, type(start.network))
+    kept = {*start.group.names}.intersection(
+        *(group_of(line.at(start.network, value)).names for value in (low, high)))
+    group = start.group.subgroup(tuple(name for name, element in start.group.elements.items()
+                                       if element in kept))
+    size = float(np.abs(start.state).max()) or 1.0
+    curve = EquilibriumCurve(start.network, group, line, high - low, size)
+    cell = Quotient(start.network, group.orbits)
+    z = np.concatenate([start.state[cell.kept], [1.0, line.value(start.network)]])
+    first = correct_point(curve, z, fixed_unknown(z.size, -1))
+    if first is None:
+        raise NoOrbit('the equilibrium is not isolated')
+    halves = []
+    for begin in (first.reversed(), first):
+        points = [begin]
+
+        def visit(point: CurvePoint, points: list[CurvePoint] = points) -> str:
+            points.append(point)
+            return ''
+
+        folds, _ = continue_curve(begin, low, high, visit, longest_step=STEP, most=MOST)
+        met: list[Crossing] = []
+        for k, point in enumerate(points[1:]):
+            met += _crossings(points[k], point)
+            met += [_fold(point, begin)] if k in folds else []
+        halves.append((points, met))
+    (back, before), (ahead, after) = halves
+    return EquilibriumBranch(
+        line, tuple((point.value, point.curve.orbit(point.z)) for point in back[:0:-1] + ahead),
+        tuple(before[::-1] + after))
+
+
+def _crossings(last: CurvePoint, point: CurvePoint) -> list[Crossing]:
+    """Return the crossings between two neighbouring points of a branch, without folds."""
+    found: list[Crossing] = []
+    reach = last.curve.product(last.tangent, point.z - last.z)
+    for which, pair in enumerate(zip(*(end.curve.orbit(end.z).blocks for end in (last, point)),
+                                     strict=True)):
+        for rank in range(*sorted(len(block.right_of(0.0)) for block in pair)):
+            def root(there: CurvePoint, at: tuple[int, int] = (which, rank)) -> float:
+                return float(there.curve.orbit(there.z).blocks[at[0]].roots(at[1] + 1)[-1].real)
+
+            try:
+                there = locate(root, partial(predict_and_correct, last), 0.0, reach, 1e-12 * reach)
+            except (NoOrbit, ValueError):
+                # Beside a fold rounding decides on the sign.
+                continue
+            found += _crossing(there, which, rank)
+    return found
+
+
+def _crossing(point: CurvePoint, which: int, rank: int) -> Iterator[Crossing]:
+    equilibrium: Equilibrium = point.curve.orbit(point.z)
+    block = equilibrium.blocks[which]
+    root, values = complex(block.roots(rank + 1)[-1]), block.representation.values
+    along = point.rate * fixed_unknown(point.z.size, -1)
+    if abs(root.imag) > TURNS * np.abs(block.now).max():
+        if root.imag > 0.0:
+            yield Crossing('Hopf', point.value, equilibrium, block, root.imag)
+    elif point.curve.product(along, along) > TURNS**2:
+        mirrored = block.copies == 1 and (values.real.min() < 0.0 or (
+            block.symmetry.odd and np.abs(equilibrium.state).max() <= SAME))
+        yield Crossing('pitchfork' if mirrored else 'branch point', point.value, equilibrium,
+                       block, 0.0)
+
+
+def _fold(point: CurvePoint, begin: CurvePoint) -> Crossing:
+    """Return what happens where a branch turns round: at a pitchfork it begins."""
+    images = [[_equal(image, one.state, NEAR) for _, image in _images(one.network, one.state)]
+              for one in (point.curve.orbit(point.z), begin.curve.orbit(begin.z))]
+    equilibrium = point.curve.orbit(point.z)
+    return Crossing('pitchfork' if sum(images[0]) > sum(images[1]) else 'fold', point.value,
+                    equilibrium, equilibrium.blocks[0], 0.0)

@@ -14,16 +14,14 @@
 
 """Hopf points of the equilibrium of any network, with their normal forms.
 
-On the centre manifold ``x = rest + z q + conj(z q) + ...`` with the eigenvector q of the class,
-the same for every cell but for the character chi. B(x, y) of two classes lies in the class of the
-product of their characters, so the reduction needs the characteristic matrices Delta of the
-classes 1 and chi^2 only (Kuznetsov, *Elements of Applied Bifurcation Theory*, chapter 5; with a
-delay Diekmann et al., *Delay Equations*, chapter IX)::
+On the centre manifold ``x = rest + z q + conj(z q) + ...`` with an eigenvector q that has the
+symmetry of the gait (Kuznetsov, *Elements of Applied Bifurcation Theory*, chapter 5; with a delay
+Diekmann et al., *Delay Equations*, chapter IX)::
 
-    k2 = <p, C(q, q, q*) + 2 B(q, Delta_1(0)^-1 B(q, q*))
-             + B(q*, Delta_chi^2(2 i omega)^-1 B(q, q))> / 2
+    k2 = <p, C(q, q, q*) + 2 B(q, Delta(0)^-1 B(q, q*)) + B(q*, Delta(2 i omega)^-1 B(q, q))> / 2
 
-with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``.
+with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``. Delta is the
+characteristic matrix of the whole network; it leaves the classes of B(q, q*) and B(q, q).
 """
 
 from collections.abc import Callable
@@ -35,19 +33,21 @@ import math
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import crossings, NoOrbit
 from cpg_ros.dynamics.characteristic import characteristic_matrix, delay_crossings, rightmost_first
-from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
+from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.isotypic import (
     Block,
     block_at,
     block_of,
     blocks,
-    character,
     classes,
+    everywhere,
     Expansion,
-    power,
+    group_of,
+    renamed,
 )
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network, ParameterLine
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Fraction of its terms below which a cubic coefficient is 0.
@@ -151,53 +151,74 @@ class HopfPoint(ShortRepr):
         return self.block.mode
 
     @property
+    def symmetry(self) -> Symmetry:
+        """Symmetry of the orbits that branch off, in the group of the network's gaits."""
+        group = self.network.symmetry(self.network.gaits()[0]).group
+        return renamed(self.block.symmetry, group) or self.block.symmetry
+
+    @property
     def wave(self) -> str:
         """Direction of the wave, as in the block."""
         return self.block.wave
 
     @cached_property
     def _eigenvectors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return q of one cell with <q, q> = 1 over all cells, and p with <p, Delta' q> = 1."""
-        matrix, slope = characteristic_matrix(1j * self.omega, self.block.now, self.block.past,
+        """Return q of the whole network with <q, q> = 1, and p with <p, Delta' q> = 1."""
+        block = self.block
+        matrix, slope = characteristic_matrix(1j * self.omega, block.now, block.past,
                                               self.network.delay)
         left, _, right = np.linalg.svd(matrix)
         q, p = right[-1].conj(), left[:, -1].conj()
         largest = q[np.abs(q).argmax()]
-        q = q * (largest.conjugate() / abs(largest)) / np.sqrt(self.network.cells)
-        return q, p / (p @ slope @ q)
+        q = q * (largest.conjugate() / abs(largest))
+        return block.embedded(q), block.embedded((p / (p @ slope @ q)).conj()).conj()
 
     @property
     def vector(self) -> np.ndarray:
-        """Eigenvector q of one cell, shape (variables,); over the whole network <q, q> = 1."""
-        return self._eigenvectors[0]
+        """Eigenvector q of cell 1, shape (variables,); over the whole network <q, q> = 1."""
+        return self.eigenvector[::self.network.cells]
 
     @property
     def eigenvector(self) -> np.ndarray:
         """Eigenvector q of the whole network, shape (components,)."""
-        return np.kron(self.vector, self.block.vector)
+        return self._eigenvectors[0]
+
+    @property
+    def _size(self) -> float:
+        """Largest modulus of q among the first variables of the cells."""
+        return float(np.abs(self.eigenvector[:self.network.cells]).max())
 
     @property
     def state(self) -> np.ndarray:
         """Equilibrium of the whole network, shape (components,)."""
         return everywhere(self.network, self.rest)
 
+    def towards(self, symmetry: Symmetry) -> 'HopfPoint | None':
+        """Return this point with the disturbance of a gait's symmetry, or None if it has none."""
+        other = self.block.representation.towards(symmetry)
+        return None if other is None else replace(self, block=block_of(self._expansion, other))
+
     @cached_property
     def normal_form(self) -> NormalForm:
         """Normal form in model time, mu = value' - value; z belongs to q."""
-        expansion, delay = self._expansion, self.network.delay
-        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
-        unit, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
-        still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
-        double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
-        ahead = expansion.inputs(q, chi, axis)
-        back, form, bound = ahead.conj(), expansion.multilinear, expansion.bound
-        flat = expansion.inputs(_moved(still, form(ahead, back)), unit)
-        fast = expansion.inputs(_moved(double, form(ahead, ahead)), twice, 2.0 * axis)
-        k2 = 0.5 * (p @ (form(ahead, ahead, back) + 2.0 * form(ahead, flat)
-                         + form(back, fast)))
-        size = 0.5 * np.abs(p) @ (bound(ahead, ahead, back) + 2.0 * bound(ahead, flat)
-                                  + bound(back, fast))
+        form, axis, (q, p) = self._expansion.multilinear, 1j * self.omega, self._eigenvectors
+        ahead = self._moving(q, axis)
+        back = ahead[0].conj(), ahead[1].conj()
+        flat = self._moving(self._answer(0.0, form(ahead, back)), 0.0)
+        fast = self._moving(self._answer(2.0 * axis, form(ahead, ahead)), 2.0 * axis)
+        sets = [(ahead, ahead, back), (ahead, flat), (ahead, flat), (back, fast)]
+        k2 = 0.5 * sum(p @ form(*one) for one in sets)
+        size = 0.5 * sum(np.abs(p) @ form(*one, sizes=True).real for one in sets)
         return NormalForm(self._speed(self.line), complex(k2), float(size))
+
+    def _moving(self, h: np.ndarray, exponent: complex) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``h exp(exponent t)`` now and a delay ago."""
+        return h, h * np.exp(-exponent * self.network.delay)
+
+    def _answer(self, exponent: complex, push: np.ndarray) -> np.ndarray:
+        """Return ``Delta(exponent)^-1 push``; a class with this root need not be pushed."""
+        matrix = characteristic_matrix(exponent, *self._expansion.linear, self.network.delay)[0]
+        return np.linalg.lstsq(matrix, push, rcond=None)[0]
 
     @cached_property
     def _expansion(self) -> Expansion:
@@ -205,17 +226,15 @@ class HopfPoint(ShortRepr):
 
     def _speed(self, line: ParameterLine) -> complex:
         """Return the derivative of the critical root by the value on a line of parameters."""
-        expansion, delay = self._expansion, self.network.delay
-        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
-        unit, late = np.ones_like(chi), np.exp(-axis * delay)
-        still = characteristic_matrix(0.0, *expansion.linear(unit), delay)[0]
-        moves = expansion.inputs(_moved(still, expansion.along(line)), unit)
-        now, past = expansion.linear_along(line, chi)
-        change = (now + past * late) @ q + expansion.multilinear(
-            moves, expansion.inputs(q, chi, axis))
+        expansion, axis, (q, p) = self._expansion, 1j * self.omega, self._eigenvectors
+        direction, late = line.direction(self.network), np.exp(-axis * self.network.delay)
+        push = expansion.field.by_parameter(expansion.state) @ direction
+        moves = self._moving(self._answer(0.0, push), 0.0)
+        now, past = expansion.field.linear_along(expansion.state, direction)
+        change = (now + past * late) @ q + expansion.multilinear(moves, self._moving(q, axis))
         if self.network.delay_parameter in line.names:
             sign = line.signs[line.names.index(self.network.delay_parameter)]
-            change = change - sign * axis * late * (self.block.past @ q)
+            change = change - sign * axis * late * (expansion.linear[1] @ q)
         return complex(p @ change)
 
     @property
@@ -225,12 +244,12 @@ class HopfPoint(ShortRepr):
         The delay scales the time as well; z is half the amplitude of a cell's first variable.
         """
         form, delay = self.normal_form, self.network.delay
-        scale = delay / abs(self.vector[0])**2
+        scale = delay / self._size**2
         return NormalForm(1j * self.omega + delay * form.k1, scale * form.k2, scale * form.size)
 
     @property
     def natural_amplitude(self) -> float:
-        """Size of cell 1's first variable at which the cubic term is as fast as omega.
+        """Size of a cell's first variable at which the cubic term is as fast as omega.
 
         It is half the amplitude there, or the size of the equilibrium, or 1, where the normal form
         is degenerate.
@@ -238,7 +257,7 @@ class HopfPoint(ShortRepr):
         form = self.normal_form
         if form.degenerate:
             return float(np.abs(self.rest).max()) or 1.0
-        return abs(self.vector[0]) * math.sqrt(self.omega / abs(form.k2))
+        return self._size * math.sqrt(self.omega / abs(form.k2))
 
     @property
     def slopes(self) -> dict[str, float]:
@@ -264,10 +283,9 @@ class HopfPoint(ShortRepr):
 
     def but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
         """Return a block's roots except the critical one or pair."""
-        shifts = dict(block.symmetry.shifts)
-        for critical, symmetry in ((1j * self.omega, self.block.symmetry),
-                                   (-1j * self.omega, power(self.block.symmetry, -1))):
-            if shifts == dict(symmetry.shifts) and len(roots):
+        own, values = self.block.representation.values, block.representation.values
+        for critical, sought in ((1j * self.omega, own), (-1j * self.omega, own.conj())):
+            if np.allclose(values, sought) and len(roots):
                 roots = np.delete(roots, np.abs(roots - critical).argmin())
         return roots
 
@@ -287,8 +305,9 @@ class HopfPoint(ShortRepr):
 
     def _right(self, within: bool) -> int:
         close = ON_AXIS * self.omega
-        return int(sum((roots.real > close).sum() for other, roots in self._others
-                       if within or not other.within(self.block)))
+        return int(sum((roots.real > close).sum() * (
+            other.copies - (0 if within else other.inside(self.block)))
+            for other, roots in self._others))
 
     @property
     def unstable_roots(self) -> int:
@@ -341,15 +360,9 @@ class HopfPoint(ShortRepr):
 
         """
         network = self.line.at(self.network, value)
-        turning = np.exp(2j * np.pi * (np.asarray(theta)[:, None] + self.block.symmetry.phases))
-        swing = self.normal_form.radius(value - self.value) * np.concatenate(
-            [entry * turning for entry in self.vector], axis=1)
-        return everywhere(network, equilibrium(network)) + 2.0 * swing.real
-
-
-def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
-    """Solve a linear system; a right-hand side of 0 has the solution 0 with any matrix."""
-    return np.linalg.solve(matrix, push) if push.any() else np.zeros_like(push)
+        swing = self.normal_form.radius(value - self.value) * self.eigenvector
+        turning = np.exp(2j * np.pi * np.asarray(theta))[:, None]
+        return everywhere(network, equilibrium(network)) + 2.0 * (swing * turning).real
 
 
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:
@@ -367,10 +380,14 @@ def first_hopf(network: Network, gait: str) -> HopfPoint | None:
 
     """
     symmetry, delay = network.symmetry(gait), network.delay_parameter
-    if not delay or len(symmetry.shifts) < len(symmetry.group.elements):
+    if not delay:
         return None
     rest, line = equilibrium(network), ParameterLine((delay,), (1.0,))
-    block = block_of(Expansion(network, rest), symmetry)
+    try:
+        block = block_of(Expansion(network, rest), symmetry)
+    except InputError:
+        # The gait branches off no equilibrium.
+        return None
     points = [crossing_at(block, line, rest, omega, tau)
               for omega, tau in delay_crossings(block.now, block.past)]
     # With one variable the fast wave begins there, and the slow one ends.
@@ -420,7 +437,7 @@ def hopf_points(network: Network, line: ParameterLine | str, low: float, high: f
     Raises:
         NoEquilibrium: there is none on the whole line.
         InputError: low is not below high, there is no such parameter, a parameter is not finite,
-            the delay would be negative, or the weights lack the network's symmetry.
+            or the delay would be negative.
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
@@ -448,9 +465,12 @@ def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega:
 
     """
     rest = equilibrium(network)
-    block = block_at(network, rest, mode)
+    return _on_axis(line, block_at(network, rest, mode), rest, omega)
+
+
+def _on_axis(line: ParameterLine, block: Block, rest: np.ndarray, omega: float) -> HopfPoint:
     # The real part is zero up to rounding.
-    roots = block.right_of(-1e-3 * omega)
+    roots, network = block.right_of(-1e-3 * omega), block.network
     root = roots[np.abs(roots - 1j * omega).argmin()]
     return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
 
@@ -467,12 +487,16 @@ def _by_delay(network: Network, line: ParameterLine, low: float, high: float) ->
 
 
 def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
+    # At single values the network may have more symmetry.
+    group = min((group_of(line.at(network, value)) for value in (low, high)),
+                key=lambda group: len(group.elements))
+
     @cache
     def split(value: float) -> tuple[Block, ...]:
         """Return the blocks; none where there is no equilibrium."""
         moved = line.at(network, value)
         try:
-            return blocks(moved, equilibrium(moved))
+            return blocks(moved, equilibrium(moved), group)
         except NoEquilibrium:
             return ()
 
@@ -489,7 +513,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
     if not any(split(value) for value in grid):
         equilibrium(line.at(network, low))
     points: list[HopfPoint] = []
-    for which in range(len(classes(network))):
+    for which in range(len(classes(network, group))):
         count = tracked_roots([split(value)[which] for value in grid if split(value)])
         pairs: list[tuple[float, float]] = []
         for rank in range(count):
@@ -503,8 +527,8 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                     if (omega > 0.0 and abs(root.real) <= ON_AXIS * omega
                             and not any(np.allclose((value, omega), pair) for pair in pairs)):
                         pairs.append((value, omega))
-                        points.append(hopf_at(line.at(network, value), line,
-                                              split(value)[which].mode, omega))
+                        block = split(value)[which]
+                        points.append(_on_axis(line, block, equilibrium(block.network), omega))
     # Equal values, by symmetry, differ by rounding.
     return sorted(points, key=lambda point: (round((point.value - low) / (high - low), 9),
                                              point.omega, point.mode))
@@ -513,7 +537,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
 def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
     """Return how many roots of a class to follow along some blocks: without a delay, all."""
     if not any(block.past.any() for block in along):
-        return along[0].network.variables
+        return len(along[0].now)
     return spare + max(len(block.right_of(0.0)) for block in along)
 
 

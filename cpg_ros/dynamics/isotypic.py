@@ -14,24 +14,34 @@
 
 """Isotypic blocks of the linearisation at an equilibrium: a small matrix for each class.
 
-An abelian group permutes the cells simply and transitively. Each of its characters chi has the
-eigenvector (chi(cell)) once for each variable, and the linearisation splits into
-``L_chi = sum_i J_1i chi(i)`` (Buono & Golubitsky 2001, section 5.2), for the state now and for the
-state a delay ago. Oscillations of a class are primary gaits: ``x_i ~ chi(i) exp(i omega t)``, so
-the character is the gait (Table 5).
+A finite group permutes the cells. Disturbances split into classes, one for each irreducible
+representation that occurs; of its d copies one tells all. It is picked out by the symmetry of an
+oscillation, ``x_h(i) ~ exp(2 pi i theta(h)) x_i`` for a subgroup H, where theta induces the
+representation (Serre, *Linear Representations of Finite Groups*, sections 2.6 and 7.2), and the
+linearisation maps these disturbances to one another. An abelian group that takes the first cell
+once to each has a block of one cell's size for each character chi, ``sum_i J_1i chi(i)`` (Buono &
+Golubitsky 2001, section 5.2). By the equivariant Hopf theorem (Golubitsky, Stewart & Schaeffer
+1988, chapter XVI) gaits branch off whose symmetry occurs once in the representation.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache, cached_property
-from typing import Any
+from functools import cache, cached_property, lru_cache
+from itertools import chain
 
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
-from cpg_ros.networks.equations import equations_of, multilinear, values_of
-from cpg_ros.networks.network import Network, ParameterLine
-from cpg_ros.networks.symmetry import Group, homomorphisms, Symmetry
+from cpg_ros.networks.equations import equations_of, Field
+from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network
+from cpg_ros.networks.symmetry import (
+    compose,
+    generators,
+    Group,
+    homomorphisms,
+    subgroups,
+    Symmetry,
+)
 import numpy as np
 
 
@@ -69,105 +79,198 @@ def _halves(basis: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
     return columns
 
 
+# Irreducible representations in which a group permutes cells.
+
+#: Difference of two characters, and of two vectors of length 1, that is rounding.
+SAME = 1e-9
+
+
+def _units(shifts: np.ndarray) -> np.ndarray:
+    """Return exp(2 pi i shift), with exact powers of i."""
+    quarters = 4.0 * shifts
+    exact = np.array([1.0, 1j, -1.0, -1j])[np.round(quarters).astype(int) % 4]
+    return np.where(quarters == np.round(quarters), exact, np.exp(0.5j * np.pi * quarters))
+
+
+def _moved(group: Group, names: Iterable[str], weights: Iterable[complex], vectors: np.ndarray
+           ) -> np.ndarray:
+    """Return the weighted sum of the images of vectors, shape (cells, n), by some elements."""
+    out = np.zeros(vectors.shape, dtype=complex)
+    for name, weight in zip(names, weights, strict=True):
+        out[list(group.elements[name])] += weight * vectors
+    return out
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Representation(ShortRepr):
+    """An irreducible representation of a group, with disturbances that transform by it.
+
+    Attributes:
+        symmetry: of the disturbances.
+        values: its character for each of the group's elements, shape (elements,).
+
+    """
+
+    symmetry: Symmetry
+    values: np.ndarray
+
+    @property
+    def dimension(self) -> int:
+        """Number d of independent copies of the disturbances, with the same roots."""
+        return round(self.values[0].real)
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Orthonormal disturbances of cells with the symmetry, shape (cells, m)."""
+        symmetry, group = self.symmetry, self.symmetry.group
+        images = np.eye(group.cells, dtype=complex)
+        if self.dimension > 1:
+            images = _moved(group, group.elements, self.values, images)
+        images = _moved(group, symmetry.h, _units(np.array([
+            float(shift) for _, shift in symmetry.shifts])), images)
+        columns: list[np.ndarray] = []
+        for image in images.T:
+            for column in columns:
+                image = image - column * (column.conj() @ image)
+            if np.linalg.norm(image) > 1e-6:
+                # The first cell that it moves has phase 0.
+                first = image[np.flatnonzero(np.abs(image) > SAME)[0]]
+                columns.append(image * (abs(first) / first) / np.linalg.norm(image))
+        out = np.array(columns).reshape(-1, group.cells).T
+        return out.real.astype(complex) if symmetry.self_conjugate else out
+
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """The same for each variable, shape (components, variables m)."""
+        return np.kron(np.eye(self.symmetry.variables), self.columns)
+
+    def copies(self, symmetry: Symmetry) -> int:
+        """Return how many of the d copies have a symmetry."""
+        place = {name: n for n, name in enumerate(symmetry.group.elements)}
+        back = _units(-np.array([float(shift) for _, shift in symmetry.shifts]))
+        return round((back * self.values[[place[name] for name in symmetry.h]]).mean().real)
+
+    def towards(self, symmetry: Symmetry) -> 'Representation | None':
+        """Return the same representation by disturbances with this symmetry and no more.
+
+        Return None if there are none, or more than one of the copies has it.
+        """
+        group = self.symmetry.group
+        known = renamed(symmetry, group)
+        if known is None or self.copies(known) != 1:
+            return None
+        if known == self.symmetry:
+            return self
+        other = replace(self, symmetry=known)
+        for name in group.elements.keys() - set(known.h):
+            image = _moved(group, [name], [1.0], other.columns)
+            if abs(np.vdot(other.columns, image)) > (1.0 - SAME) * other.columns.shape[1]:
+                return None
+        return other
+
+
+@cache
+def renamed(symmetry: Symmetry, group: Group) -> Symmetry | None:
+    """Return a symmetry as one of another group of the same cells; None if H is not in it."""
+    if symmetry.group == group:
+        return symmetry
+    shifts = {group.names.get(symmetry.group.elements[name], ''): shift
+              for name, shift in symmetry.shifts}
+    return None if '' in shifts else Symmetry.of(group, shifts, symmetry.variables, symmetry.odd)
+
+
+def _induced(symmetry: Symmetry) -> np.ndarray:
+    """Return the character that the shifts of H induce, for every element, shape (elements,)."""
+    group, elements = symmetry.group, list(symmetry.group.elements.values())
+    inverses = [tuple(np.argsort(element)) for element in elements]
+    shifts = {group.elements[name]: float(shift) for name, shift in symmetry.shifts}
+    values = []
+    for element in elements:
+        conjugates = [compose(inverse, compose(element, other))
+                      for other, inverse in zip(elements, inverses, strict=True)]
+        values.append(_units(np.array([shifts[one] for one in conjugates
+                                       if one in shifts])).sum() / len(shifts))
+    return np.array(values)
+
+
+@cache
+def representations(group: Group, variables: int, odd: bool) -> tuple[Representation, ...]:
+    """Return the irreducible representations that occur on the cells, the trivial one first.
+
+    Raises:
+        InputError: a representation is induced by no character of a subgroup; the smallest such
+            group has 24 elements.
+
+    """
+    found: list[Representation] = []
+    candidates = chain.from_iterable(
+        homomorphisms(group, names, variables, odd) for names in chain(
+            [tuple(name for name, _ in group.generators)],
+            (generators(group, h) for h in reversed(subgroups(group)))))
+    for symmetry in candidates:
+        values = _induced(symmetry)
+        if (abs((np.abs(values)**2).mean() - 1.0) < SAME
+                and not any(np.allclose(values, one.values) for one in found)):
+            found.append(Representation(symmetry, values))
+        if sum(one.dimension**2 for one in found) == len(group.elements):
+            return tuple(one for one in found if one.columns.size)
+    raise InputError('the group is not monomial: its classes are not known')
+
+
+# The symmetry that a network has, and states that it fixes.
+
+@lru_cache(maxsize=256)
+def group_of(network: Network) -> Group:
+    """Return the group of a network's gaits, or what its parameters leave of it."""
+    symmetry = network.symmetry(network.gaits()[0])
+    group = symmetry.group
+    whole = Symmetry.of(group, dict.fromkeys(group.elements, Fraction(0)), symmetry.variables)
+    if not network.broken(whole) and not (equations_of(type(network)).by_cell and type(
+            network).families is Network.families and asymmetry(network, whole) > ASYMMETRIC):
+        return group
+    return group.subgroup(tuple(name for name in group.elements if asymmetry(
+        network, Symmetry.of(group, {name: Fraction(0)}, symmetry.variables)) <= ASYMMETRIC))
+
+
+def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
+    """Return the network's state from that of a cell of each orbit, shape (..., components).
+
+    Args:
+        network: parameters.
+        cell: for each variable, a value for each orbit of cells, (..., variables orbits), or one
+            for all, (..., variables).
+
+    """
+    if cell.shape[-1] == network.variables:
+        return np.repeat(cell, network.cells, axis=-1)
+    orbits = group_of(network).orbits
+    blocks = np.arange(network.variables)[:, None] * (orbits.max() + 1)
+    return cell[..., (orbits + blocks).ravel()]
+
+
 class Expansion:
-    """Exact derivatives of a cell's rates by its inputs, at a state in which all cells are equal.
+    """Exact derivatives of a network's rates at an equilibrium.
 
     Attributes:
         network: parameters.
-        state: of every cell, shape (variables,).
+        field: its rates.
+        state: shape (components,).
+        linear: L0 and L1 of the whole network, shape (components, components) each.
 
     """
 
     def __init__(self, network: Network, state: np.ndarray) -> None:
-        """Expand about a state of every cell at these parameters."""
-        self.network, self.state = network, state
-        self._equations = equations_of(type(network))
-        self._x = [state[argument.variable] for argument in self._equations.arguments]
-        self._p = [value.flat[0] for value in values_of(network)]
-        self._higher: dict[int, Mapping[Any, float]] = {}
+        """Expand about a state of every cell, or of one of each orbit of cells."""
+        self.network, self.field = network, Field(network)
+        state = np.asarray(state, dtype=float)
+        self.state = state if state.size == network.components else everywhere(network, state)
+        now, past = self.field.linearised(self.state)[1:]
+        self.linear = now, past if past.size else np.zeros_like(now)
 
-    @cached_property
-    def slopes(self) -> Mapping[tuple[int, int], float]:
-        """Return (variable, argument) -> derivative of the rate."""
-        return self._equations.slopes(self._x, self._p)[1]
-
-    def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """L0 and L1 of a class, complex: ``h' = L0 h(t) + L1 h(t - tau)``, (variables, variables).
-
-        Args:
-            chi: the class's character for every cell, 1 for the first, shape (cells,).
-
-        """
-        return self._split(chi, self.slopes)
-
-    def _split(self, chi: np.ndarray, slopes: Mapping[tuple[int, int], float]
-               ) -> tuple[np.ndarray, np.ndarray]:
-        variables = self.network.variables
-        both = np.zeros((2, variables, variables), dtype=complex)
-        for (v, k), slope in slopes.items():
-            argument = self._equations.arguments[k]
-            both[int(argument.delayed), v, argument.variable] += slope * (
-                1.0 if argument.source is None else chi[argument.source[0]])
-        return both[0], both[1]
-
-    def inputs(self, h: np.ndarray, chi: np.ndarray, exponent: complex = 0.0) -> np.ndarray:
-        """Return the inputs from ``h chi exp(exponent t)`` at t = 0, shape (arguments,).
-
-        Args:
-            h: of a cell, shape (variables,).
-            chi: character, shape (cells,).
-            exponent: 1/model time.
-
-        """
-        past = np.exp(-exponent * self.network.delay)
-        return np.array([h[argument.variable]
-                         * (1.0 if argument.source is None else chi[argument.source[0]])
-                         * (past if argument.delayed else 1.0)
-                         for argument in self._equations.arguments])
-
-    def multilinear(self, *sets: np.ndarray) -> np.ndarray:
-        """Derivative of the rates, B(a, b) or C(a, b, c), at sets of arguments, (variables,)."""
-        return self._summed(self.derivatives(len(sets)), sets)
-
-    def bound(self, *sets: np.ndarray) -> np.ndarray:
-        """Return the sum of the moduli of the terms of ``multilinear``, shape (variables,)."""
-        sizes = {key: abs(value) for key, value in self.derivatives(len(sets)).items()}
-        return self._summed(sizes, [np.abs(vectors) for vectors in sets]).real
-
-    def derivatives(self, order: int) -> Mapping[Any, float]:
-        """Return (variable, arguments) -> derivative of order 2 or 3; arguments ascend."""
-        if order not in self._higher:
-            self._higher[order] = self._equations.higher(order, self._x, self._p)
-        return self._higher[order]
-
-    def _summed(self, derivatives: Mapping[Any, float], sets: Sequence[np.ndarray]) -> np.ndarray:
-        out = np.zeros(self.network.variables, dtype=complex)
-        for v, rate in multilinear(derivatives, sets).items():
-            out[v] = rate
-        return out
-
-    def _moving(self, line: ParameterLine) -> dict[int, float]:
-        """Return the rates at which rows of parameters change along a line, without zeros."""
-        signs = dict(zip(line.names, line.signs, strict=True))
-        by_cell = self._equations.by_cell
-        names = [by_cell[row][0] if row in by_cell else row for row in self._equations.rows]
-        return {r: signs[name] for r, name in enumerate(names) if name in signs}
-
-    def along(self, line: ParameterLine) -> np.ndarray:
-        """Return the derivative of the rates along a line of parameters, shape (variables,)."""
-        out, moving = np.zeros(self.network.variables), self._moving(line)
-        for (v, r), slope in self._equations.by_parameter(self._x, self._p).items():
-            out[v] += slope * moving.get(r, 0.0)
-        return out
-
-    def linear_along(self, line: ParameterLine, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return derivatives of L0 and L1 along a line of parameters, at a state that stays."""
-        moving = self._moving(line)
-        slopes: dict[tuple[int, int], float] = {}
-        mixed = self._equations.by_parameter_and_argument(self._x, self._p)
-        for (v, r, k), slope in mixed.items():
-            slopes[v, k] = slopes.get((v, k), 0.0) + slope * moving.get(r, 0.0)
-        return self._split(chi, slopes)
+    def multilinear(self, *sets: tuple[np.ndarray, np.ndarray], sizes: bool = False
+                    ) -> np.ndarray:
+        """Derivative of the rates, B(a, b) or C(a, b, c), as of Field.multilinear."""
+        return self.field.multilinear((self.state, self.state), *sets, sizes=sizes)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -176,26 +279,34 @@ class Block(ShortRepr):
 
     Attributes:
         network: parameters.
-        symmetry: of the class's oscillation, the shifts of the whole group.
-        now: L0, complex, shape (variables, variables), by the state now.
+        representation: of the class.
+        now: L0, complex, shape (variables m, variables m), by the state now.
         past: L1, by the state a delay ago.
 
     """
 
     network: Network
-    symmetry: Symmetry
+    representation: Representation
     now: np.ndarray
     past: np.ndarray
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Symmetry of the class's oscillation."""
+        return self.representation.symmetry
+
+    @property
+    def copies(self) -> int:
+        """How often the network has each of the roots."""
+        return self.representation.dimension
 
     @cached_property
     def gait(self) -> str:
         """The network's gait that oscillates in this class, in either direction of its wave."""
-        own = dict(self.symmetry.shifts)
-        directions = [own, {name: -shift % 1 for name, shift in own.items()}]
-        gaits = {gait: dict(self.network.symmetry(gait).shifts) for gait in self.network.gaits()}
+        gaits = {gait: self.network.symmetry(gait) for gait in self.network.gaits()}
         # Some networks have a name for each direction.
-        return next((gait for direction in directions for gait, shifts in gaits.items()
-                     if shifts == direction), '')
+        return next((gait for way in (1, -1) for gait, symmetry in gaits.items()
+                     if self.representation.towards(power(symmetry, way))), '')
 
     @property
     def mode(self) -> tuple[int, ...]:
@@ -204,8 +315,8 @@ class Block(ShortRepr):
 
     @property
     def name(self) -> str:
-        """Name as in Buono & Golubitsky's Table 6, ``L_21``."""
-        return f'L_{"".join(map(str, self.mode))}'
+        """Name as in Buono & Golubitsky's Table 6, ``L_21``; * stands for -1."""
+        return f'L_{"".join("*" if j < 0 else str(j) for j in self.mode)}'
 
     @property
     def real(self) -> bool:
@@ -228,8 +339,9 @@ class Block(ShortRepr):
 
     @property
     def vector(self) -> np.ndarray:
-        """Value of the character for every cell, shape (cells,)."""
-        return character(self.symmetry)
+        """Disturbance of the cells, 1 for the first that it moves, shape (cells,)."""
+        column = self.representation.columns[:, 0]
+        return np.asarray(column / column[np.flatnonzero(np.abs(column) > SAME)[0]])
 
     @property
     def leading(self) -> complex:
@@ -244,34 +356,23 @@ class Block(ShortRepr):
         """Return all roots whose real part is above a bound, rightmost first."""
         return roots_right_of(bound, self.now, self.past, self.network.delay, self.real)
 
-    def within(self, other: 'Block') -> bool:
-        """Return whether the class lies in the fixed-point space of the K of the other's gait.
+    def embedded(self, vectors: np.ndarray) -> np.ndarray:
+        """Return vectors of the block, shape (variables m, ...), for the whole network."""
+        return np.asarray(self.representation.whole @ vectors)
+
+    def restricted(self, matrix: np.ndarray) -> np.ndarray:
+        """Return a matrix of the whole network in this class."""
+        return np.asarray(self.representation.whole.conj().T @ matrix @ self.representation.whole)
+
+    def inside(self, other: 'Block') -> int:
+        """Return how many copies lie in the fixed-point space of the K of the other's gait.
 
         With the symmetry x -> -x, elements with a shift of 1/2 belong to K, too.
         """
-        own = dict(self.symmetry.shifts)
         kept = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
-        return all(own[name] == shift for name, shift in other.symmetry.shifts if shift in kept)
-
-
-@cache
-def character(symmetry: Symmetry) -> np.ndarray:
-    """Return a character's values for the cells, with exact powers of i."""
-    quarters = 4.0 * symmetry.phases
-    exact = np.array([1.0, 1j, -1.0, -1j])[np.round(quarters).astype(int) % 4]
-    return np.where(quarters == np.round(quarters), exact, np.exp(0.5j * np.pi * quarters))
-
-
-@cache
-def characters(group: Group, variables: int, odd: bool) -> tuple[Symmetry, ...]:
-    """Return all characters of a network's group, as symmetries of oscillations.
-
-    Raises:
-        InputError: the group does not act regularly on the cells, or is not abelian.
-
-    """
-    group.check_regular()
-    return tuple(homomorphisms(group, [name for name, _ in group.generators], variables, odd))
+        return self.representation.copies(Symmetry.of(
+            other.symmetry.group, {name: shift for name, shift in other.symmetry.shifts
+                                   if shift in kept}, odd=self.symmetry.odd))
 
 
 def power(symmetry: Symmetry, n: int) -> Symmetry:
@@ -288,44 +389,58 @@ def waves_of(network: Network, gait: str) -> list[Symmetry]:
     return [symmetry] if other in named else [symmetry, other]
 
 
-def block_of(expansion: Expansion, symmetry: Symmetry) -> Block:
+def classes(network: Network, group: Group | None = None) -> tuple[Representation, ...]:
+    """Return the representations of the classes, by ascending mode.
+
+    Args:
+        network: parameters.
+        group: symmetries of the equilibrium, by default all of the network.
+
+    """
+    symmetry = network.symmetry(network.gaits()[0])
+    return representations(group or group_of(network), symmetry.variables, symmetry.odd)
+
+
+@cache
+def _class_of(group: Group, symmetry: Symmetry) -> Representation:
+    found = [one for each in representations(group, symmetry.variables, symmetry.odd)
+             if (one := each.towards(symmetry)) is not None]
+    if not found:
+        raise InputError(f'{symmetry!r} belongs to no class of the equilibrium')
+    return found[0]
+
+
+def block_of(expansion: Expansion, representation: Representation | Symmetry) -> Block:
     """Return the block of one class.
 
     Args:
         expansion: at the equilibrium.
-        symmetry: of the class, the shifts of the whole group.
+        representation: of the class, or the symmetry of its oscillation.
+
+    Raises:
+        InputError: no class has this symmetry.
 
     """
-    return Block(expansion.network, symmetry, *expansion.linear(character(symmetry)))
+    if isinstance(representation, Symmetry):
+        representation = _class_of(group_of(expansion.network), representation)
+    block = Block(expansion.network, representation, *expansion.linear)
+    return replace(block, now=block.restricted(block.now), past=block.restricted(block.past))
 
 
-def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
-    """Split the linearisation at an equilibrium, one block for each cell, by ascending mode.
+def blocks(network: Network, state: np.ndarray, group: Group | None = None) -> tuple[Block, ...]:
+    """Split the linearisation at an equilibrium, a block for each class, by ascending mode.
 
     Args:
         network: parameters.
-        state: of every cell, shape (variables,).
-
-    Raises:
-        InputError: weights differ that the network's symmetry makes equal, or its group does not
-            act regularly on the cells.
+        state: of every cell, of one of each orbit of cells, or of all.
+        group: symmetries of the equilibrium, by default all of the network.
 
     """
-    expansion = Expansion(network, np.asarray(state, dtype=float))
-    return tuple(block_of(expansion, symmetry) for symmetry in classes(network))
+    expansion = Expansion(network, state)
+    return tuple(block_of(expansion, one) for one in classes(network, group))
 
 
 def block_at(network: Network, state: np.ndarray, mode: tuple[int, ...]) -> Block:
     """Return the block of one class by its mode, as of blocks."""
-    symmetry = next(symmetry for symmetry in classes(network) if symmetry.mode == mode)
-    return block_of(Expansion(network, np.asarray(state, dtype=float)), symmetry)
-
-
-def classes(network: Network) -> tuple[Symmetry, ...]:
-    """Return the symmetries of the classes; order and errors as of blocks."""
-    symmetry = network.symmetry(network.gaits()[0])
-    split = characters(symmetry.group, network.variables, symmetry.odd)
-    broken = network.broken(split[0])
-    if broken:
-        raise InputError(f'{broken} differ: the network does not have the symmetry of its gaits')
-    return split
+    return block_of(Expansion(network, state), next(
+        one for one in classes(network) if one.symmetry.mode == mode))

@@ -93,6 +93,28 @@ class Orbit(ShortRepr, ABC):
         gaps = self.derivative(self.between) - self.network.rates(states, past)
         return float(np.abs(gaps).max())
 
+    @cached_property
+    def error(self) -> float:
+        """Estimated error of a state over its variable's range, or of the period over itself.
+
+        It is the largest change on a mesh twice as fine.
+
+        Raises:
+            NoOrbit: there is no solution on that mesh.
+
+        """
+        finer, theta = self.refined(), self.between / self.period
+        states = finer(theta * finer.period)
+        sizes = np.ptp(states, axis=0).reshape(self.network.variables, -1).max(axis=1)
+        # A variable that stands still has no range.
+        sizes = np.maximum(sizes, SAME * np.abs(states).max())
+        gaps = np.abs(states - self(self.between)).max(axis=0) / sizes.repeat(self.network.cells)
+        return float(max(gaps.max(), abs(finer.period / self.period - 1.0)))
+
+    @abstractmethod
+    def refined(self) -> 'Orbit':
+        """Solve for the same orbit on a mesh twice as fine; NoOrbit if that fails."""
+
     @property
     @abstractmethod
     def between(self) -> np.ndarray:

@@ -17,14 +17,16 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 import math
+import warnings
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
+from cpg_ros.dynamics.equilibrium import equilibrium, Quotient
 from cpg_ros.dynamics.integration.c_kernel import LANES
 from cpg_ros.dynamics.integration.simulate import History, simulate, Trajectory
-from cpg_ros.dynamics.isotypic import Expansion, waves_of
+from cpg_ros.dynamics.isotypic import everywhere, waves_of
 from cpg_ros.dynamics.orbit import Path, signal_symmetry
+from cpg_ros.networks.equations import Field
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -40,8 +42,9 @@ DISTURBANCE = 0.05
 AVERAGED, POINTS = 3, 256
 #: ALIVE: range of the first variable below which nothing oscillates.
 ALIVE = 0.05
-#: Distance of a state from its return, over the range of the states.
-RETURNED = 0.1
+#: Distance of a state from its return, over the range of the states; EXACTLY: of a return after
+#: several cycles, over that after one, where the cycles differ.
+RETURNED, EXACTLY = 0.1, 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,6 +140,9 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     if gaps.min() > RETURNED:
         return None
     back = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
+    if gaps[back] > REPEATING and gaps.min() < EXACTLY * gaps[back]:
+        # Only every second cycle is the same after a period doubling.
+        back = np.flatnonzero(gaps <= max(EXACTLY * gaps[back], 1.5 * gaps.min()))[-1]
     period = float(high[-1] - high[back])
     same = states[::back - len(gaps)]
     drift = float(np.abs(same - same[0]).max()) if len(same) > 2 else np.inf
@@ -212,6 +218,61 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
     return last_cycle(run, network.cells, int((rest - 3) * period / step), _smallest(run, network))
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class StiffCycle(ShortRepr):
+    """Final cycle of a simulation with steps that adapt, of one cell of each class.
+
+    Attributes:
+        run: states of these cells, shape (d, m), over model times, shape (m,).
+        begin: time of cell 1's last peak but one, model time.
+        period: in model time.
+        columns: index among these of each component of the network, shape (components,).
+        steps: ends of the steps, cycles after that peak, rising.
+
+    """
+
+    run: Callable[[np.ndarray], np.ndarray]
+    begin: float
+    period: float
+    columns: np.ndarray
+    steps: np.ndarray
+
+    def __call__(self, theta: np.ndarray) -> np.ndarray:
+        """Return states at times in cycles after that peak, 0 to 1, shape (m, components)."""
+        return self.run(self.begin + theta * self.period).T[:, self.columns]
+
+
+def _stiff_cycle(network: Network, symmetry: Symmetry, start: np.ndarray) -> StiffCycle | None:
+    """Simulate a network without a delay in a gait's class, with any steps it needs."""
+    # Import here, as it takes long to load.
+    from scipy.integrate import solve_ivp
+    cell, span = Quotient(network, symmetry.classes), LONGER[-1] * COARSER * network.step
+    with np.errstate(all='ignore'), warnings.catch_warnings():
+        # LSODA warns where it gives up.
+        warnings.simplefilter('ignore')
+        run = solve_ivp(lambda _, x: cell.rates(x), (0.0, span), start[cell.kept], method='LSODA',
+                        jac=lambda _, x: cell.linearised(x)[1], dense_output=True, rtol=1e-8,
+                        atol=1e-9 * np.abs(start).max())
+    late = run.t > 0.5 * span
+    if run.status or not np.isfinite(run.y).all() or not late.any():
+        return None
+    size = np.ptp(run.y[:, late], axis=1)
+    first = run.y[int(size[:cell.size].argmax())]
+    middle = 0.5 * (first[late].max() + first[late].min())
+    risen = np.flatnonzero(late[:-1] & (first[:-1] < middle) & (first[1:] >= middle))
+    states = run.y[:, risen] / np.where(size > 0.0, size, 1.0)[:, None]
+    gaps = np.abs(states[:, :-1] - states[:, -1:]).max(axis=0, initial=0.0)
+    if not gaps.size or gaps.min() > RETURNED:
+        return None
+    last = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
+    end, period = run.t[risen[-1]], run.t[risen[-1]] - run.t[risen[last]]
+    cycle = (run.t >= end - 2.0 * period) & (run.t <= end - period)
+    begin = run.t[cycle][run.y[0, cycle].argmax()]
+    steps = (run.t - begin) / period
+    return StiffCycle(run.sol, float(begin), float(period), cell.columns,
+                      steps[(steps >= 0.0) & (steps <= 1.0)])
+
+
 def _smallest(run: Trajectory, network: Network) -> float:
     """Return the range of the first variable below which a run does not oscillate."""
     return float(SMALLEST * np.ptp(run.x[:, :network.cells]))
@@ -244,11 +305,11 @@ def natural_unit(network: Network, rest: np.ndarray) -> float | None:
 
     At this size terms of second or third order about an equilibrium equal linear ones.
     """
-    expansion = Expansion(network, rest)
-    slopes = expansion.slopes
-    sizes = [abs(slopes[v, last] / value)**(1.0 / (order - 1)) for order in (2, 3)
-             for (v, *_, last), value in expansion.derivatives(order).items()
-             if value and slopes.get((v, last))]
+    linear, *higher = (Field(network).terms(everywhere(network, rest), order)
+                       for order in (1, 2, 3))
+    sizes = [float(np.abs(linear[v, last] / value).min())**(1.0 / order)
+             for order, terms in enumerate(higher, 1) for (v, *_, last), value in terms.items()
+             if np.all(value) and np.all(linear.get((v, last), 0.0))]
     unit = min(sizes, default=1.0)
     return None if 1.0 / FAR < unit < FAR else unit
 
@@ -290,6 +351,12 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
             batch = simulate(network, histories, (steps - before) * step, step,
                              lock=(HOLD, symmetry), progress=False, quiet=True)
             if not (before or np.isfinite(batch.x[:, -1]).any()):
+                stiff = None if network.delay_parameter else _stiff_cycle(network, symmetry,
+                                                                          group[0])
+                if stiff is not None:
+                    yield from ((each, stiff, stiff.period) for each in directions
+                                if _fits(stiff, each))
+                    return
                 raise NoOrbit(f'no {gait} was found: simulations with steps of {step:g} model '
                               'time run away from all starts; a stiff network needs a shorter '
                               "'step'")

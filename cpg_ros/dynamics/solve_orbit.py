@@ -61,20 +61,19 @@ def branch_orbits(network: Network, gait: str
         gait: one of its gaits.
 
     """
-    shifts = set(network.symmetry(gait).shifts)
+    symmetry = network.symmetry(gait)
     line, low, high = _line(network)
-    if not low < high or line.at(network, high).broken(network.symmetry(gait)):
+    if not low < high or line.at(network, high).broken(symmetry):
         return
     try:
         points = hopf_points(network, line, low, high)
     except (NoEquilibrium, InputError):
-        # An InputError says that weights break the symmetry of the classes.
+        # An InputError says that the classes of the group are not known.
         return
-    for point in points:
-        if set(point.block.symmetry.shifts) == shifts:
-            again = point.n > 0 and _repeats(network)
-            branch = None if again else _branch(network, point, low, high)
-            yield branch, iter(()) if branch is None else _on_branch(network, branch)
+    for point in filter(None, (point.towards(symmetry) for point in points)):
+        again = point.n > 0 and _repeats(network)
+        branch = None if again else _branch(network, point, low, high)
+        yield branch, iter(()) if branch is None else _on_branch(network, branch)
 
 
 def _line(network: Network) -> tuple[ParameterLine, float, float]:

@@ -311,20 +311,47 @@ class Field(Generic[AnyDefinition]):
             into[..., i + v * self.size, self._inputs[k]] += slope
         return self._filled(rates, now.shape), by_now, by_past
 
-    def multilinear(self, at: States, *sets: States) -> np.ndarray:
+    def terms(self, now: np.ndarray, order: int) -> dict[tuple[int, ...], Any]:
+        """Return (variable, arguments) -> derivative of order 1 to 3 at a state, for all cells."""
+        x = self._arguments(now, None)
+        if order > 1:
+            return self._equations.higher(order, x, self._p)
+        return dict(self._equations.slopes(x, self._p)[1].items())
+
+    def multilinear(self, at: States, *sets: States, sizes: bool = False) -> np.ndarray:
         """Return the second or third derivative of the rates, B(a, b) or C(a, b, c), (..., d).
 
         Args:
             at: states.
             sets: two or three disturbances, which may be complex.
+            sizes: return the sums of the moduli of all terms instead.
 
         """
         out = np.zeros(sets[0][0].shape, dtype=complex)
         derivatives = self._equations.higher(len(sets), self._arguments(*at), self._p)
-        for v, rate in multilinear(derivatives, [self._arguments(*states)
-                                                 for states in sets]).items():
+        vectors = [self._arguments(*states) for states in sets]
+        if sizes:
+            derivatives = {key: abs(value) for key, value in derivatives.items()}
+            vectors = [[abs(entry) for entry in entries] for entries in vectors]
+        for v, rate in multilinear(derivatives, vectors).items():
             out[..., v * self.size:(v + 1) * self.size] = rate
         return out
+
+    def linear_along(self, now: np.ndarray, direction: np.ndarray
+                     ) -> tuple[np.ndarray, np.ndarray]:
+        """Return derivatives of the Jacobians at an equilibrium along parameters, (d, d) each.
+
+        Args:
+            now: the equilibrium, which stays, shape (d,).
+            direction: of the parameters, shape (parameters,).
+
+        """
+        both, i = np.zeros((2, now.size, now.size)), np.arange(self.size)
+        mixed = self._equations.by_parameter_and_argument(self._arguments(now, None), self._p)
+        for (v, r, k), slope in mixed.items():
+            into = both[int(self._equations.arguments[k].delayed)]
+            into[i + v * self.size, self._inputs[k]] += slope * direction[self._columns[r]]
+        return both[0], both[1]
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Return the derivative of the rates by the parameters, shape (..., d, parameters).

@@ -43,11 +43,12 @@ def compose(outer: Permutation, inner: Permutation) -> Permutation:
 
 @dataclass(frozen=True)
 class Group:
-    """An abelian group of permutations of cells.
+    """A finite group of permutations of cells.
 
     Attributes:
         cells: number of cells.
-        generators: name -> permutation; names of other elements are products of these.
+        generators: name -> permutation; names of other elements are products of these, of which
+            the first factor acts first.
 
     """
 
@@ -66,14 +67,39 @@ class Group:
                 power = compose(generator, power)
             powers.append(listed)
             names.append(['', name, *(f'{name}^{k}' for k in range(2, len(listed)))])
-        named: dict[str, Permutation] = {}
+        named: dict[Permutation, str] = {}
         for choice in product(*(range(len(listed)) for listed in powers)):
             element = tuple(range(self.cells))
             for listed, k in zip(powers, choice, strict=True):
                 element = compose(listed[k], element)
             name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
-            named[name or '1'] = element
-        return named
+            named.setdefault(element, name or '1')
+        # Of a group that is not abelian these products need not be all elements.
+        waiting = list(named)
+        while waiting:
+            element = waiting.pop(0)
+            for name, generator in self.generators:
+                image = compose(generator, element)
+                if image not in named:
+                    named[image] = f'{named[element]} {name}'
+                    waiting.append(image)
+        return {name: element for element, name in named.items()}
+
+    @cached_property
+    def names(self) -> dict[Permutation, str]:
+        """Permutation -> name."""
+        return {element: name for name, element in self.elements.items()}
+
+    @cached_property
+    def orbits(self) -> np.ndarray:
+        """Number of each cell's orbit, from 0, shape (cells,): which cells change places."""
+        least = np.array(list(self.elements.values())).min(axis=0)
+        return np.unique(least, return_inverse=True)[1]
+
+    def subgroup(self, names: 'Subgroup') -> 'Group':
+        """Return a subgroup, given by all of its elements' names, as a group."""
+        return Group(self.cells, tuple((name, self.elements[name])
+                                       for name in generators(self, names)))
 
     @cached_property
     def exponent(self) -> int:
@@ -111,7 +137,6 @@ class Group:
             ValueError: the shifts contradict one another.
 
         """
-        names = {element: name for name, element in self.elements.items()}
         phases = {tuple(range(self.cells)): Fraction(0)}
         waiting = list(phases)
         while waiting:
@@ -123,7 +148,7 @@ class Group:
                     phases[image] = theta
                     waiting.append(image)
                 elif phases[image] != theta:
-                    raise InputError(f'{names[image]} would have the shifts {theta} and '
+                    raise InputError(f'{self.names[image]} would have the shifts {theta} and '
                                      f'{phases[image]}')
         return {name: phases[element] for name, element in self.elements.items()
                 if element in phases}
@@ -235,9 +260,9 @@ class Symmetry(ShortRepr):
 
     @cached_property
     def mode(self) -> tuple[int, ...]:
-        """(j, k): shifts j/m and k/n of the generators, of orders m and n, if H is the group."""
+        """(j, k): shifts j/m and k/n of the generators, of orders m and n; -1 outside H."""
         shifts = dict(self.shifts)
-        return tuple(int(shifts[name] * self.group.order(name))
+        return tuple(int(shifts[name] * self.group.order(name)) if name in shifts else -1
                      for name, _ in self.group.generators)
 
     @cached_property
@@ -345,7 +370,7 @@ def label(group: Group, subgroup: Subgroup) -> str:
 
 @cache
 def subgroups(group: Group) -> tuple[Subgroup, ...]:
-    """Return all subgroups of an abelian group, from the trivial one to the whole."""
+    """Return all subgroups of a group, from the trivial one to the whole."""
     groups = {_closure(group, ())}
     waiting = list(groups)
     while waiting:

@@ -19,10 +19,11 @@ from functools import cache
 from cpg_ros.analysis.papers.buono_hopf import theorem_verdict
 from cpg_ros.dynamics import hopf
 from cpg_ros.dynamics.arclength import crossings
-from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
+from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import hopf_points
 from cpg_ros.dynamics.integration.simulate import simulate
+from cpg_ros.dynamics.isotypic import everywhere
 from cpg_ros.dynamics.mesh.solve import from_path
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped

@@ -14,6 +14,7 @@
 
 """All orbits of a gait: what simulations settle on is found, and judged with the others."""
 
+from dataclasses import dataclass
 from pathlib import Path
 import re
 
@@ -29,6 +30,7 @@ from cpg_ros.networks.registry import find_network, PRESETS
 from depth import in_depth
 import numpy as np
 import pytest
+from two_sided import OTHER, TwoSided, WIDE
 from van_der_pol import van_der_pol
 
 #: A set that optimize certified: the hop of period 13.9143 attracts, that of 13.38 does not.
@@ -184,3 +186,42 @@ def test_slow_relaxation_orbits_of_the_quadruped_are_found(values, gait, period)
 def test_what_is_too_stiff_for_the_step_is_not_called_none():
     with pytest.raises(NoOrbit, match=r'steps of 0.02 model time run away .* shorter .step.'):
         coexisting_orbits(van_der_pol(1.0, 1.0)(200.0, -0.1), 'walk', everything=False)
+
+
+def test_an_orbit_whose_period_has_doubled_is_found():
+    # Simulations settle on cycles of 18.821 and 18.726 by turns.
+    network = Biped.symmetric(0.3161816416321398, 0.272792643624282, 0.3769364125267425,
+                              0.18598910346640518, -0.790205646865161)
+    found = coexisting_orbits(network, 'one_legged_hop', everything=False).orbits[0]
+    assert found.period == pytest.approx(18.8214 + 18.7258, abs=1e-3)
+    assert multipliers_within(found).attracts
+    states = found(np.array([0.0, 0.25, 0.5, 1.0]) * found.period)
+    assert np.abs(states[2] - states[0]).max() > 1e-3 > 1e6 * np.abs(states[3] - states[0]).max()
+
+
+@dataclass(frozen=True)
+class Stiff(TwoSided):
+    """Van der Pol cells with mu 200, and the step of a soft network."""
+
+    mu: float = 200.0
+    k: float = -0.1
+
+    name = 'stiff'
+    ranges = {'mu': WIDE, 'k': WIDE}
+    couplings = ('k',)
+    line = 'k'
+
+    @staticmethod
+    def equations(cell, p):
+        x, y = cell.now()
+        other, _ = cell.now(OTHER)
+        return y, p.mu * (1.0 - x**2) * y - x + p.k * (other - x)
+
+
+@pytest.mark.parametrize(('gait', 'period'), [('hop', 323.916), ('walk', 404.694)])
+def test_orbits_of_a_stiff_network_are_found_where_its_step_is_too_long(gait, period):
+    # As scipy's LSODA finds them with both cells; x has the range 2 for large mu.
+    found = coexisting_orbits(Stiff(), gait, everything=False).orbits[0]
+    assert found.period == pytest.approx(period, abs=1e-3)
+    assert found.levels[0, 0, 1] == pytest.approx(2.0, abs=1e-3)
+    assert found.error < 1e-8

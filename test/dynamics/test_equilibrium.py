@@ -17,8 +17,8 @@
 from dataclasses import replace
 
 from cpg_ros.analysis.papers.buono_hopf import PRINTED, Sample, square_root
-from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, everywhere, NoEquilibrium
-from cpg_ros.dynamics.isotypic import blocks
+from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, NoEquilibrium
+from cpg_ros.dynamics.isotypic import blocks, everywhere, group_of
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
 from depth import examples
@@ -141,10 +141,17 @@ def test_blocks_split_the_linearisation(network):
                                                                            abs=1e-7)
 
 
-def test_unequal_weights_have_no_blocks():
-    network = replace(Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489), w_12=0.3)
-    with pytest.raises(ValueError, match='w_21, w_43, w_12, w_34 differ'):
-        blocks(network, equilibrium(network))
+def test_unequal_weights_leave_the_classes_of_what_symmetry_is_left():
+    whole = Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489)
+    for network, group in ((replace(whole, w_12=0.3, w_34=0.3), ['1', 'tau']),
+                           (replace(whole, w_12=0.3), ['1'])):
+        assert list(group_of(network).elements) == group
+        rest = everywhere(network, equilibrium(network))
+        assert np.abs(network.rates(rest)).max() < 1e-12
+        split = blocks(network, rest)
+        assert len(split) == len(group)
+        found = np.concatenate([block.roots(8) for block in split])
+        assert apart(found, np.linalg.eigvals(network.jacobian(rest))) < 1e-9
 
 
 @examples(40)

@@ -17,11 +17,15 @@
 from dataclasses import replace
 
 from cpg_ros.dynamics.arclength import NoOrbit
+from cpg_ros.dynamics.fourier import solve as fourier_solve
+from cpg_ros.dynamics.fourier.orbit import rows_of
 from cpg_ros.dynamics.hopf import first_hopf, hopf_points
+from cpg_ros.dynamics.mesh import orbit as mesh_orbit
 from cpg_ros.dynamics.orbit import extra_symmetry
-from cpg_ros.dynamics.solve_orbit import solve_orbit
+from cpg_ros.dynamics.solve_orbit import solve_from_path, solve_orbit, solve_preset
 from cpg_ros.networks.library.delayed import Delayed, PRESETS
 from cpg_ros.networks.network import ParameterLine
+from cpg_ros.networks.registry import PRESETS as ALL_PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from depth import examples
 from hypothesis import assume, given
@@ -195,3 +199,23 @@ def test_an_orbit_that_repeats_eleven_times_is_told():
     often = replace(once, period=11.0 * once.period, values=np.tile(once.values, 11))
     assert extra_symmetry(once) == ''
     assert extra_symmetry(often) == 'it repeats 11 times'
+
+
+@pytest.mark.parametrize('case', ['quadruped', 'delayed'])
+def test_the_error_of_a_coarse_orbit_is_that_against_a_fine_one(case, monkeypatch):
+    exact = solve_preset(ALL_PRESETS[case]['trot'])
+    assert exact.error < 1e-10
+    # As if waveforms were resolved with far larger last terms.
+    monkeypatch.setattr(mesh_orbit, 'RESOLVED', 1e-5)
+    monkeypatch.setattr(fourier_solve, 'RESOLVED', 1e-3)
+    theta = np.arange(499) / 499
+    coarse = solve_from_path(exact.network, exact.symmetry,
+                             lambda at: exact(at * exact.period), exact.period)
+    if case == 'delayed':
+        rows = rows_of(exact.network, exact.symmetry, exact.cycle(15))
+        coarse = fourier_solve.newton(exact.network, exact.symmetry, rows, exact.period)
+    states, wanted = (one(theta * one.period) for one in (coarse, exact))
+    sizes = np.ptp(wanted, axis=0).reshape(exact.network.variables, -1).max(axis=1)
+    gap = (np.abs(states - wanted).max(axis=0) / sizes.repeat(exact.network.cells)).max()
+    assert gap > 1e-11
+    assert 0.3 < coarse.error / max(gap, abs(coarse.period / exact.period - 1.0)) < 3.0

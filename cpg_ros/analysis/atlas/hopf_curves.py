@@ -295,8 +295,7 @@ class _End:
         network = chart.at_fractions(fraction[:2])
         self.rest = equilibrium(network)
         self.moves = not odd(network) and network.at_rest() is None
-        self.together = next(character for character in classes(network)
-                             if all(shift == 0 for _, shift in character.shifts))
+        self.together = classes(network)[0]
         self.free = len(self.rest) if self.moves else 0
 
     def _split(self, unknowns: np.ndarray) -> tuple[np.ndarray, Expansion]:

@@ -30,9 +30,9 @@ from cpg_ros.analysis.papers.row import (
     Value,
     value_of,
 )
-from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
+from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import hopf_at, hopf_points, HopfPoint
-from cpg_ros.dynamics.isotypic import Block, blocks
+from cpg_ros.dynamics.isotypic import Block, blocks, everywhere
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.network import known, Network, ParameterLine
 from cpg_ros.networks.symmetry import GAITS

@@ -35,7 +35,6 @@ from cpg_ros.dynamics.hopf import first_hopf, HopfPoint, NormalForm
 from cpg_ros.dynamics.isotypic import Expansion
 from cpg_ros.dynamics.solve_orbit import solve_orbit
 from cpg_ros.fitting.inversion.paper_fit import cycle_samples, CycleFit, fit_cycle
-from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.symmetry import Z4_Z2
 import numpy as np
@@ -63,20 +62,15 @@ def taylor_terms() -> Iterator[ReproducedRow | Picture]:
         """Return a row of F_3 as printed, with some cell behind."""
         return -tau / 3.0 * (b * now[cell]**3 + d * now[behind - 1]**3 + c * past[across[cell]]**3)
 
-    def third_derivative(cell: int) -> float:
-        inputs = np.array([(past if argument.delayed else now)[
-            cell if argument.source is None else argument.source[cell]]
-            for argument in equations_of(Delayed).arguments])
-        return tau * float(expansion.multilinear(inputs, inputs, inputs)[0].real)
-
+    third = tau * expansion.multilinear(*[(now, past)] * 3).real
     for cell, behind in enumerate(BEHIND):
         value, wrong = cubes(cell, behind), cell == 2
         yield at.formula(f'row {cell + 1} of F_3 as printed, and of F_3/3!',
                          f'-tau/3 (b phi_{cell + 1}^3 + d phi_{behind}^3 + '
-                         f'c phi_{across[cell] + 1}^3(-1))', value, third_derivative(cell) / 6.0,
+                         f'c phi_{across[cell] + 1}^3(-1))', value, float(third[cell]) / 6.0,
                          erratum=(25, cubes(cell, THIRD)) if wrong else None)
     yield at.formula('row 1 of F_3, where F = F_2/2! + F_3/3!', 'as printed', cubes(0, 7),
-                     third_derivative(0), erratum=(25, 6.0 * cubes(0, 7)))
+                     float(third[0]), erratum=(25, 6.0 * cubes(0, 7)))
     # (tau + mu) L phi has mu L phi as its second-order part in (mu, phi): half of F_2.
     linear = network.jacobian(np.zeros(8)) @ now
     delayed = network.rates(np.zeros(8), 1e-6 * past) / 1e-6

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, TypeAlias
 
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.orbit import deflation_factor, Orbit
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
@@ -107,6 +108,10 @@ class Nodes:
     n: int
     #: Residual, over the slopes, at which Newton's method ends.
     tolerance: ClassVar[float] = 1e-12
+
+    def finer(self, values: np.ndarray) -> tuple['Nodes', np.ndarray]:
+        """Return a basis twice as fine, and its nodes in cycles; values are of cell 1."""
+        return Nodes(2 * self.n + 1), np.arange(2 * self.n + 1) / (2 * self.n + 1)
 
     @property
     def derive(self) -> np.ndarray:
@@ -208,6 +213,17 @@ class FourierOrbit(Orbit):
     def between(self) -> np.ndarray:
         """Times in the middle between two nodes, model time, shape (n,)."""
         return (np.arange(self.samples) + 0.5) / self.samples * self.period
+
+    def refined(self) -> 'FourierOrbit':
+        """As of Orbit."""
+        rows = self.values.reshape(-1, self.values.shape[-1])
+        basis, nodes = self.basis.finer(rows[0])
+        solved = converge(self.network, self.symmetry,
+                          np.array([self.basis.evaluate(row, nodes, 0) for row in rows]),
+                          self.period, basis)
+        if solved is None:
+            raise NoOrbit('the orbit is lost on a mesh twice as fine')
+        return complete(self.network, self.symmetry, *solved, basis)
 
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:

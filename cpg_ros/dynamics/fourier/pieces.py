@@ -63,6 +63,12 @@ class Pieces(ShortRepr):
     def _summary(self) -> str:
         return f'{self.ends.size - 1} intervals'
 
+    def finer(self, values: np.ndarray) -> tuple['Pieces', np.ndarray]:
+        """As of Nodes."""
+        ends = np.sort(np.append(self.ends, 0.5 * (self.ends[:-1] + self.ends[1:])))
+        nodes = nodes_of(ends, POINTS[:-1])
+        return Pieces(ends, self.evaluate(values, nodes)), nodes
+
     @cached_property
     def _collocated(self) -> np.ndarray:
         return nodes_of(self.ends, NODES)

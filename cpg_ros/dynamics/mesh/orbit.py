@@ -206,8 +206,20 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
 
 
 def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
-               intervals: int = FEW) -> np.ndarray:
-    """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
+               intervals: int = FEW, steps: np.ndarray | None = None) -> np.ndarray:
+    """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends.
+
+    Args:
+        reduced: the network in a gait.
+        path: states of its cells.
+        intervals: their number.
+        steps: of the simulation that gave the path, in cycles, whose density counts instead.
+
+    """
+    if steps is not None:
+        ends = steps * reduced.symmetry.order
+        ends = ends[(ends > 0.0) & (ends < 1.0)]
+        return np.concatenate([[0.0], ends[::max(1, ends.size // intervals)], [1.0]])
     positions = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
     bend = np.abs(np.diff(reduced.rates(path(positions)), axis=0)).max(axis=1)
     return collocation.spread(positions, np.sqrt(bend + 1e-3 * bend.max() + 1e-300), intervals)
@@ -282,6 +294,15 @@ class MeshOrbit(Orbit):
         ends = np.vstack([self.coefficients[0], self.coefficients[:, -1].sum(axis=0)])
         return Solution(self.mesh, ends, self.stages, self.period / self.symmetry.order)
 
+    def refined(self) -> 'MeshOrbit':
+        """As of Orbit."""
+        reduced, now = Reduced(self.network, self.symmetry), self.solution
+        middles = 0.5 * (self.mesh[:-1] + self.mesh[1:])
+        finer = sampled(path_of(reduced, now), np.sort(np.append(self.mesh, middles)), now.length)
+        if not newton(reduced, finer):
+            raise NoOrbit('the orbit is lost on a mesh twice as fine')
+        return completed(reduced, finer)
+
     @cached_property
     def _derivatives(self) -> tuple[np.ndarray, np.ndarray]:
         return derivatives(Reduced(self.network, self.symmetry), self.solution)
@@ -321,6 +342,12 @@ class MeshOrbit(Orbit):
         """Times inside the intervals of T/m, model time, shape (5 n,)."""
         positions = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * BETWEEN
         return positions.ravel() * self.solution.length
+
+
+def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
+    """Make an orbit of a solution."""
+    return MeshOrbit(reduced.network, reduced.symmetry, reduced.symmetry.order * now.length,
+                     now.mesh, now.stages, coefficients_of(reduced, now))
 
 
 def columns_of(symmetry: Symmetry, wave: int, variable: int) -> list[int]:

@@ -35,6 +35,7 @@ from cpg_ros.dynamics.mesh.orbit import (
     bordered,
     coefficients_of,
     columns_of,
+    completed,
     FEW,
     FEWEST,
     finer,
@@ -72,7 +73,8 @@ def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
         return path(positions / symmetry.order)[:, reduced.kept]
 
     for intervals in MESHES[:1] if periods else MESHES:
-        start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
+        start = sampled(guess, first_mesh(reduced, guess, intervals, getattr(path, 'steps', None)),
+                        period / symmetry.order)
         orbit = _refined(reduced, start, [excluded / symmetry.order for excluded in periods])
         if orbit is not None:
             return orbit
@@ -142,13 +144,6 @@ def _on_kinks(reduced: Reduced, now: Solution) -> bool:
         if not newton(reduced, now):
             return False
     return True
-
-
-def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
-    """Make an orbit of a solution."""
-    return MeshOrbit(reduced.network, reduced.symmetry, reduced.symmetry.order * now.length,
-                     now.mesh, now.stages, coefficients_of(reduced, now))
-
 
 
 @dataclass(frozen=True, eq=False, repr=False)
