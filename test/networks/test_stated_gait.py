@@ -168,5 +168,5 @@ def test_an_atlas_seeks_no_equilibrium_where_there_is_none(monkeypatch):
     monkeypatch.setattr('cpg_ros.dynamics.equilibrium.Quotient.newton_from_all', None)
     chart = chart_of('phase', trot, [('w', (0.1, 5.0)), ('nu', (0.5, 2.0))], (9, 9))
     assert hopf_curves(chart, trot.gaits()) == []
-    with pytest.raises(NoEquilibrium, match='no stand'):
+    with pytest.raises(NoEquilibrium, match='no equilibrium'):
         equilibrium(trot)
