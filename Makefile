@@ -10,6 +10,8 @@ SOURCES := $(shell find cpg_ros config launch resource -type f -not -path '*/__p
 ifeq ($(ROS_DISTRO),)
 INSTALLED := $(VENV)/.installed
 WHEELS := ros
+# Jazzy's wheels end with this Python 3.
+NEWEST := 13
 PREFIXES := $(CURDIR)/$(VENV)
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
@@ -17,6 +19,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 else
 INSTALLED := $(VENV)/.installed-beside-$(ROS_DISTRO)
 SITE := --system-site-packages
+NEWEST := 14
 PREFIXES := $(AMENT_PREFIX_PATH)
 endif
 # Installs groups of dependencies of pyproject.toml: $(call pip,GROUPS,OPTIONS).
@@ -138,8 +141,8 @@ $(VENV)/.messages: $(INSTALLED) resource/interfaces/build.py $(wildcard resource
 	@touch $@
 
 $(INSTALLED): pyproject.toml .ci/constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 14))' || \
-		{ echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); cpg_ros needs Python 3.11 to 3.13 (PYTHON=...)" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, $(NEWEST)))' || \
+		{ echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); cpg_ros needs Python 3.11 to 3.$(NEWEST) (PYTHON=...)" >&2; exit 1; }
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'

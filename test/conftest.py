@@ -43,6 +43,30 @@ FLAGS = ['--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader
          '--disable-background-networking', '--disable-component-update', '--disable-sync']
 
 
+#: Libraries that apt does not have: where colcon runs the tests beside a sourced ROS, they may be
+#: missing.
+FROM_PIP = 'ezc3d', 'jitcdde', 'rosbags', 'websockets'
+
+
+class File(pytest.Module):
+    """The tests of a file, which are skipped where it imports a library that is missing."""
+
+    def collect(self):
+        try:
+            return super().collect()
+        except self.CollectError as error:
+            cause = error.__cause__
+            missing = next((name for name in FROM_PIP if name in str(cause)), '')
+            if not (isinstance(cause, ImportError) and missing):
+                raise
+            pytest.skip(f'{missing} is not installed', allow_module_level=True)
+
+
+def pytest_pycollect_makemodule(module_path, parent):
+    """Read a file of tests."""
+    return File.from_parent(parent, path=module_path)
+
+
 def pytest_collection_modifyitems(items):
     """Mark what runs on a graph."""
     seen = set()

@@ -14,6 +14,10 @@
 
 """The parameter files of the page on Nav2 and joysticks: names and types that the nodes have."""
 
+import os
+from pathlib import Path
+import re
+
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.feedback import switch
 from launch_files import of_generator
@@ -46,6 +50,26 @@ def test_the_generator_has_the_parameters_of_its_file():
     known = {**of_generator('delayed'), **switch.specs(load_robot('unitree_go2'))}
     for name, value in files()['cpg_generator'].items():
         assert type(value) is type(known[name].default), name
+
+
+#: Node of Nav2 -> the files of its sources that declare its parameters.
+SOURCES = {
+    'lifecycle_manager_navigation': ['nav2_lifecycle_manager/src/lifecycle_manager.cpp'],
+    'controller_server': [
+        'nav2_util/include/nav2_util/twist_publisher.hpp',
+        'nav2_dwb_controller/nav_2d_utils/include/nav_2d_utils/odom_subscriber.hpp'],
+    'velocity_smoother': ['nav2_velocity_smoother/src/velocity_smoother.cpp',
+                          'nav2_util/include/nav2_util/twist_publisher.hpp']}
+
+
+@pytest.mark.parametrize('node', SOURCES)
+def test_nav2_declares_the_parameters_of_its_files(node):
+    folder = os.environ.get('NAVIGATION2')
+    if not folder:
+        pytest.skip('NAVIGATION2 names no folder with the sources of navigation2')
+    text = ''.join((Path(folder) / file).read_text() for file in SOURCES[node])
+    for name in files()[node]:
+        assert re.search(rf'declare_parameter\w*\(\s*(\w+,\s*)?"{name}"', text), name
 
 
 @pytest.mark.parametrize('node', KNOWN)

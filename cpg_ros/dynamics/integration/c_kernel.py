@@ -41,8 +41,9 @@ import numpy as np
 MOST_NODES = 2**15 - 1
 #: Numbers of lanes for one trajectory and for several.
 ONE, LANES = 1, 8
-#: Options of the compiler for lanes: all vector registers of this machine.
-NATIVE = ('-march=native', '-ffp-contract=fast')
+#: Options of the compiler for lanes: all vector registers of this machine. Every arm64 has the
+#: same ones, which compilers use anyway; not all of those take an option for this machine.
+NATIVE = ('-ffp-contract=fast', *['-march=native'] * (platform.machine() == 'x86_64'))
 
 
 def _defines(**sizes: int) -> str:
