@@ -17,11 +17,13 @@
 Each row changes the body, its servos or its sensors; the gait, the efference copy and the gains
 stay. It asks for 0.4 m/s (``--speed``) and pushes for 0.1 s from 12 directions at two phases. Of
 each row: speed, tilt, cost of transport, drift to the side, and pushes survived. The pushes are
-the same in all rows.
+the same in all rows. With ``--biped`` a humanoid walks at 0.3 m/s instead, with noise and errors
+of its sensors.
 """
 
 import argparse
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 import math
 import secrets
@@ -29,9 +31,11 @@ import time
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from bench_humanoid import NOISE
 from common import emit, log, ROOT
 from cpg_ros.feedback.gains import robot_gains
-from cpg_ros.motion.robot_file import read_robot
+from cpg_ros.motion.robot_file import load_robot, read_robot
+from cpg_ros.simulation.biped_run import BipedRun
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
@@ -92,6 +96,11 @@ def rub(factor: float, loop: ClosedLoopBatch, rng: np.random.Generator) -> None:
     loop.body.model.dof_frictionloss[6:] *= factor
 
 
+def rotors(factor: float, loop: ClosedLoopBatch, rng: np.random.Generator) -> None:
+    """Multiply the inertia of the motors' rotors."""
+    loop.body.model.dof_armature[6:] *= factor
+
+
 ROWS: dict[str, Row] = {
     'as modelled': Row(),
     **{f'zeros of joints ±{size:g} rad': Row(change=partial(zeros, size))
@@ -109,9 +118,19 @@ ROWS: dict[str, Row] = {
     'centre of mass 3 cm to the left': Row(change=partial(centre, 0.0, 0.03)),
     **{f'friction of joints x {factor:g}': Row(change=partial(rub, factor))
        for factor in (0.0, 2.0)},
+    **{f'inertia of rotors x {factor:g}': Row(change=partial(rotors, factor))
+       for factor in (0.5, 2.0)},
     **{f'friction of the ground {mu:g}': Row(scenario={'friction': mu}) for mu in (0.4, 1.2)},
     'a foot sensor stuck at 0 N': Row({'stuck': 0.0}),
     'a foot sensor stuck at 80 N': Row({'stuck': 80.0})}
+
+
+#: Rows of a biped, by changes of its sensors' noise; duration of each run, s.
+BIPED: dict[str, dict[str, float]] = {
+    'as modelled': {},
+    **{f'IMU tilted by {size:g} rad': {'orientation_bias': size} for size in (0.02, 0.04)},
+    **{f'sensors {late:g} ms late': {'delay': 1e-3 * late} for late in (10, 14, 20)}}
+BIPED_WALK = 12.0
 
 
 def held(loop: ClosedLoopBatch, rate: float) -> None:
@@ -161,6 +180,20 @@ def measure(row: Row, args: argparse.Namespace) -> dict[str, Any]:
     return found
 
 
+def measure_biped(run: BipedRun, changes: dict[str, float], args: argparse.Namespace
+                  ) -> dict[str, Any]:
+    """Return the figures of a row of a biped; seeds of the runs count from the given one on."""
+    run.noise = replace(NOISE, **changes)
+    ran = [run.run(BIPED_WALK, ((1.0, 0.3, 0.0, 0.0),), seed=args.seed + k)
+           for k in range(2 if args.quick else 6)]
+    falls = [one.fell for one in ran if math.isfinite(one.fell)]
+    return {'falls': f'{len(falls)} of {len(ran)}'
+            + (f', after {min(falls):.1f} s' if falls else ''),
+            'speed, m/s': float(np.mean([one.speed[0] for one in ran])),
+            'aside, m/s': float(np.mean([abs(one.speed[1]) for one in ran])),
+            'tilt, degrees': math.degrees(float(np.mean([one.tilt for one in ran])))}
+
+
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """Return the figures in Markdown, a row each."""
     keys = [key for key in next(iter(rows.values())) if not key.endswith('95 %')]
@@ -181,19 +214,23 @@ def main() -> int:
                         help='of the pushes, N s (default: 30 40)')
     parser.add_argument('--rows', nargs='+', default=list(ROWS), choices=list(ROWS),
                         metavar='ROW', help='; '.join(ROWS))
+    parser.add_argument('--biped', choices=['unitree_g1', 'humanoid'],
+                        help='a biped instead, with rows of its own')
     parser.add_argument('--quick', action='store_true', help='few runs: a look')
     parser.add_argument('--seed', type=int, default=None, help='a fresh one if not given')
     args = parser.parse_args()
     args.seed = secrets.randbelow(2**31) if args.seed is None else args.seed
     log(f'seed {args.seed}')
     rows = {}
-    for name in args.rows:
+    walks = args.biped and BipedRun(args.biped, load_robot(args.biped), NOISE)
+    for name in BIPED if walks else args.rows:
         began = time.perf_counter()
-        rows[name] = measure(ROWS[name], args)
+        rows[name] = (measure_biped(walks, BIPED[name], args) if walks else
+                      measure(ROWS[name], args))
         log(f'{name}: {rows[name]} ({time.perf_counter() - began:.0f} s)')
     log(table(rows))
-    emit(benchmark='model_errors', gait=args.gait, speed=args.speed, seed=args.seed,
-         quick=args.quick, rows=rows)
+    emit(benchmark='model_errors', robot=args.biped or 'go2', gait=args.gait, speed=args.speed,
+         seed=args.seed, quick=args.quick, rows=rows)
     return 0
 
 

@@ -16,7 +16,8 @@
 
     python docs/film.py --urdf my.urdf
 
-tunes the robot of the URDF, as ``demo --urdf`` does, and writes docs/film.webp. Runs are simulated
+tunes the robot of the URDF, as ``demo --urdf`` does, and writes docs/film.webp. Without ``--urdf``
+it writes docs/run.webp, a Go2 that runs up to 2 m/s. Runs are simulated
 without ROS, at the speed of the machine, and drawn without a screen. The robot's files stay in the
 folder out/film, and are used again.
 """
@@ -50,6 +51,11 @@ RATE, SIZE, QUALITY = 12.5, (1280, 720), 60
 FONT = ImageFont.truetype(Path(get_data_path(), 'fonts', 'ttf', 'DejaVuSans.ttf'), 30)
 #: Clips of the Go2: gait, m/s, s, push to the left, N s, at s, caption.
 GO2 = (('trot', 0.6, 4.0, 30.0, 2.0, 'Unitree Go2: a push of 30 N s'),)
+
+
+#: The film of the run: its file, duration in s, commands, each s and m/s; size of its pictures.
+RUN, LONG, COMMANDS = OUT.with_name('run.webp'), 8.0, ((0.0, 0.4), (2.0, 1.0), (3.5, 2.0))
+SMALL = (480, 270)
 
 
 class Filmed(ClosedLoopBatch):
@@ -90,14 +96,32 @@ def walked(robot, model: str, gait: str, scenario: Scenario, duration: float, cl
     return np.array(batch.states)[::round(1.0 / RATE / batch.timestep)]
 
 
-def drawn(model, poses: np.ndarray, caption: str) -> Iterator[Image.Image]:
-    """Yield the pictures of poses, with a caption."""
+def drawn(model, poses: np.ndarray, captions: str | list[str]) -> Iterator[Image.Image]:
+    """Yield the pictures of poses, with one caption or one each."""
+    if isinstance(captions, str):
+        captions = [captions] * len(poses)
     with closing(recorder.Camera(model, *SIZE)) as camera:
-        for pose in poses:
+        for pose, caption in zip(poses, captions, strict=True):
             image = Image.fromarray(camera.picture(pose))
             ImageDraw.Draw(image).text((36, 650), caption, 'white', FONT, stroke_width=3,
                                        stroke_fill='#1b2733')
             yield image
+
+
+def run() -> Iterator[Image.Image]:
+    """Yield the pictures of the run, with the speed that is reached."""
+    go2 = load_robot('unitree_go2')
+    later = tuple((when, speed, 0.0, 0.0) for when, speed in COMMANDS[1:])
+    poses = walked(go2, 'go2', 'run', Scenario(speed=COMMANDS[0][1], commands=later), LONG,
+                   closed=True)
+    captions = []
+    for k, pose in enumerate(poses):
+        asked = [speed for when, speed in COMMANDS if when * RATE <= k][-1]
+        # Over the last half second.
+        before = max(k - round(0.5 * RATE), 0)
+        speed = (pose[0] - poses[before, 0]) * RATE / max(k - before, 1)
+        captions.append(f'asked {asked:.1f} m/s, runs at {speed:.1f} m/s')
+    yield from drawn(load('go2', go2, visual=True), poses, captions)
 
 
 def pictures(args: argparse.Namespace) -> Iterator[Image.Image]:
@@ -120,17 +144,18 @@ def pictures(args: argparse.Namespace) -> Iterator[Image.Image]:
 def main() -> None:
     """Draw the film."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--urdf', type=Path, required=True)
+    parser.add_argument('--urdf', type=Path, help='if not given, docs/run.webp is made')
     parser.add_argument('--gait', default='trot')
     parser.add_argument('--speed', type=float, default=0.4)
     parser.add_argument('--caption', default='Your robot, from its URDF')
     parser.add_argument('--biped', default='unitree_g1' if find_spec('mjlab') else 'humanoid')
     args = parser.parse_args()
     recorder.SHADOW, recorder.SAMPLES = 2048, 2
-    first, *others = pictures(args)
-    first.save(OUT, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0,
+    out = OUT if args.urdf else RUN
+    first, *others = pictures(args) if args.urdf else (one.resize(SMALL) for one in run())
+    first.save(out, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0,
                quality=QUALITY, method=4)
-    print(f'{OUT}: {1 + len(others)} pictures, {OUT.stat().st_size / 1e6:.2f} MB')
+    print(f'{out}: {1 + len(others)} pictures, {out.stat().st_size / 1e6:.2f} MB')
 
 
 if __name__ == '__main__':

@@ -15,6 +15,7 @@
 """Peers: one keeps up with the node's own parts, and those that are missing are named."""
 
 import importlib
+import importlib.util
 import json
 import os
 from pathlib import Path
@@ -22,6 +23,9 @@ import signal
 import subprocess
 import sys
 
+from cpg_ros.motion.robot_file import load_robot
+from cpg_ros.simulation.bodies import BatchPhysics
+from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import impulse, Scenario
 from graph import free_domain, PATIENCE, Watcher
 import numpy as np
@@ -68,6 +72,40 @@ def test_policies_that_are_missing_are_skipped_with_the_reason(tmp_path):
                      'logs/go2/kaiwu2025_v6-2_124004/exported/policy.onnx in it',
         'himloco': 'RL_SAR: there is no policy/go2/himloco/himloco.pt in it',
         'playground': 'MUJOCO_PLAYGROUND names no checkout of google-deepmind/mujoco_playground'}
+
+
+def test_a_second_engine_that_is_missing_is_named_at_once():
+    if importlib.util.find_spec('pybullet'):
+        pytest.skip('pybullet is installed')
+    ran = subprocess.run([sys.executable, str(BENCHMARKS / 'bench_second_engine.py')], text=True,
+                         capture_output=True)
+    assert ran.returncode == 2 and not ran.stdout
+    assert ran.stderr.endswith('pip install pybullet, or --engines MuJoCo\n')
+
+
+def test_bullet_moves_joints_in_the_air_as_mujoco_does(monkeypatch):
+    """Rotors are most of a knee's inertia: without them angles differ by more."""
+    pytest.importorskip('pybullet')
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    robot = load_robot('unitree_go2')
+    put_in_bullet = importlib.import_module('bullet').put_in_bullet
+
+    def swing(rotors):
+        bodies = BatchPhysics(Body('go2', robot), 1)
+        bodies.start[3] += 1.0
+        if rotors:
+            put_in_bullet(bodies, rotors)
+        model = bodies.model(Scenario())
+        model.opt.gravity[:] = 0.0
+        control, joints, _ = bodies.controls(1, 300)
+        joints[0] = bodies.body.stand + 0.3 * np.outer(
+            np.sin(6.0 * np.pi * 0.002 * np.arange(300)), np.tile([0.3, 1.0, -1.0], 4))
+        states, _ = bodies.rollout([model], bodies.start[None].copy(), control)
+        return states[0, :, 1 + bodies.parts.angles]
+
+    def off(rotors):
+        return np.sqrt(((swing(rotors) - swing(''))**2).mean())
+    assert off('own') < 0.008 < 0.015 < off('none')
 
 
 def test_a_policy_that_does_nothing_stands_in_the_table(tmp_path, monkeypatch):
