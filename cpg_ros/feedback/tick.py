@@ -350,7 +350,9 @@ def _change_frequency(gains, memory, run, steered, intent, faster, step):
     if gains.pace and steered:
         quicker = fraction * pace.frequency_change(intent.error, memory.fatigue[run], gains)
     memory.fatigue[run] = low_passed(memory.fatigue[run], quicker, gains.pace_memory, dt)
-    memory.frequency_scale[run] = 1.0 + quicker + faster
+    # After a push the clock is that of pace.
+    pushed = memory.stiff_for[run] > 0.0
+    memory.frequency_scale[run] = 1.0 + quicker + (0.0 if pushed else faster)
 
 
 @jit_entry
