@@ -179,9 +179,11 @@ def _change_strides(tables, gains, memory, run, slot, missing, turned, step):
         length = heading.response(tables.at[slot], tables.length[slot],
                                   memory.wanted_velocity[run, 0, 0])
         # No stride is longer than 1: turning back comes before speed.
-        possible = limited(length + longer, max(1.0 - 0.5 * abs(uneven), 0.0)) - length
-        faster = limited(max(longer - possible, 0.0), gains.speed_faster)
-        longer = possible
+        room = max(1.0 - 0.5 * abs(uneven), 0.0)
+        # What lasts: a clock that follows each sway shakes the body where sensors are late.
+        lasting = length + fraction * gains.speed_rate * memory.speed_integral[run]
+        faster = limited(max(lasting - room, 0.0), gains.speed_faster)
+        longer = limited(length + longer, room) - length
     for leg in range(stride.shape[0]):
         stride[leg] = longer + uneven * tables.sides[leg]
     return faster
