@@ -357,7 +357,7 @@ class RobotSim(StartedNode):
                                    partial(self._find_lack, clock), self._move, self._fail,
                                    factor)
         self._kp_scale = KpScaleSubscription(self)
-        self._feedforward = self._take_torques(self._value('feedforward'))
+        self._feedforward = self._torques(self._value('feedforward'))
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_subscription(String, 'cpg_generator/gait',
@@ -381,16 +381,16 @@ class RobotSim(StartedNode):
         body.load(self._value('payload'))
         return body
 
-    def _take_torques(self, share: float) -> FeedforwardSubscription | None:
-        """Subscribe to torques up to a share of the motors' limits; to none if that is 0."""
-        if not share:
+    def _torques(self, fraction: float) -> FeedforwardSubscription | None:
+        """Subscribe to torques up to a fraction of the motors' limits; to none if that is 0."""
+        if not fraction:
             return None
         names, limits = self._body.robot.order, self._body.torque_limits
         if unlimited := [name for name, limit in zip(names, limits, strict=True)
                          if not np.isfinite(limit)]:
             raise StartError(f"feedforward is a fraction of the motors' limits: the model has "
                              f'none for {", ".join(unlimited)}')
-        return FeedforwardSubscription(self, names, share * limits)
+        return FeedforwardSubscription(self, names, fraction * limits)
 
     # -- requests -------------------------------------------------------------------------
 

@@ -189,9 +189,9 @@ class BridgeNode(StartedNode):
         self._feedforward: FeedforwardSubscription | None = None
         self._followed = list(self._commands.topics)
         # Bridges of motors that take no torques lack the parameter.
-        if 'feedforward' in self.specs and (share := value('feedforward')):
+        if 'feedforward' in self.specs and (fraction := value('feedforward')):
             self._feedforward = FeedforwardSubscription(self, settings.names,
-                                                        share * settings.torque)
+                                                        fraction * settings.torque)
             self._followed.append(self._feedforward.topic)
         self._every = (max(1, round(value('rate') / value('sensor_rate')))
                        if 'sensor_rate' in self.specs else 1)

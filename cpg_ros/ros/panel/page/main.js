@@ -91,7 +91,7 @@ function beside() {
   tour.enable(steering.able, parameters.gaitNames);
   at('steered').textContent = lease.reason || (steered
     ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
-    : 'this generator ignores cmd_vel; start it with cmd_vel:=true to steer');
+    : 'not steered: the gait has no steering table, or the generator runs without cmd_vel:=true');
 }
 
 const takes = {
