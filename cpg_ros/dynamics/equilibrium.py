@@ -259,8 +259,8 @@ def equilibrium(network: Network) -> np.ndarray:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'
             listed = ', '.join(f'{name} {value:.4f}' for name, value
                                in named(network, state).items())
-            raise NoEquilibrium(f'the stand is lost {how} at {fraction:.4f} of the couplings, '
-                                f'{listed}')
+            raise NoEquilibrium(f'the equilibrium is lost {how} at {fraction:.4f} of the '
+                                f'couplings, {listed}')
     return state
 
 
@@ -273,8 +273,8 @@ def _uncoupled(alone: Network, cells: tuple[int, ...]) -> np.ndarray:
         cell.take(first)
         states = _found(cell)
         if len(states) != 1:
-            raise NoEquilibrium(f'an uncoupled cell has {len(states)} equilibria: none is the '
-                                'stand')
+            raise NoEquilibrium(f'an uncoupled cell has {len(states)} equilibria: none is '
+                                'continued')
         rest.append(states[0])
     return np.array(rest).T.ravel()
 

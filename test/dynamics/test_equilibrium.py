@@ -90,7 +90,7 @@ def test_the_stand_is_followed_from_the_uncoupled_cells(network):
         new, _, ok, _ = fsolve(part.rates, state, fprime=part.jacobian, full_output=True)
         lost = ok != 1 or np.abs(new - state).max() > 0.05 * (1.0 + np.abs(state).max())
         if lost:
-            with pytest.raises(NoEquilibrium, match='the stand is lost'):
+            with pytest.raises(NoEquilibrium, match='the equilibrium is lost'):
                 equilibrium(network)
             return
         state = new
