@@ -264,7 +264,7 @@ class Generator(StartedNode):
         if self._value('faster_gait'):
             self._one_of('faster_gait', tuple(self._planner.offered))
         # Its descriptor lists those of the file, too.
-        descriptor = gait_spec(network, self._planner.offered).descriptor()
+        descriptor = gait_spec(network, self._planner.offered, robot=robot).descriptor()
         descriptor.type = ParameterType.PARAMETER_STRING
         self.set_descriptor('gait', descriptor)
         self._declare(switch.specs(robot))

@@ -49,8 +49,9 @@ from rclpy.type_support import check_for_type_support
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
-#: PRESETS: separates, in the constraints of a gait, gaits from presets with names of their own.
-PRESETS = '; presets: '
+#: PRESETS: separates, in the constraints of a gait, gaits from presets with names of their own;
+#: UNTUNED: precedes those that are not tuned for the robot.
+PRESETS, UNTUNED = '; presets: ', '; not tuned for this robot: '
 
 
 def one_of(names: Iterable[str], further: str = '') -> str:
@@ -60,7 +61,7 @@ def one_of(names: Iterable[str], further: str = '') -> str:
 
 def choices(constraints: str) -> list[str]:
     """Return the words in a descriptor's constraints, if one_of wrote them."""
-    match = re.search(r'one of: (.*)', constraints)
+    match = re.search(r'one of: (.*)', constraints.partition(UNTUNED)[0])
     names = re.split(f', |{PRESETS}', match[1]) if match else []
     return [name for name in names if re.fullmatch(r'[\w.-]+', name)]
 
@@ -68,6 +69,11 @@ def choices(constraints: str) -> list[str]:
 def presets_among(constraints: str) -> list[str]:
     """Return those choices that are presets with other names than gaits."""
     return choices(f'one of: {constraints.partition(PRESETS)[2]}')
+
+
+def untuned_among(constraints: str) -> list[str]:
+    """Return those choices of a gait that are not tuned for the robot."""
+    return choices(f'one of: {constraints.partition(UNTUNED)[2]}')
 
 
 @dataclass(frozen=True)

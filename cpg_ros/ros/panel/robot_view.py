@@ -30,7 +30,7 @@ from cpg_ros.ros.node.client import (
     RequestRefused,
     ServiceClients,
 )
-from cpg_ros.ros.node.parameters import choices, presets_among
+from cpg_ros.ros.node.parameters import choices, presets_among, untuned_among
 from cpg_ros.ros.node.polled import best_effort, latched, PolledSubscription
 from cpg_ros.ros.panel import shape
 from cpg_ros.ros.panel.pages import RequestError
@@ -126,6 +126,7 @@ class Controls:
                 'unit': unit(descriptor.description), 'fixed': descriptor.read_only,
                 'choices': choices(descriptor.additional_constraints),
                 'presets': presets_among(descriptor.additional_constraints),
+                'untuned': untuned_among(descriptor.additional_constraints),
                 'value': value,
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
         self.by_name = controls

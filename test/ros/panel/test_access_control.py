@@ -14,6 +14,7 @@
 
 """Who may come in to the panel, and what may be asked of it."""
 
+from dataclasses import replace
 from functools import partial
 import json
 
@@ -22,7 +23,10 @@ import pytest
 pytest.importorskip('websockets')
 
 from cpg_ros.common.files import is_loopback  # noqa: E402, I100
-from cpg_ros.ros.node.parameters import choices  # noqa: E402
+from cpg_ros.motion.robot_file import load_robot  # noqa: E402
+from cpg_ros.networks.registry import NETWORKS  # noqa: E402
+from cpg_ros.ros.generator_parameters import gait_spec  # noqa: E402
+from cpg_ros.ros.node.parameters import choices, untuned_among  # noqa: E402
 from cpg_ros.ros.panel.pages import LONGEST_REQUEST, read, RequestError  # noqa: E402
 from cpg_ros.ros.panel.robot_view import unit  # noqa: E402
 from cpg_ros.ros.panel.web_server import AccessError, rejected, token_for  # noqa: E402
@@ -111,10 +115,26 @@ def test_what_is_understood():
         'name': 'gait', 'value': 'walk'}
 
 
+def test_a_gait_says_on_which_tuned_robots_it_walks_badly():
+    robot, delayed = load_robot('unitree_go2'), NETWORKS['delayed']
+    motion, tried = robot.motions['trot'], {}
+    for verdict in ('good: 0.4 m/s', 'poor: it falls', ''):
+        tried[verdict] = replace(robot, motions={
+            'trot': replace(motion, verdict='good'), 'pace': replace(motion, verdict=verdict)})
+    bad = {verdict: untuned_among(gait_spec(delayed, delayed.presets(), robot=one).constraints)
+           for verdict, one in tried.items()}
+    assert 'trot' not in bad['good: 0.4 m/s'] and {'walk', 'bound'} <= set(bad['good: 0.4 m/s'])
+    assert 'pace' in bad['poor: it falls'] and 'pace' not in bad['']
+    assert not untuned_among(gait_spec(delayed, delayed.presets(), robot=robot).constraints)
+
+
 def test_what_a_descriptor_says():
     assert choices('one of: walk, trot, my-own.gait') == ['walk', 'trot', 'my-own.gait']
     assert choices('one of: delayed, biped, or the path of a Python file that defines one') == [
         'delayed', 'biped']
     assert choices('a shipped name, or a path') == []
+    told = 'one of: walk, trot; presets: goat_walk; not tuned for this robot: trot, goat_walk'
+    assert choices(told) == ['walk', 'trot', 'goat_walk']
+    assert untuned_among(told) == ['trot', 'goat_walk'] and not untuned_among('one of: walk')
     assert unit('strides per second [Hz]; 0 runs in model time') == 'Hz'
     assert unit('damping [N m s/rad]') == 'N m s/rad' and unit('factor') == ''

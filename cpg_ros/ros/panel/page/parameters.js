@@ -46,11 +46,12 @@ export class Parameters {
         make('output', { className: 'all', textContent: String(one.value) || '–' }), make('p', { textContent: one.text }))));
     this.find(this.field.value);
     const words = this.known.gait?.choices || [];
-    const presets = this.known.gait?.presets || [];
+    const presets = this.known.gait?.presets || [], untuned = this.known.gait?.untuned || [];
     this.gaitNames = words.filter((word) => !presets.includes(word));
     const button = (gait, k) => {
       const made = make('button', { textContent: titled(gait), onclick: () => this.set('gait', gait) });
       made.dataset.gait = gait;
+      if (untuned.includes(gait)) Object.assign(made, { className: 'untuned', title: 'not tuned for this robot' });
       if (k < 9) made.append(make('kbd', { textContent: k + 1 }));
       return made;
     };
