@@ -128,7 +128,7 @@ def test_a_mass_that_no_robot_has(check):
      'foot: [0.0, 0.0, -220.0] m is')])
 def test_geometry_that_is_not_the_descriptions(check, tmp_path, capsys, change, words):
     (tmp_path / 'of.urdf').write_text(URDF)
-    made = tmp_path / 'made.yaml'
+    made = tmp_path / 'new' / 'made.yaml'
     assert main(['--urdf', str(tmp_path / 'of.urdf'), '--make', str(made)]) == 0
     capsys.readouterr()
     tree = yaml.safe_load(made.read_text())
@@ -258,7 +258,7 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('quadruped', '--urdf', 'URDF', '--velocity', '0'), '--velocity: 0 is not above 0'),
     (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt does not end in .yaml'),
     (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'already exists'),
-    (('--urdf', 'URDF', '--make', 'nowhere/a.yaml'), 'No such file or directory'),
+    (('--urdf', 'URDF', '--make', 'URDF/a.yaml'), 'URDF: File exists'),
     (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'no legs are found'),
     (('--urdf', 'SIDEWAYS', '--make', 'a.yaml'), 'forward and'),
     (('--urdf', 'STIFF', '--make', 'a.yaml'), 'no room to move'),

@@ -305,7 +305,7 @@ def test_what_would_not_stand_or_step_is_not_written(tmp_path, capsys, limits, w
         *limits)).replace('lower="-2.6" upper="-0.5"', 'lower="-1.41" upper="-1.39"'))
     assert main(['--urdf', str(urdf), '--make', str(out)]) == 2 and not out.exists()
     said = capsys.readouterr().err
-    assert 'nothing is written' in said and word in said and said.count('\n') == 1
+    assert 'no file is written' in said and word in said and said.count('\n') == 1
 
 
 def test_legs_at_another_place_than_the_file_says_are_found(tmp_path, capsys):
