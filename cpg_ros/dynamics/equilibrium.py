@@ -28,6 +28,7 @@ symmetry begin.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache, partial
+from itertools import pairwise
 
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.dynamics.arclength import (
@@ -346,12 +347,12 @@ class Equilibrium(ShortRepr):
 
 def _images(network: Network, state: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Yield the images of a state by the network's symmetries, with x -> -x if it has it."""
-    odd = network.symmetry(network.gaits()[0]).odd
+    mirrored = odd(network)
     for name, element in group_of(network).elements.items():
         image = np.empty_like(state).reshape(network.variables, -1)
         image[:, list(element)] = state.reshape(network.variables, -1)
         yield name, image.ravel()
-        if odd:
+        if mirrored:
             yield '', -image.ravel()
 
 
@@ -533,22 +534,22 @@ def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: flo
 
         folds, _ = continue_curve(begin, low, high, visit, longest_step=STEP, most=MOST)
         met: list[Crossing] = []
-        for k, point in enumerate(points[1:]):
-            met += _crossings(points[k], point)
-            met += [_fold(point, begin)] if k in folds else []
-        halves.append((points, met))
+        ends = [(point, point.curve.orbit(point.z)) for point in points]
+        for k, (last, now) in enumerate(pairwise(ends)):
+            met += _crossings(last, now)
+            met += [_fold(now[0], begin)] if k in folds else []
+        halves.append(([(point.value, one) for point, one in ends], met))
     (back, before), (ahead, after) = halves
     return EquilibriumBranch(
-        line, tuple((point.value, point.curve.orbit(point.z)) for point in back[:0:-1] + ahead),
-        tuple(before[::-1] + after))
+        line, tuple(back[:0:-1] + ahead), tuple(before[::-1] + after))
 
 
-def _crossings(last: CurvePoint, point: CurvePoint) -> list[Crossing]:
+def _crossings(*ends: tuple[CurvePoint, Equilibrium]) -> list[Crossing]:
     """Return the crossings between two neighbouring points of a branch, without folds."""
     found: list[Crossing] = []
+    (last, _), (point, _) = ends
     reach = last.curve.product(last.tangent, point.z - last.z)
-    for which, pair in enumerate(zip(*(end.curve.orbit(end.z).blocks for end in (last, point)),
-                                     strict=True)):
+    for which, pair in enumerate(zip(*(one.blocks for _, one in ends), strict=True)):
         for rank in range(*sorted(len(block.right_of(0.0)) for block in pair)):
             def root(there: CurvePoint, at: tuple[int, int] = (which, rank)) -> float:
                 return float(there.curve.orbit(there.z).blocks[at[0]].roots(at[1] + 1)[-1].real)

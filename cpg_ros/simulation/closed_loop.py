@@ -218,7 +218,7 @@ class _Bodies:
         return bool(self._going.size)
 
 
-class Walk:
+class ClosedLoop:
     """Bodies that walk off from the stand, their patterns and their feedback.
 
     Attributes:
@@ -281,7 +281,7 @@ class Walk:
             self.bodies.step(angles, np.zeros((len(angles), 2)),
                              self.feedback.memory.kp_scale.round(KP_DIGITS))
 
-    def take(self, other: 'Walk') -> None:
+    def take(self, other: 'ClosedLoop') -> None:
         """Put all runs, which have not begun, into the state of another walk's only run.
 
         That one is in its full gait, where no limit of a joint acts.
@@ -350,7 +350,7 @@ class ClosedLoopBatch(BatchPhysics):
 
         """
         dt, steps = self.timestep, round(duration / self.timestep)
-        walk = Walk(self, scenarios, gains, expected, noise)
+        walk = ClosedLoop(self, scenarios, gains, expected, noise)
         memory, bodies, senses = walk.feedback.memory, walk.bodies, walk.senses
         forces = np.stack([scenario.forces(steps, dt) for scenario in scenarios], axis=1)
         signals = {'place': bodies.place, 'rpy': senses.rpy, 'velocity': bodies.velocity,

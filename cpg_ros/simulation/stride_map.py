@@ -29,7 +29,7 @@ from cpg_ros.dynamics.floquet import by_size, Multipliers, multipliers
 from cpg_ros.feedback.gains import Gains, VARIABLES
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.simulation.body import FALLEN
-from cpg_ros.simulation.closed_loop import ClosedLoopBatch, Walk
+from cpg_ros.simulation.closed_loop import ClosedLoop, ClosedLoopBatch
 from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
@@ -37,6 +37,8 @@ import numpy as np
 #: SETTLING: strides before the one that is linearised; STEP: of the finite differences, in the
 #: unit of each coordinate; TICK: tick, about, s.
 SETTLING, STEP, TICK = 45, 1e-5, 0.002
+#: PERIODIC: change of the phase over a stride, cycles, that is none.
+PERIODIC = 1e-5
 #: HELD: change up to which a coordinate is the same after a stride, whatever the others are.
 HELD = 1e-9
 
@@ -82,7 +84,7 @@ class StrideMap(ShortRepr):
 class _Coordinates:
     """Phase, body and feedback of runs, as deviations from the first run."""
 
-    def __init__(self, walk: Walk, loop: ClosedLoopBatch) -> None:
+    def __init__(self, walk: ClosedLoop, loop: ClosedLoopBatch) -> None:
         """Find the coordinates of a walk; nothing depends on where on the ground the body is."""
         self._mujoco, self._model = engine(), loop.body.model
         model, memory, legs = self._model, walk.feedback.memory, len(loop.robot.legs)
@@ -150,7 +152,8 @@ def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0
         threads: of the physics, 0 for all cores.
 
     Raises:
-        InputError: the body falls before it has settled.
+        InputError: the body falls before it has settled, or the feedback changes the frequency, so
+            that it returns to no state after the gait's stride.
         SimulationError: MuJoCo is missing, or the model cannot be used.
 
     """
@@ -158,13 +161,13 @@ def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0
     stride = 1.0 / (plan.frequency * pace)
     ticks = round(stride / TICK)
     loop = ClosedLoopBatch(model, plan, timestep=stride / ticks, threads=threads)
-    settled = Walk(loop, [Scenario(speed=speed)], gains, None)
+    settled = ClosedLoop(loop, [Scenario(speed=speed)], gains, None)
     settled.go(settling * ticks)
     if np.cos(settled.senses.rpy[0, :2]).prod() < math.cos(FALLEN):
         raise InputError(f'the {plan.name} falls within {settling} strides')
     count = len(_Coordinates(settled, loop).names)
     offsets = STEP * np.vstack([np.zeros(count), np.eye(count), -np.eye(count)])
-    walk = Walk(loop, [Scenario(speed=speed)] * len(offsets), gains, None)
+    walk = ClosedLoop(loop, [Scenario(speed=speed)] * len(offsets), gains, None)
     walk.take(settled)
     coordinates, origin = _Coordinates(walk, loop), loop.body.model.qpos0.copy()
     before = coordinates.read(origin)[0]
@@ -174,6 +177,9 @@ def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0
     gaps = (ends[1:count + 1] - ends[count + 1:]).T
     for phases in (gaps[:1], change[:1]):
         phases[:] = (phases + 0.5) % 1.0 - 0.5
+    if abs(change[0]) > PERIODIC:
+        raise InputError(f'at {speed:g} m/s the feedback changes the frequency of the '
+                         f'{plan.name}: {stride:.4f} s are not its stride; take a lower speed')
     jacobian = gaps / (2.0 * STEP)
     moves = np.abs(jacobian - np.eye(count)).max(axis=1) > HELD
     moves[0] = True

@@ -73,3 +73,9 @@ def test_a_body_that_falls_has_no_stride(monkeypatch):
     monkeypatch.setattr('cpg_ros.simulation.stride_map.FALLEN', 1e-4)
     with pytest.raises(InputError, match='the trot falls within 3 strides'):
         stride_map('go2', program('trot'), None, settling=3)
+
+
+def test_a_stride_that_the_feedback_shortens_is_refused():
+    # The walk's strides cannot be as long as 0.4 m/s takes.
+    with pytest.raises(InputError, match=r'at 0\.4 m/s the feedback changes the frequency'):
+        stride_map('go2', program('walk'), Gains())

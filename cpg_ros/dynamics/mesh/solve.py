@@ -465,8 +465,9 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         first = near.network
         last = first.replace(**{name: old + reached * (network.as_dict()[name] - old)
                                 for name, old in first.as_dict().items()})
+        before = first.grouped()
         changed = ', '.join(f'{name} {value:.4g}' for name, value in last.grouped().items()
-                            if value != first.grouped().get(name))
+                            if value != before.get(name))
         raise NoOrbit(f'no {gait} at these parameters: continued from its preset, it ends at '
                       f'{changed}')
     raise NoOrbit(f'no {gait} at these parameters')

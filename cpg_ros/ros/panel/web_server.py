@@ -81,7 +81,7 @@ def rejected(token: str, path: str, host: str, origin: str) -> str:
         token: as of ``token_for``.
         path: of the request, with the query.
         host: header Host.
-        origin: header Origin, '' for a program that is not a browser.
+        origin: header Origin, '' for a client that is no browser.
 
     """
     # Another site's page, open in the same browser, must not move the robot.
