@@ -30,7 +30,7 @@ import time
 
 from common import emit, log, ROOT
 from cpg_ros.feedback.estimate import advance_odometry, Odometry, SensorData
-from cpg_ros.feedback.gains import LENGTH, scaled_gains
+from cpg_ros.feedback.gains import GO2_LEG_LENGTH, scaled_gains
 from cpg_ros.motion.plan import plan
 from cpg_ros.motion.robot_file import read_robot
 from cpg_ros.networks.registry import NETWORKS
@@ -73,7 +73,7 @@ def tape(loop: ClosedLoopBatch, expected: object, seed: int, size: float) -> flo
     """Return true divided by estimated distance, as measured straight along a tape."""
     speeds = math.sqrt(size) * np.linspace(*SPEEDS, 3)
     ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE,
-                   scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))
+                   scaled_gains(size * GO2_LEG_LENGTH), expected, SensorNoise(**NOISE, seed=seed))
     walked = loop.timestep * ran.estimated[:, :, 0].sum(axis=1)
     ways = np.linalg.norm(ran.place[:, -1] - ran.place[:, 0], axis=1)
     return float(np.mean(ways / walked))
@@ -84,7 +84,7 @@ def measure(loop: ClosedLoopBatch, expected: object, args: argparse.Namespace, s
     """Return drift in percent and NEES at the end of the way, of runs that did not fall."""
     runs, seed, size = args.runs, args.seed, args.size
     ran = loop.run(scenarios(np.random.default_rng(seed), runs, size), LONGEST / math.sqrt(size),
-                   scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))
+                   scaled_gains(size * GO2_LEG_LENGTH), expected, SensorNoise(**NOISE, seed=seed))
     found: dict[str, object] = {'runs': runs, 'fell': int(runs - ran.upright.sum())}
     for name, how in (('as_it_is', ()), ('measured', (scale, MEASURED))):
         drifts, errors = [], []

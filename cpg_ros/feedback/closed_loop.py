@@ -28,21 +28,21 @@ from cpg_ros.feedback.estimate import (
 )
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, Memory
-from cpg_ros.feedback.gait_tables import GaitTables, POINTS
+from cpg_ros.feedback.gait_tables import GaitTables, NUM_PHASES
 from cpg_ros.feedback.input_checks import (
     AGE,
     agreement,
-    BELIEVED,
-    CAME,
     check_imu,
     check_joints,
     check_loads,
     fade,
     IMU,
-    IMU_MEMORY,
+    IMU_STATE_SIZE,
     is_out,
+    LAST_MESSAGE,
+    LAST_VALID,
     note,
-    NUMBERS,
+    NUM_VALUES,
 )
 from cpg_ros.feedback.kinematics import LegArrays
 from cpg_ros.feedback.laws import virtual_stiffness
@@ -50,18 +50,18 @@ from cpg_ros.feedback.leg_rates import compare_rates, rates_memory
 from cpg_ros.feedback.tick import PlannedMotion, tick
 import numpy as np
 
-#: FURTHEST: largest difference between wanted and measured heading, rad.
-FURTHEST = 0.5
-#: DIES_OUT: time at a fraction of 0 after which all displacements have decayed, s.
-DIES_OUT = 0.3
-#: AGREES: least mean fraction of legs whose contacts agree with the gait.
-AGREES = 0.5
-#: FLIGHT: longest time for which all feet may be unloaded, s.
-FLIGHT = 0.3
+#: MAX_HEADING_ERROR: largest difference between wanted and measured heading, rad.
+MAX_HEADING_ERROR = 0.5
+#: DECAY_TIME: time at a fraction of 0 after which all displacements have decayed, s.
+DECAY_TIME = 0.3
+#: MIN_AGREEMENT: least mean fraction of legs whose contacts agree with the gait.
+MIN_AGREEMENT = 0.5
+#: MAX_FLIGHT_TIME: longest time for which all feet may be unloaded, s.
+MAX_FLIGHT_TIME = 0.3
 #: Sources of the loads on the feet.
 FOOT_CONTACTS, WRENCHES, EFFORTS = CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
-#: JOINT: number of values that are read of each joint; FORCE: number of a Wrench's.
-JOINT, FORCE = 3, 3
+#: JOINT_SIZE: number of values that are read of each joint; FORCE_SIZE: number of a Wrench's.
+JOINT_SIZE, FORCE_SIZE = 3, 3
 
 
 class Senses(NamedTuple):
@@ -76,8 +76,8 @@ class Senses(NamedTuple):
         stamps: of the messages, s, NaN without, (inputs,).
         unreadable: verdict on messages of a layout that cannot be used, else 0, (inputs,).
         imu: as in the message, shape (IMU,).
-        joints: positions, velocities and efforts, shape (JOINT, joints).
-        feet: loads, shape (1, legs), or forces, shape (legs, FORCE).
+        joints: positions, velocities and efforts, shape (JOINT_SIZE, joints).
+        feet: loads, shape (1, legs), or forces, shape (legs, FORCE_SIZE).
         counts: measured joints, and which of CONTACTS it is, shape (2,).
         indices: indices 0, 1, 2 and so on.
         mount: orientation of the IMU in the base's frame, x y z w.
@@ -111,13 +111,13 @@ class Senses(NamedTuple):
         """Return that of a robot before its first messages."""
         kind, joints = CONTACTS.index(contacts), limits.shape[1]
         inputs = 2 + (1, legs, 0)[kind]
-        never, whole = np.full(max(IMU, JOINT * joints), math.nan), np.int64
-        return cls(np.zeros((inputs, NUMBERS)), np.zeros(inputs, whole), np.zeros(inputs),
+        never, whole = np.full(max(IMU, JOINT_SIZE * joints), math.nan), np.int64
+        return cls(np.zeros((inputs, NUM_VALUES)), np.zeros(inputs, whole), np.zeros(inputs),
                    np.zeros(inputs, whole), never[:IMU].copy(),
-                   never[:JOINT * joints].reshape(JOINT, joints).copy(),
-                   np.full((legs, FORCE) if kind == 1 else (1, legs), math.nan),
+                   never[:JOINT_SIZE * joints].reshape(JOINT_SIZE, joints).copy(),
+                   np.full((legs, FORCE_SIZE) if kind == 1 else (1, legs), math.nan),
                    np.array([joints, kind]), np.arange(joints), mount, limits, np.array([weight]),
-                   np.zeros(IMU_MEMORY), np.zeros((legs, 1)), np.zeros(legs))
+                   np.zeros(IMU_STATE_SIZE), np.zeros((legs, 1)), np.zeros(legs))
 
 
 @jit
@@ -131,7 +131,7 @@ def _check_feet(senses, sensors, legs, k, gap):
         load = math.sqrt(force[0]**2 + force[1]**2 + force[2]**2)
         senses.loads[foot] = load
         return (check_loads(senses.loads[foot:foot + 1], indices[:1], weight, gap, heavy[foot],
-                            forces[foot:foot + 1]), 0.0 if load else FLIGHT)
+                            forces[foot:foot + 1]), 0.0 if load else MAX_FLIGHT_TIME)
     if senses.counts[1] == 2:
         angles, rpy = sensors.joint_positions[0], sensors.rpy[0]
         loads_of(legs.rows, legs.columns, angles, senses.joints[2], rpy[0], rpy[1], senses.loads)
@@ -141,7 +141,7 @@ def _check_feet(senses, sensors, legs, k, gap):
     for load in loads:
         unloaded = unloaded and load == 0.0
     return (check_loads(loads, indices[:len(forces)], weight, gap, heavy[0], forces),
-            FLIGHT if unloaded else 0.0)
+            MAX_FLIGHT_TIME if unloaded else 0.0)
 
 
 @jit_entry
@@ -160,12 +160,12 @@ def check_inputs(senses, sensors, legs, now, moving):
         if senses.news[k] == 0:
             continue
         monitor, patience = senses.monitors[k], 0.0 if moving else math.inf
-        verdict, gap = senses.unreadable[k], min(now - monitor[BELIEVED], 1.0)
+        verdict, gap = senses.unreadable[k], min(now - monitor[LAST_VALID], 1.0)
         if verdict == 0 and k == 0:
             # Means go on while messages are refused.
-            verdict = check_imu(senses.imu, min(now - monitor[CAME], 1.0), moving, senses.mount,
-                                senses.memory, sensors.rpy[0], sensors.angular_velocity[0],
-                                sensors.acceleration[0])
+            verdict = check_imu(senses.imu, min(now - monitor[LAST_MESSAGE], 1.0), moving,
+                                senses.mount, senses.memory, sensors.rpy[0],
+                                sensors.angular_velocity[0], sensors.acceleration[0])
         elif verdict == 0 and k == 1:
             limits = senses.limits
             verdict = check_joints(senses.joints[0], senses.joints[1],
@@ -181,17 +181,18 @@ def check_inputs(senses, sensors, legs, now, moving):
         senses.news[k] = 0
 
 
-#: Indices of a loop's state. WANTED: whether feedback is requested; SPENT: time for which its
-#: fraction has been 0, s; FRACTION: of the correction that acts; WAY, GOOD_FOR: see fade;
-#: AGREEMENT: mean fraction of legs whose contacts agree with the gait; OUT: number of inputs that
-#: are out; MOUNT: index of the IMU's mount in leg_rates.MOUNTED; CONTRARY: whether contacts
-#: disagree; CLOSED: whether feedback acts. STATE is the number of these.
-(WANTED, SPENT, FRACTION, WAY, GOOD_FOR, AGREEMENT, OUT, MOUNT, CONTRARY, CLOSED,
- STATE) = range(11)
-#: Indices of an instant. DT: length of the tick, s; NOW: time, s; LEVEL: of the ramp, 0 to 1;
-#: PHASE: cycles; MIX: fraction of the gait that is entered; FREQUENCY: of strides, Hz; CHANGES:
-#: whether the gait changes; ROLL, and pitch and yaw behind it: of the body against its feet, rad.
-DT, NOW, LEVEL, PHASE, MIX, FREQUENCY, CHANGES, ROLL = range(8)
+#: Indices of a loop's state. REQUESTED: whether feedback is requested; OFF_TIME: time for which
+#: its fraction has been 0, s; FRACTION: of the correction that acts; PROGRESS, GOOD_TIME: see
+#: fade; AGREEMENT: mean fraction of legs whose contacts agree with the gait; NUM_FAILED: number of
+#: inputs that are out; MOUNT: index of the IMU's mount in leg_rates.MOUNTED; CONTACTS_DISAGREE:
+#: whether contacts disagree; ACTIVE: whether feedback acts. STATE_SIZE is the number of these.
+(REQUESTED, OFF_TIME, FRACTION, PROGRESS, GOOD_TIME, AGREEMENT, NUM_FAILED, MOUNT,
+ CONTACTS_DISAGREE, ACTIVE, STATE_SIZE) = range(11)
+#: Indices of an instant. DT: length of the tick, s; TIME: time, s; RAMP: of the ramp, 0 to 1;
+#: PHASE: cycles; BLEND: fraction of the gait that is entered; FREQUENCY: of strides, Hz;
+#: SWITCHING: whether the gait changes; ROLL, and pitch and yaw behind it: of the body against its
+#: feet, rad.
+DT, TIME, RAMP, PHASE, BLEND, FREQUENCY, SWITCHING, ROLL = range(8)
 
 
 class Instant(NamedTuple):
@@ -234,20 +235,20 @@ def _compare_contacts(loop, slot):
         loop.instant.numbers, loop.state, loop.senses.monitors, loop.tables)
     dt, out = numbers[DT], 0
     for k in range(len(monitors)):
-        out += is_out(monitors[k], numbers[NOW])
-    state[OUT], state[MOUNT], state[CONTRARY] = out, 0.0, 0.0
+        out += is_out(monitors[k], numbers[TIME])
+    state[NUM_FAILED], state[MOUNT], state[CONTACTS_DISAGREE] = out, 0.0, 0.0
     if out == 0:
         state[MOUNT] = compare_rates(loop.legs, loop.sensors, dt, *loop.rates)
     wrong = out > 0 or state[MOUNT] > 0.0 or not tables.copied[slot]
-    if wrong or numbers[LEVEL] < 1.0 or numbers[CHANGES] > 0.0:
+    if wrong or numbers[RAMP] < 1.0 or numbers[SWITCHING] > 0.0:
         state[AGREEMENT] = 1.0
         return wrong
-    row = int(numbers[PHASE] * POINTS) % POINTS
+    row = int(numbers[PHASE] * NUM_PHASES) % NUM_PHASES
     state[AGREEMENT] = agreement(loop.sensors.foot_forces[0], TOUCH * loop.legs.weight,
                                  tables.swinging[slot, row], min(dt * numbers[FREQUENCY], 1.0),
                                  state[AGREEMENT])
-    state[CONTRARY] = state[AGREEMENT] < AGREES
-    return state[CONTRARY] > 0.0
+    state[CONTACTS_DISAGREE] = state[AGREEMENT] < MIN_AGREEMENT
+    return state[CONTACTS_DISAGREE] > 0.0
 
 
 class LoopData(NamedTuple):
@@ -263,7 +264,7 @@ class LoopData(NamedTuple):
         planned: of which angles are given, rad, shape (1, joints).
         rates: memory and scratch of compare_rates.
         instant: of the pattern.
-        state: see WANTED and what follows it.
+        state: see REQUESTED and what follows it.
         corrected: angles, rad, shape (1, joints); filled.
         odometry: of the base, advanced in place.
         position: target angles within the limits, rad, shape (1, joints).
@@ -294,8 +295,8 @@ class LoopData(NamedTuple):
         planned = PlannedMotion.zeros(1, goal.size)._replace(angles=angles[None])
         legs = feedback.geometry.arrays
         return cls(legs, feedback.tables, feedback.gains, feedback.memory, senses, sensors,
-                   planned, rates_memory(len(legs.rows)), instant, np.zeros(STATE), goal[None],
-                   odometry, position[None], position[None].copy())
+                   planned, rates_memory(len(legs.rows)), instant, np.zeros(STATE_SIZE),
+                   goal[None], odometry, position[None], position[None].copy())
 
 
 @jit
@@ -313,23 +314,24 @@ def close(loop):
         loop.legs, loop.tables, loop.memory, loop.senses, loop.sensors)
     planned, instant, state, out = loop.planned, loop.instant, loop.state, loop.corrected
     numbers, trim = instant.numbers, instant.trim
-    dt, level = numbers[DT], numbers[LEVEL]
-    enabled, wrong = state[WANTED] > 0.0, False
-    if enabled or state[SPENT] <= DIES_OUT:
-        check_inputs(senses, sensors, legs, numbers[NOW], level > 0.0)
+    dt, level = numbers[DT], numbers[RAMP]
+    enabled, wrong = state[REQUESTED] > 0.0, False
+    if enabled or state[OFF_TIME] <= DECAY_TIME:
+        check_inputs(senses, sensors, legs, numbers[TIME], level > 0.0)
         old, new = _slot(tables, instant.gaits[0]), _slot(tables, instant.gaits[1])
         new = max(new, 0)
         old = new if old < 0 else old
         wrong = _compare_contacts(loop, new)
-        state[WAY], state[GOOD_FOR] = fade(state[WAY], state[GOOD_FOR], enabled and not wrong, dt)
-        state[FRACTION] = state[WAY]**2 * (3.0 - 2.0 * state[WAY])
-        state[SPENT] = 0.0 if state[FRACTION] > 0.0 else state[SPENT] + dt
-    if state[SPENT] > DIES_OUT and (wrong or not enabled):
+        state[PROGRESS], state[GOOD_TIME] = fade(
+            state[PROGRESS], state[GOOD_TIME], enabled and not wrong, dt)
+        state[FRACTION] = state[PROGRESS]**2 * (3.0 - 2.0 * state[PROGRESS])
+        state[OFF_TIME] = 0.0 if state[FRACTION] > 0.0 else state[OFF_TIME] + dt
+    if state[OFF_TIME] > DECAY_TIME and (wrong or not enabled):
         # Nothing is fed back: measurements from before the gap mean nothing after it.
-        closed, state[CLOSED], memory.stiff[0] = state[CLOSED] > 0.0, 0.0, False
+        closed, state[ACTIVE], memory.stiff[0] = state[ACTIVE] > 0.0, 0.0, False
         memory.kp_scale[0], instant.scale[0], trim[:], out[0] = 1.0, 1.0, 0.0, planned.angles[0]
         return 2 if closed and wrong else 0
-    planned.gaits[0, 0], planned.gaits[0, 1], planned.mix[0] = old, new, numbers[MIX]
+    planned.gaits[0, 0], planned.gaits[0, 1], planned.mix[0] = old, new, numbers[BLEND]
     planned.phase[0], turn, heading = numbers[PHASE], instant.command[2], planned.heading
     planned.velocity[0, 0], planned.velocity[0, 1] = instant.command[0], instant.command[1]
     planned.lean[0] = numbers[ROLL:]
@@ -337,13 +339,13 @@ def close(loop):
     if state[FRACTION] > 0.0 and level > 0.0:
         # Without a commanded turn the heading is kept; with one it advances.
         ahead = (heading[0] + turn * dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
-        heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
+        heading[0] = yaw + min(max(ahead, -MAX_HEADING_ERROR), MAX_HEADING_ERROR)
     else:
         heading[0] = yaw
     age = senses.monitors[1, AGE]
     tick(legs, tables, loop.gains, memory, sensors, planned,
          (dt, state[FRACTION] * level, level, math.inf if math.isnan(age) else age), out)
-    instant.scale[0], trim[:], state[CLOSED] = memory.frequency_scale[0], memory.stride[0], 1.0
+    instant.scale[0], trim[:], state[ACTIVE] = memory.frequency_scale[0], memory.stride[0], 1.0
     return 1
 
 
@@ -356,7 +358,7 @@ def finish(loop):
 
     """
     memory, sensors, dt = loop.memory, loop.sensors, loop.instant.numbers[DT]
-    if loop.state[CLOSED] > 0.0:
+    if loop.state[ACTIVE] > 0.0:
         advance_odometry(loop.odometry, loop.legs, sensors, memory.velocity[0], memory.contact[0],
                          dt)
     else:

@@ -20,7 +20,7 @@ from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.gains import Gains, Memory
-from cpg_ros.feedback.gait_tables import GaitTables, SLOTS, Timetable
+from cpg_ros.feedback.gait_tables import GaitTables, MAX_GAITS, Timetable
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.tick import PlannedMotion, tick
 from cpg_ros.motion.plan import GaitPlan
@@ -46,7 +46,7 @@ class Feedback:
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
         self._legs, self.tables = geometry.arrays, GaitTables.empty(legs)
-        self._plans: list[GaitPlan | None] = [None] * SLOTS
+        self._plans: list[GaitPlan | None] = [None] * MAX_GAITS
         self._learnt = 0
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
         self._tick: Callable | None = None
@@ -60,7 +60,7 @@ class Feedback:
         """
         if expected is None and plan.motion.efference is not None:
             expected = EfferenceCopy.of(plan.motion.efference)
-        slot = self._learnt % SLOTS
+        slot = self._learnt % MAX_GAITS
         self.tables.fill(slot, Timetable(plan, self.geometry),
                           expected or EfferenceCopy.blank(), plan)
         self._plans[slot] = plan

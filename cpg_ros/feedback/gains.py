@@ -111,10 +111,10 @@ class Memory(_MemoryFields):  # type: ignore[misc]
 
 # Gains of a robot of another size than the Go2.
 
-#: LENGTH: length of the Go2's outstretched legs, from the thigh joints to the feet, m.
-LENGTH = 0.426
-#: POWERS: unit -> exponents of the legs' length l, of the time sqrt(l/g) and of the mass.
-POWERS = {'m': (1, 0, 0), 's': (0, 1, 0), 's^2': (0, 2, 0), 'Hz': (0, -1, 0), 'kg': (0, 0, 1),
+#: GO2_LEG_LENGTH: length of the Go2's outstretched legs, from the thigh joints to the feet, m.
+GO2_LEG_LENGTH = 0.426
+#: EXPONENTS: unit -> exponents of the legs' length l, of the time sqrt(l/g) and of the mass.
+EXPONENTS = {'m': (1, 0, 0), 's': (0, 1, 0), 's^2': (0, 2, 0), 'Hz': (0, -1, 0), 'kg': (0, 0, 1),
           'N': (1, -2, 1), 'rad': (0, 0, 0), '1': (0, 0, 0), '': (0, 0, 0)}
 #: DIGITS: significant digits of scaled gains.
 DIGITS = 3
@@ -127,7 +127,7 @@ def leg_length(geometry: Geometry) -> float:
     """
     turning = geometry.turns[:, 1] != 0.0
     lengths = (np.abs(geometry.uppers) + np.abs(geometry.lowers))[turning]
-    return float(lengths.mean()) if turning.any() else LENGTH
+    return float(lengths.mean()) if turning.any() else GO2_LEG_LENGTH
 
 
 def shorter_times(length: float) -> float:
@@ -135,7 +135,7 @@ def shorter_times(length: float) -> float:
 
     Sensors may be late by a fraction of the time in which a body falls.
     """
-    return min(math.sqrt(length / LENGTH), 1.0)
+    return min(math.sqrt(length / GO2_LEG_LENGTH), 1.0)
 
 
 @cache
@@ -143,9 +143,9 @@ def _powers(unit: str) -> tuple[int, ...]:
     over, *under = unit.split('/')
     powers = np.zeros(3, dtype=int)
     for part in over.split(' '):
-        powers += POWERS[part]
+        powers += EXPONENTS[part]
     for part in under:
-        powers -= POWERS[part]
+        powers -= EXPONENTS[part]
     return tuple(powers.tolist())
 
 
@@ -166,7 +166,7 @@ def scaled_gains(length: float) -> Gains:
     """Return the default gains for legs of a length, m, within their limits."""
     result = {}
     for name, gain in GAINS.items():
-        ratio = scale_of(gain.unit, length) / scale_of(gain.unit, LENGTH)
+        ratio = scale_of(gain.unit, length) / scale_of(gain.unit, GO2_LEG_LENGTH)
         if ratio != 1.0:
             scaled = float(f'{gain.default * ratio:.{DIGITS}g}')
             result[name] = min(max(scaled, gain.low), gain.high)

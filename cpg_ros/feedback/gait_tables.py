@@ -27,28 +27,28 @@ import numpy as np
 
 # When each leg of a gait swings, and how far it has got, by the stride phase of the first leg.
 
-#: POINTS: number of phases of a stride in the tables.
-POINTS = 512
-#: TOGETHER: legs of a pair swing together if one alone swings for less than this fraction of a
-#: stride.
-TOGETHER = 0.2
+#: NUM_PHASES: number of phases of a stride in the tables.
+NUM_PHASES = 512
+#: MIN_SINGLE_SWING: legs of a pair swing together if one alone swings for less than this fraction
+#: of a stride.
+MIN_SINGLE_SWING = 0.2
 
 
 class Timetable:
     """A gait's angles and the times of its steps, over the stride.
 
     Attributes:
-        angles: from the stand at full strides, rad, shape (POINTS, joints).
+        angles: from the stand at full strides, rad, shape (NUM_PHASES, joints).
         in_place: the same at strides of length 0.
-        swinging: whether each leg should swing, shape (POINTS, legs).
-        progress: completed fraction of that swing or stance, shape (POINTS, legs).
+        swinging: whether each leg should swing, shape (NUM_PHASES, legs).
+        progress: completed fraction of that swing or stance, shape (NUM_PHASES, legs).
         hops: whether the left and right leg of each pair swing together.
 
     """
 
     def __init__(self, plan: GaitPlan, geometry: Geometry) -> None:
         """Tabulate a gait: a leg swings while its foot moves forward relative to the body."""
-        robot, theta = plan.robot, np.arange(POINTS) / POINTS
+        robot, theta = plan.robot, np.arange(NUM_PHASES) / NUM_PHASES
         phases = theta[:, None] - plan.readout.start + plan.orbit.phases[robot.cells]
         self.angles, self.in_place = (
             plan.shift + np.stack([periodic(row, phase) for row, phase
@@ -64,7 +64,7 @@ class Timetable:
 def _hops(robot: Robot, swinging: np.ndarray) -> bool:
     pairs = [pair for pair in itertools.combinations(range(len(robot.legs)), 2)
              if _paired(robot, *(list(robot.legs)[leg] for leg in pair))]
-    return bool(pairs) and all((swinging[:, first] != swinging[:, other]).mean() < TOGETHER
+    return bool(pairs) and all((swinging[:, first] != swinging[:, other]).mean() < MIN_SINGLE_SWING
                                for first, other in pairs)
 
 
@@ -84,31 +84,31 @@ def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))
 
 
-#: SLOTS: most gaits known at the same time; ROWS: most rows of a steering table.
-SLOTS, ROWS = 8, 32
+#: MAX_GAITS: most gaits known at the same time; MAX_ROWS: most rows of a steering table.
+MAX_GAITS, MAX_ROWS = 8, 32
 
 
 class GaitTables(NamedTuple):
     """Tables of several gaits; the first axis is the gait's slot.
 
     Attributes:
-        swinging: whether each leg should swing, shape (SLOTS, POINTS, legs).
+        swinging: whether each leg should swing, shape (MAX_GAITS, NUM_PHASES, legs).
         progress: completed fraction of that swing or stance, the same.
-        duty: fraction of the stride that each leg stands, shape (SLOTS, legs).
-        stance: mean duration of a stance, s, shape (SLOTS,).
+        duty: fraction of the stride that each leg stands, shape (MAX_GAITS, legs).
+        stance: mean duration of a stance, s, shape (MAX_GAITS,).
         one_by_one: 1 where for most of the stride at most one leg swings, else 0, the same.
-        alternates: 1 where left and right legs alternate, 0 where they hop, shape (SLOTS,).
-        speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
-        expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
-        steered: whether strides can be changed, shape (SLOTS,).
-        at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
+        alternates: 1 where left and right legs alternate, 0 where they hop, shape (MAX_GAITS,).
+        speeds: of the efference copies, m/s, shape (MAX_GAITS, SPEEDS).
+        expected: efference copies, shape (MAX_GAITS, SPEEDS, BINS, SIGNALS).
+        steered: whether strides can be changed, shape (MAX_GAITS,).
+        at: speeds of the steering tables, m/s, shape (MAX_GAITS, MAX_ROWS).
         turn: yaw rate, rad/s, for each unit by which right strides exceed left ones, the same.
         length: stride at these speeds, 1 for a full one, the same.
         stiffness: factor of the servos' proportional gain at these speeds, the same.
         sides: -1/2 for left legs and 1/2 for right ones, shape (legs,); 0 until a gait with
             steering is known.
-        copied: whether the robot file has an efference copy of the gait, shape (SLOTS,).
-        keys: addresses of the gaits in the core, shape (SLOTS,).
+        copied: whether the robot file has an efference copy of the gait, shape (MAX_GAITS,).
+        keys: addresses of the gaits in the core, shape (MAX_GAITS,).
 
     """
 
@@ -132,12 +132,13 @@ class GaitTables(NamedTuple):
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
         """Return tables with empty slots."""
-        return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
-                   np.ones((SLOTS, legs)), np.ones(SLOTS), np.zeros(SLOTS), np.ones(SLOTS),
-                   np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
-                   np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
-                   np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.ones((SLOTS, ROWS)),
-                   np.zeros(legs), np.zeros(SLOTS, dtype=bool), np.zeros(SLOTS, dtype=np.int64))
+        progress, table = (MAX_GAITS, NUM_PHASES, legs), (MAX_GAITS, MAX_ROWS)
+        return cls(np.zeros(progress, dtype=bool), np.zeros(progress), np.ones((MAX_GAITS, legs)),
+                   np.ones(MAX_GAITS), np.zeros(MAX_GAITS), np.ones(MAX_GAITS),
+                   np.zeros((MAX_GAITS, SPEEDS)), np.zeros((MAX_GAITS, SPEEDS, BINS, SIGNALS)),
+                   np.zeros(MAX_GAITS, dtype=bool), np.zeros(table),
+                   np.ones(table), np.ones(table), np.ones(table), np.zeros(legs),
+                   np.zeros(MAX_GAITS, dtype=bool), np.zeros(MAX_GAITS, dtype=np.int64))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, plan: GaitPlan
              ) -> None:
@@ -163,7 +164,7 @@ class GaitTables(NamedTuple):
             for part, column in ((self.at, steering.speed), (self.turn, steering.turn),
                                  (self.length, steering.stride),
                                  (self.stiffness, steering.stiffness or (1.0,))):
-                part[slot] = _filled(np.array(column), ROWS, 'a steering table')
+                part[slot] = _filled(np.array(column), MAX_ROWS, 'a steering table')
             self.sides[:] = np.where(plan.robot.left, -0.5, 0.5)
 
 

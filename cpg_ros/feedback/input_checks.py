@@ -26,31 +26,31 @@ import numpy as np
 
 # Monitoring of the feedback's inputs: whether each is valid, or since when it is not.
 
-#: STALE: time without a valid message, s, after which an input is out.
-STALE = 0.05
-#: DELAYED: largest difference of a message's stamp from the clock, s, in either direction.
-DELAYED = 0.1
+#: MAX_SILENCE: time without a valid message, s, after which an input is out.
+MAX_SILENCE = 0.05
+#: MAX_STAMP_OFFSET: largest difference of a message's stamp from the clock, s, in either
+#: direction.
+MAX_STAMP_OFFSET = 0.1
 #: Largest age of measurements when they are used, s, below the delay at which the robot falls in
-#: simulation. LATE: in the gaits of a quadruped, which falls with an IMU that is 28 ms late, also
-#: for moments; LATE_BALANCE: in a balanced walk, low-passed.
-LATE, LATE_BALANCE = 0.022, 0.012
-#: AGE_MEMORY: time constant of the low-pass of the age, s; IN_TIME: fraction of the largest age
-#: below which a late input counts as good again.
-AGE_MEMORY, IN_TIME = 0.1, 0.9
-#: FADE: duration of the transition from full feedback to none and back, s; GOOD: time for which
-#: all inputs have to be good before feedback returns, s.
-FADE, GOOD = 0.15, 0.3
+#: simulation. MAX_AGE: in the gaits of a quadruped, which falls with an IMU that is 28 ms late,
+#: also for moments; MAX_AGE_BALANCE: in a balanced walk, low-passed.
+MAX_AGE, MAX_AGE_BALANCE = 0.022, 0.012
+#: AGE_FILTER: time constant of the low-pass of the age, s; AGE_HYSTERESIS: fraction of the largest
+#: age below which a late input counts as good again.
+AGE_FILTER, AGE_HYSTERESIS = 0.1, 0.9
+#: FADE: duration of the transition from full feedback to none and back, s; RECOVERY_TIME: time for
+#: which all inputs have to be good before feedback returns, s.
+FADE, RECOVERY_TIME = 0.15, 0.3
 
 
-#: Indices of a monitor's values, times in s. Instants of BELIEVED: the last valid message;
-#: CHANGED: the last change of values; CAME: the last message; MEASURED: the stamp of the last
-#: valid one;
-#: USED: the last update of its age; SINCE: the failure of the input. AGE: low-passed age; IS_LATE:
-#: whether it is too large; WRONG: verdict on the last message; LAG: age of its stamp; LATEST:
-#: largest age; PEAKS: whether the age rises at once, and only falls as low-passed. NUMBERS: how
-#: many values these are.
-(BELIEVED, CHANGED, CAME, MEASURED, USED, AGE, SINCE, IS_LATE, WRONG, LAG, LATEST, PEAKS,
- NUMBERS) = range(13)
+#: Indices of a monitor's values, times in s. Instants of LAST_VALID: the last valid message;
+#: LAST_CHANGE: the last change of values; LAST_MESSAGE: the last message; LAST_STAMP: the stamp of
+#: the last valid one; LAST_UPDATE: the last update of its age; FAILED_SINCE: the failure of the
+#: input. AGE: low-passed age; TOO_OLD: whether it is too large; FAULT: verdict on the last
+#: message; STAMP_AGE: age of its stamp; AGE_LIMIT: largest age; PEAK_HOLD: whether the age rises
+#: at once, and only falls as low-passed. NUM_VALUES: how many values these are.
+(LAST_VALID, LAST_CHANGE, LAST_MESSAGE, LAST_STAMP, LAST_UPDATE, AGE, FAILED_SINCE, TOO_OLD,
+ FAULT, STAMP_AGE, AGE_LIMIT, PEAK_HOLD, NUM_VALUES) = range(13)
 
 
 @jit
@@ -62,44 +62,45 @@ def note(monitor, now, stamp, same, verdict, patience):
         now: s.
         stamp: of the message, on the same clock, s; nan if it has none.
         same: whether its numbers equal those of the last one.
-        verdict: on the numbers, an index into VERDICTS.
+        verdict: on the numbers, an index into FAULT_TEXTS.
         patience: longest time for which the same numbers may repeat, s.
 
     """
-    monitor[CAME] = now
+    monitor[LAST_MESSAGE] = now
     if not same:
-        monitor[CHANGED] = now
-    elif verdict in (0, NO_GRAVITY) and now > monitor[CHANGED] + patience:
+        monitor[LAST_CHANGE] = now
+    elif verdict in (0, NO_GRAVITY) and now > monitor[LAST_CHANGE] + patience:
         verdict = REPEATED
-    if not math.isnan(stamp) and not abs(now - stamp) <= DELAYED:
-        monitor[LAG], verdict = now - stamp, MISSTAMPED
-    monitor[WRONG] = verdict
+    if not math.isnan(stamp) and not abs(now - stamp) <= MAX_STAMP_OFFSET:
+        monitor[STAMP_AGE], verdict = now - stamp, MISSTAMPED
+    monitor[FAULT] = verdict
     if verdict == 0:
-        monitor[BELIEVED], monitor[MEASURED] = now, stamp
+        monitor[LAST_VALID], monitor[LAST_STAMP] = now, stamp
 
 
 @jit
 def is_out(monitor, now):
     """Update the low-passed age of the measurements, s; return whether the input is out."""
-    stale, late = now - monitor[BELIEVED] > STALE, False
+    stale, late = now - monitor[LAST_VALID] > MAX_SILENCE, False
     if stale:
         # After a gap the low-pass starts anew: earlier ages do not matter.
-        monitor[AGE], monitor[IS_LATE] = math.nan, 0.0
-    elif not math.isnan(monitor[MEASURED]):
-        age = max(now - monitor[MEASURED], 0.0)
+        monitor[AGE], monitor[TOO_OLD] = math.nan, 0.0
+    elif not math.isnan(monitor[LAST_STAMP]):
+        age = max(now - monitor[LAST_STAMP], 0.0)
         if math.isnan(monitor[AGE]):
             monitor[AGE] = age
         else:
-            monitor[AGE] += min((now - monitor[USED]) / AGE_MEMORY, 1.0) * (age - monitor[AGE])
-            if monitor[PEAKS]:
+            share = min((now - monitor[LAST_UPDATE]) / AGE_FILTER, 1.0)
+            monitor[AGE] += share * (age - monitor[AGE])
+            if monitor[PEAK_HOLD]:
                 monitor[AGE] = max(monitor[AGE], age)
-        monitor[USED] = now
-        late = monitor[AGE] > monitor[LATEST] * (IN_TIME if monitor[IS_LATE] else 1.0)
-        monitor[IS_LATE] = late
+        monitor[LAST_UPDATE] = now
+        late = monitor[AGE] > monitor[AGE_LIMIT] * (AGE_HYSTERESIS if monitor[TOO_OLD] else 1.0)
+        monitor[TOO_OLD] = late
     if not (late or stale):
-        monitor[SINCE] = math.nan
-    elif math.isnan(monitor[SINCE]):
-        monitor[SINCE] = now
+        monitor[FAILED_SINCE] = math.nan
+    elif math.isnan(monitor[FAILED_SINCE]):
+        monitor[FAILED_SINCE] = now
     return late or stale
 
 
@@ -108,7 +109,7 @@ class InputMonitor:
 
     Attributes:
         name: of the input.
-        numbers: see BELIEVED and the constants after it.
+        numbers: see LAST_VALID and the constants after it.
         other: fault of messages that no check could read.
 
     """
@@ -120,31 +121,31 @@ class InputMonitor:
         Args:
             name: of the input.
             latest: age up to which measurements are valid, s.
-            numbers: to be used, see BELIEVED and what follows it, shape (NUMBERS,).
+            numbers: to be used, see LAST_VALID and what follows it, shape (NUM_VALUES,).
             peaks: whether a larger age counts at once, as gaits fall that are late for moments;
                 else as low-passed.
 
         """
         self.name, self._latest, self._peaks, self.other = name, latest, peaks, ''
-        self.numbers = np.empty(NUMBERS) if numbers is None else numbers
+        self.numbers = np.empty(NUM_VALUES) if numbers is None else numbers
         self.restart()
 
     def restart(self) -> None:
         """Forget all messages."""
         self.numbers[:] = math.nan
-        self.numbers[[BELIEVED, CHANGED, CAME]] = -math.inf
-        self.numbers[[IS_LATE, WRONG, LAG]] = 0.0
-        self.numbers[[LATEST, PEAKS]] = self._latest, self._peaks
+        self.numbers[[LAST_VALID, LAST_CHANGE, LAST_MESSAGE]] = -math.inf
+        self.numbers[[TOO_OLD, FAULT, STAMP_AGE]] = 0.0
+        self.numbers[[AGE_LIMIT, PEAK_HOLD]] = self._latest, self._peaks
 
     @property
     def believed(self) -> float:
         """Time of arrival of the last valid message, s; -inf before the first one."""
-        return float(self.numbers[BELIEVED])
+        return float(self.numbers[LAST_VALID])
 
     @property
     def since(self) -> float:
         """Time at which it went out, s; nan while it is in."""
-        return float(self.numbers[SINCE])
+        return float(self.numbers[FAILED_SINCE])
 
     @property
     def age(self) -> float:
@@ -159,10 +160,10 @@ class InputMonitor:
     @property
     def reason(self) -> str:
         """Why it was out at the last check, or ''."""
-        wrong, late = int(self.numbers[WRONG]), self.numbers[LAG]
-        if math.isnan(self.numbers[SINCE]):
+        wrong, late = int(self.numbers[FAULT]), self.numbers[STAMP_AGE]
+        if math.isnan(self.numbers[FAILED_SINCE]):
             return ''
-        if self.numbers[IS_LATE]:
+        if self.numbers[TOO_OLD]:
             return (f'the measurement is {1e3 * self.age:.0f} ms old when it is used, more than '
                     f'feedback.max_delay, {1e3 * self._latest:.0f} ms')
         if wrong == MISSTAMPED:
@@ -170,7 +171,7 @@ class InputMonitor:
                     f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
         if wrong == UNREADABLE:
             return self.other
-        return VERDICTS[wrong] or ('no message yet' if self.believed == -math.inf else
+        return FAULT_TEXTS[wrong] or ('no message yet' if self.believed == -math.inf else
                                    'no messages')
 
 
@@ -186,14 +187,14 @@ def fade(way, good, valid, dt):
 
     """
     good = good + dt if valid else 0.0
-    if good >= GOOD or (valid and way >= 1.0):
+    if good >= RECOVERY_TIME or (valid and way >= 1.0):
         return min(1.0, way + dt / FADE), good
     # Also where a good message comes between bad ones.
     return max(0.0, way - dt / FADE), good
 
 
-#: VERDICTS: faults of a message, by the number that the checks return; 0 is none.
-VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
+#: FAULT_TEXTS: faults of a message, by the number that the checks return; 0 is none.
+FAULT_TEXTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
             'no orientation (its covariance begins with -1)', 'an impossible angular velocity',
             'an impossible acceleration',
             'an orientation and an angular velocity that contradict each other',
@@ -205,39 +206,45 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
 #: Indices of the last verdicts. NO_GRAVITY: an acceleration without it; REPEATED: the same values;
 #: MISSTAMPED: a stamp far from the clock; UNREADABLE: another layout.
 NO_GRAVITY, REPEATED, MISSTAMPED, UNREADABLE = 10, 11, 12, 13
-#: JOLT: largest change of the angular velocity between two messages, rad/s, and SPUN: what the
-#: time between them adds, rad/s^2.
-JOLT, SPUN = 5.0, 1000.0
-#: UNIT: largest difference of a quaternion's length from 1; FASTEST: largest angular velocity,
-#: rad/s; HARDEST: largest acceleration, m/s^2, and TELLING: time constant of its low-pass, s.
-UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
-#: APART: largest difference between the vertical and the integrated angular velocity, rad;
-#: FORGET: time constant of the integral, s; GAP: longest time between messages, s, over which they
-#: are compared; LEAP: difference in one message, rad, from which on the base was put elsewhere.
-APART, FORGET, GAP, LEAP = 0.15, 0.2, 0.05, 0.3
-#: DIFFERS: mean square of that difference, as a fraction of the motion's, above which orientation
-#: and angular velocity contradict each other; AGREE: fraction below which they agree again;
-#: COMPARED: time constant of the mean, s; MOVES: RMS motion, rad, above which they are compared.
-DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
-#: Distance of the mean acceleration from gravity, m/s^2. STANDING_OFF, WALKING_OFF: largest one
-#: while the robot stands and walks; RIGHT: below it, the acceleration is right again.
-STANDING_OFF, WALKING_OFF, RIGHT = 2.5, 6.0, 2.0
-#: STANDING_MEAN, WALKING_MEAN: time constant of that mean, s, while the robot stands and walks;
-#: JUDGED: time after the first message, s, from which on it is judged.
-STANDING_MEAN, WALKING_MEAN, JUDGED = 0.3, 1.0, 0.25
-#: BEYOND: how far a joint may be beyond its limits, rad; OUTRUN: largest speed of a joint, as a
-#: multiple of its speed limit.
-BEYOND, OUTRUN = 0.3, 3.0
-#: HEAVIEST: largest load of all feet, low-passed with TELLING, as a multiple of the weight; DRAWN:
-#: least load of one foot, likewise.
-HEAVIEST, DRAWN = 4.0, -0.5
-#: IMU: number of values of a sensor_msgs/Imu. IMU_MEMORY: values of the memory of its check, with
-#: their indices: 0-2 acceleration, 3-5 vertical, 6-8 its recent change by the orientation and 9-11
-#: by the angular velocity, 12 mean square of their difference and 13 of both, 14-16 mean
+#: MAX_RATE_CHANGE: largest change of the angular velocity between two messages, rad/s, and
+#: MAX_ANGULAR_ACCELERATION: what the time between them adds, rad/s^2.
+MAX_RATE_CHANGE, MAX_ANGULAR_ACCELERATION = 5.0, 1000.0
+#: QUATERNION_TOLERANCE: largest difference of a quaternion's length from 1; MAX_ANGULAR_VELOCITY:
+#: largest angular velocity, rad/s; MAX_ACCELERATION: largest acceleration, m/s^2, and
+#: SHOCK_FILTER: time constant of its low-pass, s.
+QUATERNION_TOLERANCE, MAX_ANGULAR_VELOCITY = 0.1, 35.0
+MAX_ACCELERATION, SHOCK_FILTER = 4.0 * GRAVITY, 0.05
+#: MAX_VERTICAL_ERROR: largest difference between the vertical and the integrated angular velocity,
+#: rad; VERTICAL_MEMORY: time constant of the integral, s; MAX_GAP: longest time between messages,
+#: s, over which they are compared; RELOCATION_ANGLE: difference in one message, rad, from which on
+#: the base was put elsewhere.
+MAX_VERTICAL_ERROR, VERTICAL_MEMORY, MAX_GAP, RELOCATION_ANGLE = 0.15, 0.2, 0.05, 0.3
+#: MAX_MISMATCH: mean square of that difference, as a fraction of the motion's, above which
+#: orientation and angular velocity contradict each other; MISMATCH_RECOVERY: fraction below which
+#: they agree again; MISMATCH_FILTER: time constant of the mean, s; MIN_MOTION: RMS motion, rad,
+#: above which they are compared.
+MAX_MISMATCH, MISMATCH_RECOVERY, MISMATCH_FILTER, MIN_MOTION = 0.6, 0.2, 0.5, 0.01
+#: Distance of the mean acceleration from gravity, m/s^2. GRAVITY_ERROR_STANDING,
+#: GRAVITY_ERROR_WALKING: largest one while the robot stands and walks; GRAVITY_ERROR_RECOVERY:
+#: below it, the acceleration is right again.
+GRAVITY_ERROR_STANDING, GRAVITY_ERROR_WALKING, GRAVITY_ERROR_RECOVERY = 2.5, 6.0, 2.0
+#: GRAVITY_FILTER_STANDING, GRAVITY_FILTER_WALKING: time constant of that mean, s, while the robot
+#: stands and walks; GRAVITY_CHECK_DELAY: time after the first message, s, from which on it is
+#: judged.
+GRAVITY_FILTER_STANDING, GRAVITY_FILTER_WALKING, GRAVITY_CHECK_DELAY = 0.3, 1.0, 0.25
+#: LIMIT_MARGIN: how far a joint may be beyond its limits, rad; MAX_SPEED_RATIO: largest speed of a
+#: joint, as a multiple of its speed limit.
+LIMIT_MARGIN, MAX_SPEED_RATIO = 0.3, 3.0
+#: MAX_LOAD: largest load of all feet, low-passed with SHOCK_FILTER, as a multiple of the weight;
+#: MIN_FOOT_LOAD: least load of one foot, likewise.
+MAX_LOAD, MIN_FOOT_LOAD = 4.0, -0.5
+#: IMU: number of values of a sensor_msgs/Imu. IMU_STATE_SIZE: values of the memory of its check,
+#: with their indices: 0-2 acceleration, 3-5 vertical, 6-8 its recent change by the orientation and
+#: 9-11 by the angular velocity, 12 mean square of their difference and 13 of both, 14-16 mean
 #: acceleration less gravity, 17 time so far, 18 whether that mean is too large, 19 whether
 #: orientation and angular velocity contradict each other, 20 time since the vertical last changed,
 #: 21-23 the last angular velocity.
-IMU, IMU_MEMORY = 37, 24
+IMU, IMU_STATE_SIZE = 37, 24
 
 
 @jit
@@ -258,17 +265,17 @@ def _contradicts(up, turning, memory):
     # A vector that is constant in the world turns the opposite way in the base's frame.
     turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
               up[0] * turning[1] - up[1] * turning[0])
-    comparable, parted, moved, leap = memory[17] > 0.0 and dt < GAP, 0.0, 0.0, 0.0
+    comparable, parted, moved, leap = memory[17] > 0.0 and dt < MAX_GAP, 0.0, 0.0, 0.0
     for k in range(3):
         leap += (up[k] - memory[3 + k] - dt * turned[k])**2
     # A base that is put elsewhere says nothing about the IMU: compare anew from here on.
-    leaps = comparable and leap > LEAP**2
+    leaps = comparable and leap > RELOCATION_ANGLE**2
     if leaps:
         comparable, memory[12], memory[13], memory[19] = False, 0.0, 0.0, 0.0
     if not comparable:
         # The mean acceleration begins anew, too.
         memory[14:19] = 0.0
-    stays = 1.0 - min(dt / FORGET, 1.0)
+    stays = 1.0 - min(dt / VERTICAL_MEMORY, 1.0)
     for k in range(3):
         stated = stays * memory[6 + k] + up[k] - memory[3 + k]
         measured = stays * memory[9 + k] + dt * turned[k]
@@ -276,46 +283,48 @@ def _contradicts(up, turning, memory):
         memory[6 + k], memory[9 + k] = (stated, measured) if comparable else (0.0, 0.0)
         parted += (memory[6 + k] - memory[9 + k])**2
         moved += memory[6 + k]**2 + memory[9 + k]**2
-    fraction = min(dt / COMPARED, 1.0)
+    fraction = min(dt / MISMATCH_FILTER, 1.0)
     memory[12] += fraction * (parted - memory[12])
     memory[13] += fraction * (moved - memory[13])
-    if memory[13] > MOVES**2:
-        if memory[12] > DIFFERS * memory[13]:
+    if memory[13] > MIN_MOTION**2:
+        if memory[12] > MAX_MISMATCH * memory[13]:
             memory[19] = 1.0
-        elif memory[12] < AGREE * memory[13]:
+        elif memory[12] < MISMATCH_RECOVERY * memory[13]:
             memory[19] = 0.0
-    return leaps or memory[19] > 0.0 or math.sqrt(parted) > APART
+    return leaps or memory[19] > 0.0 or math.sqrt(parted) > MAX_VERTICAL_ERROR
 
 
 @jit
 def _is_off_gravity(up, acceleration, moving, dt, memory):
     """Return whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
     # One message after a gap, such as the first, says no more than any other.
-    dt = min(dt, GAP)
+    dt = min(dt, MAX_GAP)
     memory[17] += dt
-    fraction = min(dt / min(WALKING_MEAN if moving else STANDING_MEAN, memory[17]), 1.0)
+    filter_time = GRAVITY_FILTER_WALKING if moving else GRAVITY_FILTER_STANDING
+    fraction = min(dt / min(filter_time, memory[17]), 1.0)
     square = 0.0
     for k in range(3):
         memory[14 + k] += fraction * (acceleration[k] - GRAVITY * up[k] - memory[14 + k])
         square += memory[14 + k]**2
     off = math.sqrt(square)
-    if memory[17] > JUDGED and off > (WALKING_OFF if moving else STANDING_OFF):
+    largest = GRAVITY_ERROR_WALKING if moving else GRAVITY_ERROR_STANDING
+    if memory[17] > GRAVITY_CHECK_DELAY and off > largest:
         memory[18] = 1.0
-    elif off < RIGHT:
+    elif off < GRAVITY_ERROR_RECOVERY:
         memory[18] = 0.0
     return memory[18] > 0.0
 
 
 @jit_entry
 def check_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
-    """Fill the last three arguments if a message is plausible; return an index into VERDICTS.
+    """Fill the last three arguments if a message is plausible; return an index into FAULT_TEXTS.
 
     Args:
         values: numbers of a sensor_msgs/Imu in its order, shape (IMU,).
         dt: since the last one, s.
         moving: whether the robot walks.
         mount: orientation of the IMU in the base's frame, x y z w, shape (4,).
-        memory: shape (IMU_MEMORY,), zeros at first; overwritten.
+        memory: shape (IMU_STATE_SIZE,), zeros at first; overwritten.
         rpy: roll, pitch and yaw of the base, rad, shape (3,).
         angular_velocity: of the base in its own frame, rad/s, shape (3,).
         acceleration: accelerometer's reading in the base's frame, m/s^2, shape (3,).
@@ -328,7 +337,7 @@ def check_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
     if values[4] == -1.0:
         return 3
     x, y, z, w = values[0], values[1], values[2], values[3]
-    if abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) > UNIT:
+    if abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) > QUATERNION_TOLERANCE:
         return 2
     # The base's orientation is the IMU's after the inverse of the mount.
     a, b, c, d = -mount[0], -mount[1], -mount[2], mount[3]
@@ -341,14 +350,15 @@ def check_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
         jump += (turning[k] - memory[21 + k])**2
         memory[21 + k] = turning[k]
     # A single message with another angular velocity is a spike, and not what the base does.
-    if (math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > FASTEST
-            or (memory[17] > 0.0 and math.sqrt(jump) > JOLT + SPUN * dt)):
+    if (math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > MAX_ANGULAR_VELOCITY
+            or (memory[17] > 0.0
+                and math.sqrt(jump) > MAX_RATE_CHANGE + MAX_ANGULAR_ACCELERATION * dt)):
         return 4
     hard = 0.0
     for k in range(3):
-        memory[k] += min(dt / TELLING, 1.0) * (felt[k] - memory[k])
+        memory[k] += min(dt / SHOCK_FILTER, 1.0) * (felt[k] - memory[k])
         hard += memory[k] * memory[k]
-    if math.sqrt(hard) > HARDEST:
+    if math.sqrt(hard) > MAX_ACCELERATION:
         return 5
     up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
     contradicts = _contradicts(up, turning, memory)
@@ -366,7 +376,7 @@ def check_imu(values, dt, moving, mount, memory, rpy, angular_velocity, accelera
 
 @jit_entry
 def check_joints(positions, velocities, indices, lower, upper, fastest, angles, rates):
-    """Fill angles and rates if they are plausible; return an index into VERDICTS.
+    """Fill angles and rates if they are plausible; return an index into FAULT_TEXTS.
 
     Args:
         positions: of a message, in its order, rad.
@@ -383,9 +393,9 @@ def check_joints(positions, velocities, indices, lower, upper, fastest, angles, 
         angle, rate = positions[indices[k]], velocities[indices[k]]
         if not math.isfinite(angle + rate):
             return 1
-        if not lower[k] - BEYOND <= angle <= upper[k] + BEYOND:
+        if not lower[k] - LIMIT_MARGIN <= angle <= upper[k] + LIMIT_MARGIN:
             return 7
-        if abs(rate) > OUTRUN * fastest[k]:
+        if abs(rate) > MAX_SPEED_RATIO * fastest[k]:
             return 8
     for k in range(len(indices)):
         angles[k], rates[k] = positions[indices[k]], velocities[indices[k]]
@@ -394,7 +404,7 @@ def check_joints(positions, velocities, indices, lower, upper, fastest, angles, 
 
 @jit_entry
 def check_loads(loads, indices, weight, dt, memory, forces):
-    """Fill forces if they are plausible; return an index into VERDICTS.
+    """Fill forces if they are plausible; return an index into FAULT_TEXTS.
 
     Args:
         loads: of the feet, N, in any order.
@@ -409,11 +419,11 @@ def check_loads(loads, indices, weight, dt, memory, forces):
     for load in loads:
         if not math.isfinite(load):
             return 1
-        if load < DRAWN * weight:
+        if load < MIN_FOOT_LOAD * weight:
             return 9
         whole += load
-    memory[0] += min(dt / TELLING, 1.0) * (whole - memory[0])
-    if memory[0] > HEAVIEST * weight:
+    memory[0] += min(dt / SHOCK_FILTER, 1.0) * (whole - memory[0])
+    if memory[0] > MAX_LOAD * weight:
         return 9
     for k in range(len(indices)):
         forces[k] = loads[indices[k]]

@@ -29,19 +29,21 @@ import numpy as np
 MOUNTS = np.array([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 0.0, -1.0],
                    [0.0, -1.0, 1.0, 0.0], [1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 1.0, 0.0],
                    [-1.0, 0.0, 0.0, 1.0], [0.0, -1.0, -1.0, 0.0]])
-#: MOUNTED: text for the user on each of MOUNTS.
-MOUNTED = ('', 'turned by 90 degrees about z', 'turned by 180 degrees about z',
+#: MOUNT_TEXTS: text for the user on each of MOUNTS.
+MOUNT_TEXTS = ('', 'turned by 90 degrees about z', 'turned by 180 degrees about z',
            'turned by -90 degrees about z', *['with a wrong sign of an axis'] * 4)
-#: RATES_MEMORY: values of the memory: for each of MOUNTS the mean square of the feet's relative
-#: motion that it leaves unexplained, (rad/s)^2; time with two feet on the ground, s; the verdict.
-RATES_MEMORY = len(MOUNTS) + 2
-#: MEAN: time constant of these means, s on two feet; LEAST: time from which on they are judged, s.
-MEAN, LEAST = 1.0, 0.15
-#: SLIPS: least mismatch of all mounts, rad/s, at which a sample counts half: the feet slip.
-SLIPS = 0.2
-#: The mount is wrong if it leaves more than MOVES, (rad/s)^2, unexplained, and if another mount
-#: leaves less than the fraction BETTER of that.
-BETTER, MOVES = 0.5, 0.0025
+#: RATES_STATE_SIZE: values of the memory: for each of MOUNTS the mean square of the feet's
+#: relative motion that it leaves unexplained, (rad/s)^2; time with two feet on the ground, s; the
+#: verdict.
+RATES_STATE_SIZE = len(MOUNTS) + 2
+#: MEAN_TIME: time constant of these means, s on two feet; MIN_TIME: time from which on they are
+#: judged, s.
+MEAN_TIME, MIN_TIME = 1.0, 0.15
+#: SLIP_RATE: least mismatch of all mounts, rad/s, at which a sample counts half: the feet slip.
+SLIP_RATE = 0.2
+#: The mount is wrong if it leaves more than MIN_UNEXPLAINED, (rad/s)^2, unexplained, and if
+#: another mount leaves less than the fraction MAX_RATIO of that.
+MAX_RATIO, MIN_UNEXPLAINED = 0.5, 0.0025
 
 
 @jit
@@ -63,20 +65,20 @@ def _add(leg, other, turning, dt, memory):
         off[k] = (ex * ex + ey * ey + ez * ez - along * along / square) / square
         least = min(least, off[k])
     memory[count] += dt
-    fraction = min(dt / min(MEAN, memory[count]), 1.0) / (1.0 + least / SLIPS**2)
+    fraction = min(dt / min(MEAN_TIME, memory[count]), 1.0) / (1.0 + least / SLIP_RATE**2)
     for k in range(count):
         memory[k] += fraction * (off[k] - memory[k])
 
 
 @jit_entry
 def compare_rates(legs, sensors, dt, memory, seen, scratch):
-    """Update the memory with a measurement; return an index into MOUNTED, 0 for a right mount.
+    """Update the memory with a measurement; return an index into MOUNT_TEXTS, 0 for a right mount.
 
     Args:
         legs: LegArrays of the robot.
         sensors: SensorData of one run.
         dt: since the last tick, s.
-        memory: shape (RATES_MEMORY,), zeros at first; overwritten.
+        memory: shape (RATES_STATE_SIZE,), zeros at first; overwritten.
         seen: scratch, shape (legs, 6).
         scratch: shape (4, 3).
 
@@ -100,8 +102,8 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
     best = 0
     for k in range(1, count):
         best = k if memory[k] < memory[best] else best
-    if memory[count] > LEAST:
-        if best and memory[0] > MOVES and memory[best] < BETTER * memory[0]:
+    if memory[count] > MIN_TIME:
+        if best and memory[0] > MIN_UNEXPLAINED and memory[best] < MAX_RATIO * memory[0]:
             memory[count + 1] = best
         elif best == 0:
             memory[count + 1] = 0.0
@@ -110,4 +112,4 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
 
 def rates_memory(legs: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return memory and scratch of compare_rates."""
-    return np.zeros(RATES_MEMORY), np.zeros((legs, 6)), np.zeros((4, 3))
+    return np.zeros(RATES_STATE_SIZE), np.zeros((legs, 6)), np.zeros((4, 3))

@@ -20,7 +20,7 @@ from typing import NamedTuple
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
 from cpg_ros.feedback.efference_copy import expect, SIGNALS
 from cpg_ros.feedback.estimate import update
-from cpg_ros.feedback.gait_tables import POINTS
+from cpg_ros.feedback.gait_tables import NUM_PHASES
 from cpg_ros.feedback.kinematics import foot_of, move_foot, wrapped
 from cpg_ros.feedback.laws import (
     clearance,
@@ -299,8 +299,8 @@ def _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, ste
     rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
     quick, phase = 1.0 - math.exp(-dt / gains.smooth), planned.phase[run]
     foot, feet = memory.scratch[0], memory.leg_velocities
-    row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
-    now = int(phase % 1.0 * POINTS) % POINTS
+    row = int((phase + LEAD) % 1.0 * NUM_PHASES) % NUM_PHASES
+    now = int(phase % 1.0 * NUM_PHASES) % NUM_PHASES
     standing, mean_x, mean_y, stumbling = 0, 0.0, 0.0, 0.0
     for leg in range(rows.shape[0]):
         feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(

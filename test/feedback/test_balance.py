@@ -227,7 +227,7 @@ def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed)
 
 def test_servos_that_give_way_hold_a_crouch_short_of_the_end_of_the_knees(walker, monkeypatch):
     # As of a robot whose thighs would point downward at the end, such as the Unitree G1.
-    monkeypatch.setattr(crouch, 'BENT', np.array([0.75]))
+    monkeypatch.setattr(crouch, 'KNEE_FRACTIONS', np.array([0.75]))
     walker.go(2.0)
     assert walker.pattern.lower()
     walker.go(3.0)

@@ -17,14 +17,14 @@
 from cpg_ros.feedback.input_checks import (
     check_imu,
     check_joints,
-    DELAYED,
+    FAULT_TEXTS,
     IMU,
-    IMU_MEMORY,
+    IMU_STATE_SIZE,
     InputMonitor,
-    LATE,
+    MAX_AGE,
+    MAX_SILENCE,
+    MAX_STAMP_OFFSET,
     note,
-    STALE,
-    VERDICTS,
 )
 import numpy as np
 import pytest
@@ -41,9 +41,10 @@ def monitor():
 
 
 @pytest.mark.parametrize(('off', 'why'), [
-    (-1.5 * DELAYED, 'stamps 0.15 s old'), (1.5 * DELAYED, 'stamps 0.15 s ahead')])
+    (-1.5 * MAX_STAMP_OFFSET, 'stamps 0.15 s old'),
+    (1.5 * MAX_STAMP_OFFSET, 'stamps 0.15 s ahead')])
 def test_stamps_far_from_now_are_named(monitor, off, why):
-    now = 1.0 + 1.1 * STALE
+    now = 1.0 + 1.1 * MAX_SILENCE
     note(monitor.numbers, now, now + off, False, 0, 0.0)
     assert why in monitor.fault(now)
     note(monitor.numbers, now, now + off / 2.0, False, 0, 0.0)
@@ -58,7 +59,7 @@ def test_the_same_numbers_are_believed_for_as_long_as_allowed(monitor):
 
 
 def test_silence_is_named(monitor):
-    assert monitor.fault(1.0 + 1.1 * STALE) == 'no messages'
+    assert monitor.fault(1.0 + 1.1 * MAX_SILENCE) == 'no messages'
     assert InputMonitor('feet').fault(1.0) == 'no message yet'
 
 
@@ -74,12 +75,13 @@ def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
     # In the message the joints are the other way round.
     verdict = check_joints(np.array(angles[::-1]), np.array(speeds[::-1]), np.array([1, 0]),
                            np.full(2, -1.0), np.full(2, 1.0), FASTEST, *found)
-    assert VERDICTS[verdict] == why
+    assert FAULT_TEXTS[verdict] == why
     assert (found == ([angles, speeds] if not why else 7.0)).all()
 
 
 def test_a_spike_of_the_gyroscope_is_left_out():
-    memory, mount, filled = np.zeros(IMU_MEMORY), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros((3, 3))
+    memory, filled = np.zeros(IMU_STATE_SIZE), np.zeros((3, 3))
+    mount = np.array([0.0, 0.0, 0.0, 1.0])
     message = np.zeros(IMU)
     message[3], message[27] = 1.0, 9.81
     verdicts = []
@@ -88,12 +90,13 @@ def test_a_spike_of_the_gyroscope_is_left_out():
         verdicts.append(check_imu(message, 0.002, False, mount, memory, *filled))
         assert not filled[1].any()
     # The jump back counts as one, too.
-    assert [VERDICTS[verdict] for verdict in verdicts] == [
+    assert [FAULT_TEXTS[verdict] for verdict in verdicts] == [
         '', '', 'an impossible angular velocity', 'an impossible angular velocity', '']
 
 
 def test_gravity_is_judged_by_a_quarter_of_a_second_and_not_by_the_first_message():
-    memory, mount, filled = np.zeros(IMU_MEMORY), np.array([0.0, 0.0, 0.0, 1.0]), np.zeros((3, 3))
+    memory, filled = np.zeros(IMU_STATE_SIZE), np.zeros((3, 3))
+    mount = np.array([0.0, 0.0, 0.0, 1.0])
     message = np.zeros(IMU)
     message[3] = 1.0
     # A robot that is put on the ground falls freely at first; before it, a second of silence.
@@ -109,11 +112,11 @@ def test_gravity_is_judged_by_a_quarter_of_a_second_and_not_by_the_first_message
     memory[:], message[27] = 0.0, 0.0
     verdicts = [check_imu(message, dt, False, mount, memory, *filled)
                 for dt in (1.0, *(140 * [0.002]))]
-    assert verdicts[90] == 0 and 'gravity' in VERDICTS[verdicts[-1]]
+    assert verdicts[90] == 0 and 'gravity' in FAULT_TEXTS[verdicts[-1]]
 
 
 def late_monitor(delay, now):
-    monitor = InputMonitor('imu', latest=LATE)
+    monitor = InputMonitor('imu', latest=MAX_AGE)
     for _ in range(100):
         now += 0.005
         note(monitor.numbers, now, now - delay, False, 0, 0.0)
@@ -131,7 +134,7 @@ def test_measurements_that_are_old_when_they_are_used_are_out(delay, late):
 
 @pytest.mark.parametrize(('peaks', 'late'), [(True, True), (False, False)])
 def test_a_moment_of_late_measurements_counts_at_once_where_the_gait_falls_by_it(peaks, late):
-    monitor = InputMonitor('imu', latest=LATE, peaks=peaks)
+    monitor = InputMonitor('imu', latest=MAX_AGE, peaks=peaks)
     for k in range(20):
         now = 1.0 + 0.002 * k
         note(monitor.numbers, now, now - (0.03 if k == 19 else 0.004), False, 0, 0.0)

@@ -19,7 +19,7 @@ import re
 from unittest import mock
 
 from c_ticks import CTicks
-from cpg_ros.feedback.input_checks import LATE
+from cpg_ros.feedback.input_checks import MAX_AGE
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.strides import StrideCommand
@@ -63,7 +63,7 @@ class FaultyGo2:
     def __init__(self, fault: str = 'none', seed: int = 0, gait: str = 'trot',
                  begins: float = BEGINS, **settings: object) -> None:
         """Stand; begins in s, settings as of SensorInput."""
-        settings.setdefault('latest', LATE)
+        settings.setdefault('latest', MAX_AGE)
         self.gait = program(gait)
         self.body = Body('go2', GO2)
         self._unit = SimulatedSensors(self.body, DT, SensorNoise(

@@ -20,7 +20,7 @@ from functools import cache
 from c_ticks import CTicks
 from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.feedback import gait_plan
-from cpg_ros.feedback.input_checks import LATE_BALANCE
+from cpg_ros.feedback.input_checks import MAX_AGE_BALANCE
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.feedback import sensor_input
@@ -66,7 +66,7 @@ class HumanoidUnderFault:
         try:
             inputs = sensor_input.SensorInput(None, robot, GRAVITY * robot.biped.total, 'imu',
                                               'measured', 'foot_contacts', 'foot_contacts',
-                                              latest=LATE_BALANCE)
+                                              latest=MAX_AGE_BALANCE)
         finally:
             sensor_input.PolledSubscription = subscription
         self.loop = BalanceLoop(self.pattern, inputs, lambda: (speed, 0.0, 0.0))

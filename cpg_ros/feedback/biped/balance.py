@@ -25,68 +25,70 @@ from cpg_ros.feedback.biped.modes import accept_request, advance, stand_anew
 from cpg_ros.feedback.biped.stepping import swing_fraction, WALKS
 from cpg_ros.feedback.biped.substitutes import FEET, IMU, JOINTS, LastStride, Substitutes
 from cpg_ros.feedback.biped.support import swing_arms
-from cpg_ros.feedback.closed_loop import check_inputs, NOW
+from cpg_ros.feedback.closed_loop import check_inputs, TIME
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.feedback.input_checks import BELIEVED, GOOD, is_out, MEASURED, WRONG
+from cpg_ros.feedback.input_checks import FAULT, is_out, LAST_STAMP, LAST_VALID, RECOVERY_TIME
 from cpg_ros.motion.strides import smoothstep
 import numpy as np
 
-#: LEANS: lean of the base, rad, above which the robot has fallen; LOW: height of the centre of
-#: mass, as a fraction of the wanted one, below which it has fallen.
-LEANS, LOW = 1.0, 0.6
-#: The robot is on its feet, and balance begins, if all of these hold for a time of STEADY, s:
-#: UPRIGHT: largest lean of the base, rad, in the stand; CROUCHED: the same in the crouch;
-#: NEAR: largest distance of a joint from the pose, rad; BORNE: least fraction of the weight on the
-#: feet.
-UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
-#: RETURN: duration of the way back into the stand, s; LOWER: duration of the way into the crouch,
-#: s.
-RETURN, LOWER = 0.3, 0.45
-#: SETTLED: time in the stand before it crouches, s; PATIENCE: longest time after the failure of an
-#: input in which it comes to a stand, s.
-SETTLED, PATIENCE = 0.3, 4.0
-#: BEHIND: how far the centre of mass is behind the middle of the soles in a crouch from a walk, m.
-BEHIND = 0.025
-#: PASSING: begin and end, as fractions of a swing, of the time in which the body passes over the
-#: foot that stands: the best time to crouch without any sensor.
-PASSING = 0.38, 0.6
-#: CONTRARY: ratio of the swinging foot's load to the other's above which loads contradict the
-#: gait.
-CONTRARY = 4.0
-#: While both feet stand, each with a fraction of LOADED of the weight, soles that are not level
-#: for COMPARED, s, contradict: PARALLEL: largest angle between them by the joints; FLAT: largest
-#: lean by IMU and joints, rad.
-PARALLEL, FLAT, LOADED, COMPARED = 0.16, 0.1, 0.12, 0.06
-#: Largest deviation from the mean over USUAL, s, meanwhile: TWISTED: of the angle between the
-#: soles while the weight shifts; TURNED: of their lean, rad; SEEN_LEVEL: time for which they are
-#: level in a crouch before the IMU counts again, s.
-TWISTED, TURNED, USUAL, SEEN_LEVEL = 0.015, 0.05, 1.0, 1.0
-#: TOPPLES: lean of a robot that holds the stand, rad, above which it topples.
-TOPPLES = 0.05
-#: BLIND: age of IMU and joints, s, from which on nothing balances a walk: its last stride is
-#: repeated; LATE: the same where an input has failed already.
-BLIND, LATE = 0.025, 0.015
+#: FALLEN_LEAN: lean of the base, rad, above which the robot has fallen; FALLEN_HEIGHT: height of
+#: the centre of mass, as a fraction of the wanted one, below which it has fallen.
+FALLEN_LEAN, FALLEN_HEIGHT = 1.0, 0.6
+#: The robot is on its feet, and balance begins, if all of these hold for a time of STEADY_TIME, s:
+#: MAX_STAND_LEAN: largest lean of the base, rad, in the stand; MAX_CROUCH_LEAN: the same in the
+#: crouch; MAX_POSE_ERROR: largest distance of a joint from the pose, rad; MIN_FEET_LOAD: least
+#: fraction of the weight on the feet.
+MAX_STAND_LEAN, MAX_CROUCH_LEAN, MAX_POSE_ERROR = 0.2, 0.5, 0.35
+MIN_FEET_LOAD, STEADY_TIME = 0.4, 0.04
+#: STAND_TIME: duration of the way back into the stand, s; CROUCH_TIME: duration of the way into
+#: the crouch, s.
+STAND_TIME, CROUCH_TIME = 0.3, 0.45
+#: SETTLE_TIME: time in the stand before it crouches, s; STOP_TIMEOUT: longest time after the
+#: failure of an input in which it comes to a stand, s.
+SETTLE_TIME, STOP_TIMEOUT = 0.3, 4.0
+#: COM_OFFSET: how far the centre of mass is behind the middle of the soles in a crouch from a
+#: walk, m.
+COM_OFFSET = 0.025
+#: PASSING_PHASES: begin and end, as fractions of a swing, of the time in which the body passes
+#: over the foot that stands: the best time to crouch without any sensor.
+PASSING_PHASES = 0.38, 0.6
+#: MAX_LOAD_RATIO: ratio of the swinging foot's load to the other's above which loads contradict
+#: the gait.
+MAX_LOAD_RATIO = 4.0
+#: While both feet stand, each with a fraction of MIN_SOLE_LOAD of the weight, soles that are not
+#: level for COMPARISON_TIME, s, contradict: MAX_SOLE_ANGLE: largest angle between them by the
+#: joints; MAX_SOLE_LEAN: largest lean by IMU and joints, rad.
+MAX_SOLE_ANGLE, MAX_SOLE_LEAN, MIN_SOLE_LOAD, COMPARISON_TIME = 0.16, 0.1, 0.12, 0.06
+#: Largest deviation from the mean over MEAN_TIME, s, meanwhile: MAX_SOLE_TWIST: of the angle
+#: between the soles while the weight shifts; MAX_LEAN_CHANGE: of their lean, rad; LEVEL_TIME: time
+#: for which they are level in a crouch before the IMU counts again, s.
+MAX_SOLE_TWIST, MAX_LEAN_CHANGE, MEAN_TIME, LEVEL_TIME = 0.015, 0.05, 1.0, 1.0
+#: TOPPLING_LEAN: lean of a robot that holds the stand, rad, above which it topples.
+TOPPLING_LEAN = 0.05
+#: BLIND_AGE: age of IMU and joints, s, from which on nothing balances a walk: its last stride is
+#: repeated; BLIND_AGE_FAILED: the same where an input has failed already.
+BLIND_AGE, BLIND_AGE_FAILED = 0.025, 0.015
 #: A joint was moved by hand, or its sensor failed, if it moves from one tick to the next by more
-#: than JUMP, rad, plus FASTEST, rad/s, times the time between.
-JUMP, FASTEST = 0.15, 40.0
-#: TAKEOVER: duration of the transition from the angles that are held to those of balance, s.
-TAKEOVER = 0.1
-#: ASIDE: largest speed sideways, m/s; TURN: largest yaw rate, rad/s.
-ASIDE, TURN = 0.2, 0.5
-#: DOUBTS: how an input contradicts the others, by number, 0 for not; then the numbers.
-DOUBTS = ('', '{joint} jumped', '{joint} is stuck',
+#: than MAX_JUMP, rad, plus MAX_JOINT_SPEED, rad/s, times the time between.
+MAX_JUMP, MAX_JOINT_SPEED = 0.15, 40.0
+#: TAKEOVER_TIME: duration of the transition from the angles that are held to those of balance, s.
+TAKEOVER_TIME = 0.1
+#: MAX_SIDE_SPEED: largest speed sideways, m/s; MAX_YAW_RATE: largest yaw rate, rad/s.
+MAX_SIDE_SPEED, MAX_YAW_RATE = 0.2, 0.5
+#: FAULT_TEXTS: how an input contradicts the others, by number, 0 for not; then the numbers.
+FAULT_TEXTS = ('', '{joint} jumped', '{joint} is stuck',
           'the soles are {apart:.2f} rad from parallel by the joints, or turn against each other, '
           'while both feet stand: encoder offsets or names of joints',
           'the contacts do not go with the gait',
           'the soles lean by IMU and joints while both feet stand: the mounting of the IMU, its '
           'signs, a push, or ground too steep')
-JUMPED, STUCK, UNEVEN, AGAINST, LEAN = range(1, 6)
+JOINT_JUMPED, JOINT_STUCK, SOLES_UNEVEN, CONTACTS_DISAGREE, SOLES_LEAN = range(1, 6)
 #: Indices of functions of the pattern's core: move on without balance, go over to that, and move
 #: the joints to the goal.
-ADVANCE, LET_GO, REACH = range(3)
+ADVANCE, RELEASE, REACH = range(3)
 #: Rows of the poses: the stand, the crouch, what a crouch out of a walk adds to it at first, and
 #: the angles from which the present transition began.
-REST, CROUCH, BRACED, START = range(4)
+REST, CROUCH, CROUCH_OFFSET, START = range(4)
 
 #: State of a balanced pattern; angles in rad, times in s, and of inertial unit, joints and feet in
 #: this order.
@@ -191,7 +193,7 @@ def _passes(gait, laws):
     """Return whether the body is above the stance foot."""
     for leg in range(2):
         fraction = laws.phases[leg] / swing_fraction(gait)
-        if laws.swinging[leg] and PASSING[0] < fraction < PASSING[1]:
+        if laws.swinging[leg] and PASSING_PHASES[0] < fraction < PASSING_PHASES[1]:
             return True
     return False
 
@@ -202,7 +204,7 @@ def _leaps(joints, now, state, dt):
     count, last = 0, -1
     for k in range(len(now)):
         joints[1, k], joints[0, k] = abs(now[k] - joints[0, k]), now[k]
-        if joints[1, k] > JUMP + FASTEST * (state.gap + dt):
+        if joints[1, k] > MAX_JUMP + MAX_JOINT_SPEED * (state.gap + dt):
             count, last = count + 1, k
     return count, last
 
@@ -210,14 +212,14 @@ def _leaps(joints, now, state, dt):
 @jit
 def _doubt_joints(rows, joints, state, walks, leaps, dt):
     """Doubt a joint that jumps alone, or that does not move in a walk; leaps as of _leaps."""
-    (count, wrong), reason = leaps, JUMPED
+    (count, wrong), reason = leaps, JOINT_JUMPED
     for k in range(joints.shape[1]):
         before = joints[2, k] if walks else 0.0
         joints[2, k] = 0.0 if joints[1, k] > 0.0 else before + dt
     if count == 0:
-        reason = STUCK
+        reason = JOINT_STUCK
         for row in rows:
-            if joints[2, row] > STEADY:
+            if joints[2, row] > STEADY_TIME:
                 count, wrong = count + 1, row
     if count == 1 and state.doubts[JOINTS] == 0:
         state.suspect, state.doubts[JOINTS] = wrong, reason
@@ -232,10 +234,10 @@ def _doubt_soles(links, measured, filled, state, mode, dt):
     """
     loads, used = measured.foot_forces[0], state.used
     if state.fallen or (state.balancing and mode == WALK):
-        state.settles = SETTLED
+        state.settles = SETTLE_TIME
         return
-    if max(used[IMU], used[JOINTS], used[FEET]) > substitutes.EXTRAPOLATED or (
-            min(loads[0], loads[1]) < LOADED * state.weight):
+    if max(used[IMU], used[JOINTS], used[FEET]) > substitutes.MAX_EXTRAPOLATION or (
+            min(loads[0], loads[1]) < MIN_SOLE_LOAD * state.weight):
         return
     tilts, smooth, usual = state.tilts[0], state.tilts[1], state.tilts[2]
     substitutes.sole_tilts(links, measured, filled, tilts)
@@ -246,27 +248,28 @@ def _doubt_soles(links, measured, filled, state, mode, dt):
     shifts = state.balancing and mode == SHIFT
     for leg in range(2):
         for k in range(2):
-            smooth[leg, k] += min(dt / COMPARED, 1.0) * (tilts[leg, k] - smooth[leg, k])
+            smooth[leg, k] += min(dt / COMPARISON_TIME, 1.0) * (tilts[leg, k] - smooth[leg, k])
             if not shifts:
-                usual[leg, k] += min(dt / USUAL, 1.0) * (tilts[leg, k] - usual[leg, k])
+                usual[leg, k] += min(dt / MEAN_TIME, 1.0) * (tilts[leg, k] - usual[leg, k])
     first = smooth[0, 0] - usual[0, 0], smooth[0, 1] - usual[0, 1]
     second = smooth[1, 0] - usual[1, 0], smooth[1, 1] - usual[1, 1]
     off = math.hypot(tilts[0, 0] - tilts[1, 0], tilts[0, 1] - tilts[1, 1])
-    apart = off > PARALLEL or (
-        shifts and math.hypot(first[0] - second[0], first[1] - second[1]) > TWISTED)
+    apart = off > MAX_SOLE_ANGLE or (
+        shifts and math.hypot(first[0] - second[0], first[1] - second[1]) > MAX_SOLE_TWIST)
     leaning = 0.5 * max(math.hypot(tilts[0, 0] + tilts[1, 0], tilts[0, 1] + tilts[1, 1]),
-                        FLAT / TURNED * math.hypot(first[0] + second[0], first[1] + second[1]))
-    uneven = apart or leaning > FLAT
+                        MAX_SOLE_LEAN / MAX_LEAN_CHANGE
+                        * math.hypot(first[0] + second[0], first[1] + second[1]))
+    uneven = apart or leaning > MAX_SOLE_LEAN
     state.uneven = state.uneven + dt if uneven or state.uneven < 0.0 else 0.0
     state.level = state.level + dt if state.crouching and not uneven else 0.0
-    if state.level > SEEN_LEVEL and state.leant:
+    if state.level > LEVEL_TIME and state.leant:
         state.leant, state.doubts[IMU] = False, 0
-    if state.uneven <= COMPARED or _doubted(state):
+    if state.uneven <= COMPARISON_TIME or _doubted(state):
         return
     if apart:
-        state.doubts[JOINTS], state.apart = UNEVEN, off
+        state.doubts[JOINTS], state.apart = SOLES_UNEVEN, off
     else:
-        state.doubts[IMU], state.leant = LEAN, True
+        state.doubts[IMU], state.leant = SOLES_LEAN, True
 
 
 @jit
@@ -278,11 +281,11 @@ def _doubt_feet(gait, laws, loads, state, dt):
             swung += loads[leg]
         else:
             stood += loads[leg]
-    contrary = state.used[FEET] < substitutes.EXTRAPOLATED and _passes(gait, laws) and (
-        swung > CONTRARY * stood)
+    contrary = state.used[FEET] < substitutes.MAX_EXTRAPOLATION and _passes(gait, laws) and (
+        swung > MAX_LOAD_RATIO * stood)
     state.contrary = state.contrary + dt if contrary else 0.0
-    if state.contrary > STEADY and state.doubts[FEET] == 0:
-        state.doubts[FEET] = AGAINST
+    if state.contrary > STEADY_TIME and state.doubts[FEET] == 0:
+        state.doubts[FEET] = CONTACTS_DISAGREE
 
 
 @jit
@@ -292,7 +295,8 @@ def _discount(state):
         state.suspect = -1
     for k in range(3):
         if state.doubts[k] > 0 and (k != JOINTS or state.suspect < 0):
-            state.used[k] = max(state.used[k], substitutes.EXTRAPOLATED + substitutes.ADOPTED)
+            state.used[k] = max(
+                state.used[k], substitutes.MAX_EXTRAPOLATION + substitutes.ADOPTION_TIME)
 
 
 @jit
@@ -307,7 +311,7 @@ def _is_near(joints, rows, pose, indices):
     off = 0.0
     for k in range(len(indices)):
         off = max(off, abs(joints[rows[k]] - pose[indices[k]]))
-    return off < NEAR
+    return off < MAX_POSE_ERROR
 
 
 @jit
@@ -324,26 +328,26 @@ def _ready_to_balance(state, lean, near, load, leaps, dt):
 
     """
     if state.balancing:
-        if lean > LEANS:
+        if lean > FALLEN_LEAN:
             _fall(state)
         elif leaps > 1:
             # A person moves more than one joint.
             _release(state)
         return False
-    if state.crouching and lean > LEANS and (
+    if state.crouching and lean > FALLEN_LEAN and (
             state.leant or not (state.failed or _doubted(state))):
         # A push has felled it, which made the soles lean or the IMU show no gravity.
         _fall(state)
-    if state.good < GOOD or state.lowers:
+    if state.good < RECOVERY_TIME or state.lowers:
         state.stood = 0.0
         return False
-    stands = lean < (CROUCHED if state.crouching else UPRIGHT) and near and (
-        load > BORNE * state.weight)
-    if TOPPLES < lean < UPRIGHT and not (stands or state.fallen or state.crouching):
+    stands = lean < (MAX_CROUCH_LEAN if state.crouching else MAX_STAND_LEAN) and near and (
+        load > MIN_FEET_LOAD * state.weight)
+    if TOPPLING_LEAN < lean < MAX_STAND_LEAN and not (stands or state.fallen or state.crouching):
         # Its feet do not show that it stands.
         state.crouching = True
     state.stood = state.stood + dt if stands and leaps == 0 else 0.0
-    return state.stood >= STEADY
+    return state.stood >= STEADY_TIME
 
 
 @jit
@@ -369,7 +373,7 @@ def _sense(biped, watch, dt):
         state.balancing, state.fallen, state.fraction, state.known = True, False, 0.0, True
         if state.crouching:
             # Soles rock while the robot rises.
-            state.uneven, state.crouching = -USUAL, False
+            state.uneven, state.crouching = -MEAN_TIME, False
 
 
 @jit
@@ -379,14 +383,14 @@ def _gives_up(gait, mode, laws, state, dt):
     A crouch that begins in a walk waits for the moment at which the body is over the foot
     that stands.
     """
-    stops = state.good < GOOD
+    stops = state.good < RECOVERY_TIME
     if not (stops or state.lowers or state.unseen):
         state.waited, state.failing, state.blind = 0.0, 0.0, False
         return not state.seen
     state.failing += dt
     state.waited = state.waited + dt if mode == STAND else 0.0
-    state.blind = state.blind or state.unseen or (stops and state.failing > PATIENCE)
-    return (not state.seen or state.waited > SETTLED
+    state.blind = state.blind or state.unseen or (stops and state.failing > STOP_TIMEOUT)
+    return (not state.seen or state.waited > SETTLE_TIME
             or (state.blind and (mode != WALK or _passes(gait, laws))))
 
 
@@ -396,7 +400,7 @@ def _decide(gait, mode, laws, state, dt):
     oldest = min(max(state.used[IMU], state.latencies[IMU]),
                  max(state.used[JOINTS], state.latencies[JOINTS]))
     # Nothing tells how the robot moves.
-    state.unseen = oldest > (LATE if state.failed else BLIND)
+    state.unseen = oldest > (BLIND_AGE_FAILED if state.failed else BLIND_AGE)
     wrong = state.failed or _doubted(state)
     state.good = 0.0 if wrong else state.good + dt
     if state.balancing and _gives_up(gait, mode, laws, state, dt):
@@ -411,12 +415,12 @@ def _decide(gait, mode, laws, state, dt):
 @jit
 def _read_command(velocity, state):
     """Fill the commanded velocity, m/s and rad/s, shape (3,); return whether the robot walks."""
-    walks = state.enabled and not (state.good < GOOD or state.lowers)
+    walks = state.enabled and not (state.good < RECOVERY_TIME or state.lowers)
     velocity[:] = state.command
     if not walks:
         velocity[:] = 0.0
-    velocity[1] = min(max(velocity[1], -ASIDE), ASIDE)
-    velocity[2] = min(max(velocity[2], -TURN), TURN)
+    velocity[1] = min(max(velocity[1], -MAX_SIDE_SPEED), MAX_SIDE_SPEED)
+    velocity[2] = min(max(velocity[2], -MAX_YAW_RATE), MAX_YAW_RATE)
     return walks
 
 
@@ -427,7 +431,7 @@ def _go_over(target, start, goal, indices, state, dt):
         if not math.isfinite(angle):
             _fall(state)
             return False
-    state.fraction = min(1.0, state.fraction + dt / TAKEOVER)
+    state.fraction = min(1.0, state.fraction + dt / TAKEOVER_TIME)
     for k in range(len(indices)):
         begin = start[indices[k]]
         goal[indices[k]] = begin + state.fraction * (target[k] - begin)
@@ -449,7 +453,7 @@ def _balance(biped, watch, dt):
     if not _go_over(target, watch.poses[START], watch.goal, watch.indices, state, dt):
         return False
     height = laws.center[0, 2] - min(soles[0, 2], soles[1, 2])
-    if height < LOW * (biped.gaits[own.gait].height - laws.crouch):
+    if height < FALLEN_HEIGHT * (biped.gaits[own.gait].height - laws.crouch):
         _fall(state)
     return True
 
@@ -458,19 +462,19 @@ def _balance(biped, watch, dt):
 def _hold(poses, position, goal, state, dt):
     """Fill the goal with the angles of the stand or the crouch, or those on the way to them."""
     pose, start = poses[CROUCH if state.crouching else REST], poses[START]
-    duration = LOWER if state.crouching else RETURN
+    duration = CROUCH_TIME if state.crouching else STAND_TIME
     if not state.holds or state.crouching != state.low:
         state.holds, state.low, state.time = True, state.crouching, 0.0
         start[:] = position
         for k in range(len(pose)):
-            if abs(pose[k] - start[k]) > JUMP:
-                state.settles = duration + SETTLED
+            if abs(pose[k] - start[k]) > MAX_JUMP:
+                state.settles = duration + SETTLE_TIME
     state.time += dt
     fraction, bracing = _smooth(min(state.time / duration, 1.0)), 0.0
     if state.crouching and state.braces:
-        bracing = _smooth(min(max(2.0 - state.time / LOWER, 0.0), 1.0))
+        bracing = _smooth(min(max(2.0 - state.time / CROUCH_TIME, 0.0), 1.0))
     for k in range(len(pose)):
-        end = pose[k] + bracing * poses[BRACED, k]
+        end = pose[k] + bracing * poses[CROUCH_OFFSET, k]
         goal[k] = start[k] + fraction * (end - start[k])
 
 
@@ -483,7 +487,7 @@ def balance(biped, watch, dt):
         swing_arms(biped.arms, own.gait, 0, False, dt)
         begins = state.holds or state.balancing
         state.holds = state.balancing = state.crouching = False
-        call_at(functions[LET_GO if begins else ADVANCE], watch.core, dt)
+        call_at(functions[RELEASE if begins else ADVANCE], watch.core, dt)
         return
     state.gap += watch.stall[0]
     watch.stall[0] = 0.0
@@ -521,25 +525,25 @@ def read_measurements(senses, sensors, legs, numbers, rows, watch):
         watch: Watch, changed in place.
 
     """
-    state, now, measured, inputs = watch.state[0], numbers[NOW], watch.measured, len(senses.news)
+    state, now, measured, inputs = watch.state[0], numbers[TIME], watch.measured, len(senses.news)
     if not state.wanted:
         return
     check_inputs(senses, sensors, legs, now, state.enabled)
     failed = waiting = refused = False
     for k in range(inputs):
         monitor = senses.monitors[k]
-        never = monitor[BELIEVED] == -math.inf
+        never = monitor[LAST_VALID] == -math.inf
         if is_out(monitor, now):
             failed, waiting = True, waiting or never
-        refused = refused or (never and monitor[WRONG] != 0.0)
+        refused = refused or (never and monitor[FAULT] != 0.0)
         if k < FEET:
-            state.ages[k], state.latencies[k] = now - monitor[BELIEVED], 0.0
-            if not math.isnan(monitor[MEASURED]):
-                state.latencies[k] = max(now - monitor[MEASURED], 0.0)
+            state.ages[k], state.latencies[k] = now - monitor[LAST_VALID], 0.0
+            if not math.isnan(monitor[LAST_STAMP]):
+                state.latencies[k] = max(now - monitor[LAST_STAMP], 0.0)
     # The oldest of the feet's inputs counts; with efforts as contacts, that of the joints.
-    state.ages[FEET] = now - senses.monitors[JOINTS, BELIEVED] if inputs == FEET else 0.0
+    state.ages[FEET] = now - senses.monitors[JOINTS, LAST_VALID] if inputs == FEET else 0.0
     for k in range(FEET, inputs):
-        state.ages[FEET] = max(state.ages[FEET], now - senses.monitors[k, BELIEVED])
+        state.ages[FEET] = max(state.ages[FEET], now - senses.monitors[k, LAST_VALID])
     for k in range(len(rows)):
         measured.joint_positions[0, rows[k]] = sensors.joint_positions[0, k]
         measured.joint_velocities[0, rows[k]] = sensors.joint_velocities[0, k]

@@ -22,7 +22,7 @@ from cpg_ros.feedback.biped.feedback import addresses, BipedFeedback
 from cpg_ros.feedback.biped.gains import WALK
 from cpg_ros.feedback.biped.substitutes import LastStride, Substitutes
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.feedback.input_checks import GOOD
+from cpg_ros.feedback.input_checks import RECOVERY_TIME
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.core import Core
 from cpg_ros.motion.pattern import GaitRunner, Pattern, shared, SHORTEST
@@ -70,7 +70,7 @@ class BalancedPattern(Pattern):
         """Stand; arguments as of Pattern, but a stride command has no effect."""
         self._record = np.zeros(1, compiled.STATE).view(np.recarray)
         self._state = self._record[0]
-        self._state.gap, self._state.good, self._state.suspect = math.inf, GOOD, -1
+        self._state.gap, self._state.good, self._state.suspect = math.inf, RECOVERY_TIME, -1
         self._feedback: BipedFeedback | None = None
         super().__init__(plan, ramp, enabled)
         self.ages, self.latencies = self._state.ages, self._state.latencies
@@ -99,7 +99,7 @@ class BalancedPattern(Pattern):
         joints, size = len(feedback.order), self.robot.order_indices.size
         rest = self._offset
         (low, depth), (leant, _) = (crouch_pose(self.robot, feedback.biped.links, behind)
-                                    or (rest, 0.0) for behind in (0.0, compiled.BEHIND))
+                                    or (rest, 0.0) for behind in (0.0, compiled.COM_OFFSET))
         self._state.depth = depth
         self._state.weight = GRAVITY * feedback.biped.links.masses.sum()
         self.watch = compiled.Watch(
@@ -139,7 +139,7 @@ class BalancedPattern(Pattern):
         if self._feedback is None:
             return {}
         joint, apart = self._feedback.order[max(self._state.suspect, 0)], self._state.apart
-        return {k: compiled.DOUBTS[code].format(joint=joint, apart=apart)
+        return {k: compiled.FAULT_TEXTS[code].format(joint=joint, apart=apart)
                 for k, code in enumerate(self._state.doubts.tolist()) if code}
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
@@ -180,7 +180,7 @@ class BalancedPattern(Pattern):
             return super().standing
         state = self._state
         if state.lowers and not self.fallen and (
-                self.balancing or state.time < compiled.LOWER + compiled.SETTLED):
+                self.balancing or state.time < compiled.CROUCH_TIME + compiled.SETTLE_TIME):
             return False
         return not (self.enabled or self.level)
 

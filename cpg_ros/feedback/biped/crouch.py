@@ -28,14 +28,15 @@ from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: LATERAL: least cosine between the axis of a joint that pitches a leg and the lateral axis.
-LATERAL = 0.9
-#: HALVINGS: bisections of the range of the hips, which give 1e-6 rad.
-HALVINGS = 22
-#: STEP: of central differences, rad.
-STEP = 1e-5
-#: BENT: bends of the knees that are tried, as fractions of their range, the most bent first.
-BENT = np.arange(1.0, 0.4, -0.05)
+#: MIN_COSINE: least cosine between the axis of a joint that pitches a leg and the lateral axis.
+MIN_COSINE = 0.9
+#: BISECTIONS: bisections of the range of the hips, which give 1e-6 rad.
+BISECTIONS = 22
+#: DIFFERENCE_STEP: of central differences, rad.
+DIFFERENCE_STEP = 1e-5
+#: KNEE_FRACTIONS: bends of the knees that are tried, as fractions of their range, the most bent
+#: first.
+KNEE_FRACTIONS = np.arange(1.0, 0.4, -0.05)
 
 
 def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
@@ -60,7 +61,7 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
     ahead_of_soles = _Ahead(links, behind)
     stand, legs = ahead_of_soles.height(angles), []
     for chain in links.chains:
-        pitching = [row - 1 for row in chain if abs(links.axes[row, 1]) > LATERAL]
+        pitching = [row - 1 for row in chain if abs(links.axes[row, 1]) > MIN_COSINE]
         if len(pitching) != 3:
             return None
         legs.append(pitching)
@@ -69,7 +70,7 @@ def crouch_pose(robot: Robot, links: Links, behind: float = 0.0
                               for name in names]) for key in ('lower', 'upper'))
     bent, high = angles[knees] > 0.0, angles[hips].min()
     angles[ankles] = np.where(bent, lower[ankles], upper[ankles])
-    for fraction in BENT:
+    for fraction in KNEE_FRACTIONS:
         angles[knees] = fraction * np.where(bent, upper[knees], lower[knees])
         if (_centre(ahead_of_soles, angles, hips, lower[hips].max(), high)
                 and ahead_of_soles.thighs_rise(angles)):
@@ -90,7 +91,7 @@ def _centre(ahead_of_soles: '_Ahead', angles: np.ndarray, hips: np.ndarray, low:
     angles[hips] = high
     if first * ahead_of_soles(angles) > 0.0:
         return False
-    for _ in range(HALVINGS):
+    for _ in range(BISECTIONS):
         angles[hips] = middle = 0.5 * (low + high)
         low, high = (middle, high) if first * ahead_of_soles(angles) > 0.0 else (low, middle)
     return True
@@ -101,7 +102,7 @@ class _Ahead:
 
     def __init__(self, links: Links, behind: float) -> None:
         self._links, self._pose, self._behind = links, blank_pose(links), behind
-        self._chain = [row for row in links.chains[0] if abs(links.axes[row, 1]) > LATERAL]
+        self._chain = [row for row in links.chains[0] if abs(links.axes[row, 1]) > MIN_COSINE]
         self._center, self._soles = np.zeros(6), np.zeros((2, 6))
         self._still = np.zeros(3), np.zeros(len(links.masses) - 1)
         self._weights = np.zeros(len(links.masses) - 1)
@@ -126,8 +127,8 @@ class _Ahead:
         torques, weight = np.zeros_like(angles), GRAVITY * self._links.masses.sum()
         for pair in pairs:
             step = np.zeros_like(angles)
-            step[pair] = STEP
-            torques[pair] = 0.5 * weight / (2.0 * STEP) * (
+            step[pair] = DIFFERENCE_STEP
+            torques[pair] = 0.5 * weight / (2.0 * DIFFERENCE_STEP) * (
                 self.height(angles + step) - self.height(angles - step))
         return torques
 

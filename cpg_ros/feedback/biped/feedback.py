@@ -21,7 +21,14 @@ from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.integration.compilation import specialised
 from cpg_ros.feedback.biped.gains import BipedGains, BipedMemory, GAIT
 from cpg_ros.feedback.biped.links import links_of
-from cpg_ros.feedback.biped.modes import advance, BipedArrays, ServoArrays, SLOTS, STATE, STOPPING
+from cpg_ros.feedback.biped.modes import (
+    advance,
+    BipedArrays,
+    NUM_SLOTS,
+    ServoArrays,
+    STATE,
+    STOP_SLOT,
+)
 from cpg_ros.feedback.biped.stepping import HOPS, RUNS, WALKS
 from cpg_ros.feedback.biped.support import Arms
 from cpg_ros.feedback.estimate import SensorData
@@ -107,16 +114,16 @@ class BipedFeedback:
         servos = ServoArrays(rows, np.array([chained.index(row) for row in rows]), kp, effort,
                              *np.zeros((2, len(rows))))
         state, gaits = (np.zeros(size, kind).view(np.recarray)
-                        for size, kind in ((1, STATE), (SLOTS, GAIT)))
-        self.biped = BipedArrays(links, gaits, Arms.of(robot, SLOTS), servos,
+                        for size, kind in ((1, STATE), (NUM_SLOTS, GAIT)))
+        self.biped = BipedArrays(links, gaits, Arms.of(robot, NUM_SLOTS), servos,
                                  addresses('cpg_track_advance', 'cpg_track_reseed'),
                                  BipedMemory.empty(links), np.zeros((2, 3)), state)
         self.state, self.arms = state[0], self.biped.arms
         self.pose, self.memory = self.biped.memory.pose, self.biped.memory.laws[0]
-        self.runners: list[GaitRunner | None] = [None] * SLOTS
-        self._put(STOPPING, GaitRunner(walk, 0.0))
-        self._put(STOPPING + 1, GaitRunner(plan, 0.0))
-        self.state.gait = self.state.goal = self.state.requested = STOPPING + 1
+        self.runners: list[GaitRunner | None] = [None] * NUM_SLOTS
+        self._put(STOP_SLOT, GaitRunner(walk, 0.0))
+        self._put(STOP_SLOT + 1, GaitRunner(plan, 0.0))
+        self.state.gait = self.state.goal = self.state.requested = STOP_SLOT + 1
         self._advance: Callable | None = None
 
     @property
@@ -173,7 +180,7 @@ class BipedFeedback:
 
         """
         state = self.state
-        slot = min({*range(SLOTS)} - {STOPPING, state.gait, state.goal, state.requested})
+        slot = min({*range(NUM_SLOTS)} - {STOP_SLOT, state.gait, state.goal, state.requested})
         self._put(slot, track)
         state.requested = slot
 

@@ -27,25 +27,26 @@ from cpg_ros.feedback.biped.tick import tick
 from cpg_ros.motion.core import Net, Track
 import numpy as np
 
-#: SHIFTING: duration of the shift of the weight to the second foot before the first step, s;
-#: FIRST_STEP: time from the begin of the shift to the first step, s.
-SHIFTING, FIRST_STEP = 0.8, 1.0
-#: RISING: speed at which a crouching robot stands up, m/s.
-RISING = 0.2
-#: A walk ends on two feet when the centre of mass is slower than twice STILL, m/s, and the error
-#: of the capture point is below CAUGHT, m.
-STILL, CAUGHT = 0.15, 0.05
-#: SLOWED: speed at which a run may become a walk, as a multiple of the fastest walk.
-SLOWED = 1.2
-#: STARTS: phase of the first leg's flexor, cycles, at which WALKS, RUNS and HOPS begin.
-STARTS = 0.75, 0.0, 0.5
-#: STOPPING: place among the gaits of the walk with which a run stops; SLOTS: places: for
+#: SHIFT_TIME: duration of the shift of the weight to the second foot before the first step, s;
+#: FIRST_STEP_TIME: time from the begin of the shift to the first step, s.
+SHIFT_TIME, FIRST_STEP_TIME = 0.8, 1.0
+#: RISE_SPEED: speed at which a crouching robot stands up, m/s.
+RISE_SPEED = 0.2
+#: A walk ends on two feet when the centre of mass is slower than twice STOP_SPEED, m/s, and the
+#: error of the capture point is below STOP_DCM_ERROR, m.
+STOP_SPEED, STOP_DCM_ERROR = 0.15, 0.05
+#: RUN_TO_WALK_RATIO: speed at which a run may become a walk, as a multiple of the fastest walk.
+RUN_TO_WALK_RATIO = 1.2
+#: START_PHASES: phase of the first leg's flexor, cycles, at which WALKS, RUNS and HOPS begin.
+START_PHASES = 0.75, 0.0, 0.5
+#: STOP_SLOT: place among the gaits of the walk with which a run stops; NUM_SLOTS: places: for
 #: that one, the gait in force, the gait wanted, the one requested, and a free one.
-STOPPING, SLOTS = 0, 5
+STOP_SLOT, NUM_SLOTS = 0, 5
 #: Indices of functions: they move a network by some strides, and put it on its orbit at a phase.
 MOVE, RESEED = range(2)
 #: Where a network's struct has its phase, and the addresses of the legs' phases and of the state.
-PHASE, LEGS, NOW = Track.phase.offset, Track.legs.offset, Track.net.offset + Net.now.offset
+PHASE_OFFSET, LEGS_OFFSET = Track.phase.offset, Track.legs.offset
+STATE_OFFSET = Track.net.offset + Net.now.offset
 
 #: State of a biped's feedback. mode: STAND, SHIFT or WALK; gait, goal, requested: place among the
 #: gaits of the one in force, the one wanted, and the one requested last; faults: how often the
@@ -81,7 +82,7 @@ class BipedArrays(NamedTuple):
 
     Attributes:
         links: of the robot.
-        gaits: GAIT in each place, shape (SLOTS,).
+        gaits: GAIT in each place, shape (NUM_SLOTS,).
         arms: of the robot.
         servos: of the robot.
         functions: addresses of C functions, see MOVE and RESEED.
@@ -123,7 +124,7 @@ def accept_request(gaits, functions, state):
     same = requested.name == now.name and state.gait == state.goal
     state.goal = state.requested
     if same:
-        call_at(functions[RESEED], requested.track, number_at(now.track + PHASE))
+        call_at(functions[RESEED], requested.track, number_at(now.track + PHASE_OFFSET))
         state.gait = state.goal
 
 
@@ -137,7 +138,7 @@ def _stops(gaits, state):
 @jit
 def _read_clock(gait, laws):
     """Fill the legs' phases, counted from lift-off."""
-    legs = whole_at(gait.track + LEGS)
+    legs = whole_at(gait.track + LEGS_OFFSET)
     for leg in range(2):
         laws.phases[leg] = (number_at(legs + 8 * leg) + 0.5 * (1.0 - gait.duty)) % 1.0
 
@@ -151,8 +152,8 @@ def _ends(gait, laws, half):
     both = (not (laws.swinging[0] or laws.swinging[1])
             and laws.fractions[0] > 0.0 and laws.fractions[1] > 0.0)
     return (gait.kind == WALKS and both and max(abs(target[0]), abs(target[1])) < 1e-6
-            and max(abs(center[0]), abs(center[1])) < 2.0 * STILL
-            and max(abs(error[0]), abs(error[1])) < CAUGHT)
+            and max(abs(center[0]), abs(center[1])) < 2.0 * STOP_SPEED
+            and max(abs(error[0]), abs(error[1])) < STOP_DCM_ERROR)
 
 
 @jit
@@ -160,14 +161,14 @@ def _change(gaits, functions, laws, soles, state, half):
     """Change between walk and run in the middle of a swing."""
     kind, slot = gaits[state.gait].kind, state.goal
     if _stops(gaits, state):
-        slot = STOPPING if kind == RUNS else state.gait
+        slot = STOP_SLOT if kind == RUNS else state.gait
     target = gaits[slot]
     if slot == state.gait or target.kind == HOPS:
         return
     if kind == RUNS:
         velocity, heading = laws.center[1], laws.heading
         forward = velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading)
-        if forward > SLOWED * target.fast:
+        if forward > RUN_TO_WALK_RATIO * target.fast:
             return
     for leg in range(2):
         if laws.swinging[leg] and laws.before[leg] < half <= laws.phases[leg]:
@@ -208,7 +209,7 @@ def _start(gaits, functions, laws, soles, state):
     laws.clock[0], laws.clock[1] = 1.0, 0.0
     laws.lift_off[:] = soles
     laws.ground = 0.5 * (soles[0, 2] + soles[1, 2])
-    call_at(functions[RESEED], gait.track, STARTS[gait.kind])
+    call_at(functions[RESEED], gait.track, START_PHASES[gait.kind])
     _go_on(gaits, functions, laws, soles, state)
 
 
@@ -219,7 +220,7 @@ def _choose(gaits, functions, laws, soles, state, dt):
         _go_on(gaits, functions, laws, soles, state)
         return
     state.time += dt
-    laws.crouch = max(0.0, laws.crouch - RISING * dt)
+    laws.crouch = max(0.0, laws.crouch - RISE_SPEED * dt)
     if state.mode == STAND:
         state.gait = state.goal
     if not state.walks:
@@ -227,7 +228,7 @@ def _choose(gaits, functions, laws, soles, state, dt):
     elif state.mode == STAND:
         if laws.crouch == 0.0:
             state.mode, state.time = SHIFT, 0.0
-    elif state.time >= FIRST_STEP:
+    elif state.time >= FIRST_STEP_TIME:
         _start(gaits, functions, laws, soles, state)
 
 
@@ -261,14 +262,14 @@ def advance(biped, sensors, dt):
     _limit(gaits, biped.velocities, state)
     gait = gaits[state.gait]
     tick(biped.links, gait, memory, sensors, biped.velocities[1], state.mode,
-         (dt, min(state.time / SHIFTING, 1.0), gait.kind))
+         (dt, min(state.time / SHIFT_TIME, 1.0), gait.kind))
     if state.mode == WALK:
         strides = laws.clock[1] + laws.clock[0] * gait.frequency * dt
         if call_at(functions[MOVE], gait.track, strides) == 0:
             state.faults += 1
-            call_at(functions[RESEED], gait.track, number_at(gait.track + PHASE))
+            call_at(functions[RESEED], gait.track, number_at(gait.track + PHASE_OFFSET))
     # In a run the same swing costs more than it saves.
-    swing_arms(biped.arms, state.gait, whole_at(gait.track + NOW),
+    swing_arms(biped.arms, state.gait, whole_at(gait.track + STATE_OFFSET),
                state.mode == WALK and gait.kind == WALKS, dt)
     servos, size = biped.servos, memory.torque.shape[1]
     for k in range(len(servos.kp)):

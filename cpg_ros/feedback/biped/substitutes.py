@@ -44,25 +44,26 @@ import numpy as np
 
 #: Inputs in the order of their ages.
 IMU, JOINTS, FEET = range(3)
-#: EXTRAPOLATED: age, s, up to which a measurement is extrapolated by its rate; later it is
+#: MAX_EXTRAPOLATION: age, s, up to which a measurement is extrapolated by its rate; later it is
 #: replaced.
-EXTRAPOLATED = 0.05
-#: PROMPT: age, s, above which a measurement that has just arrived is extrapolated, too.
-PROMPT = 0.008
-#: FOLLOWED: rate at which a predicted sole approaches its path, 1/s; DAMPED: damping of the least
-#: squares that give the rates of the joints.
-FOLLOWED, DAMPED = 20.0, 1e-3
-#: FASTEST: largest rate of a predicted joint, rad/s.
-FASTEST = 15.0
-#: LEANT: age of the inertial unit, s, from which on a sole stands for it, where joints are known.
-LEANT = 0.025
-#: ADOPTED: duration of the transition to orientation and angular velocity from the sole, s.
-ADOPTED = 0.02
+MAX_EXTRAPOLATION = 0.05
+#: MIN_EXTRAPOLATION: age, s, above which a measurement that has just arrived is extrapolated, too.
+MIN_EXTRAPOLATION = 0.008
+#: PATH_GAIN: rate at which a predicted sole approaches its path, 1/s; DAMPING: damping of the
+#: least squares that give the rates of the joints.
+PATH_GAIN, DAMPING = 20.0, 1e-3
+#: MAX_JOINT_SPEED: largest rate of a predicted joint, rad/s.
+MAX_JOINT_SPEED = 15.0
+#: MAX_IMU_AGE: age of the inertial unit, s, from which on a sole stands for it, where joints are
+#: known.
+MAX_IMU_AGE = 0.025
+#: ADOPTION_TIME: duration of the transition to orientation and angular velocity from the sole, s.
+ADOPTION_TIME = 0.02
 
 
-#: KEPT: ticks that are kept of the last stride; SAME: largest difference of a kept tick's phase
-#: from the present one, cycles.
-KEPT, SAME = 512, 0.02
+#: NUM_TICKS: ticks that are kept of the last stride; PHASE_TOLERANCE: largest difference of a kept
+#: tick's phase from the present one, cycles.
+NUM_TICKS, PHASE_TOLERANCE = 512, 0.02
 
 
 class LastStride(NamedTuple):
@@ -72,8 +73,8 @@ class LastStride(NamedTuple):
     each other, which no prediction of a moment later does.
 
     Attributes:
-        commands: of the legs' joints in ``robot.order``, rad, shape (KEPT, joints).
-        phases: of the first leg at these, cycles, infinite for none, shape (KEPT,).
+        commands: of the legs' joints in ``robot.order``, rad, shape (NUM_TICKS, joints).
+        phases: of the first leg at these, cycles, infinite for none, shape (NUM_TICKS,).
         row: that comes next, shape (1,).
 
     """
@@ -85,7 +86,7 @@ class LastStride(NamedTuple):
     @classmethod
     def empty(cls, joints: int) -> 'LastStride':
         """Return one without any command."""
-        return cls(np.zeros((KEPT, joints)), np.full(KEPT, math.inf),
+        return cls(np.zeros((NUM_TICKS, joints)), np.full(NUM_TICKS, math.inf),
                    np.zeros(1, dtype=np.int64))
 
 
@@ -109,14 +110,14 @@ def record(stride, mode, kind, phase, position, indices):
     for k in range(len(indices)):
         stride.commands[row, k] = position[indices[k]]
     stride.phases[row] = phase
-    stride.row[0] = (row + 1) % KEPT
+    stride.row[0] = (row + 1) % NUM_TICKS
 
 
 @jit
 def replay(stride, phase, command):
     """Replace a command, rad, shape (joints,), by the stored one nearest in phase, cycles."""
-    nearest, row = SAME, -1
-    for k in range(KEPT):
+    nearest, row = PHASE_TOLERANCE, -1
+    for k in range(NUM_TICKS):
         if math.isfinite(stride.phases[k]):
             off = abs((stride.phases[k] - phase + 0.5) % 1.0 - 0.5)
             if off < nearest:
@@ -185,19 +186,20 @@ def fill(links, measured, known, memory, own, dt):
     else:
         _take_joints(links, latencies[JOINTS], memory, known.suspect, measured, own, dt)
     time = max(ages[IMU], latencies[IMU])
-    if late_imu or time > PROMPT:
-        _turn(measured, sensors.rpy[0], min(time, EXTRAPOLATED))
-    begins = EXTRAPOLATED if late_joints else LEANT
+    if late_imu or time > MIN_EXTRAPOLATION:
+        _turn(measured, sensors.rpy[0], min(time, MAX_EXTRAPOLATION))
+    begins = MAX_EXTRAPOLATION if late_joints else MAX_IMU_AGE
     if ages[IMU] > begins:
         # In a stand, one that arrives but is not believed may be that of a robot on its edges.
-        pushed = latencies[IMU] < LEANT and not (laws.swinging[0] or laws.swinging[1])
-        _lean_on_sole(links, memory, own, min((ages[IMU] - begins) / ADOPTED, 1.0), dt, pushed)
+        pushed = latencies[IMU] < MAX_IMU_AGE and not (laws.swinging[0] or laws.swinging[1])
+        _lean_on_sole(links, memory, own, min((ages[IMU] - begins) / ADOPTION_TIME, 1.0), dt,
+                      pushed)
     if late_imu and late_joints:
         # Neither input tells how the base turns: let its angular velocity fade.
-        fading = max(1.0 - min(ages[IMU], ages[JOINTS], ages[FEET]) / EXTRAPOLATED, 0.0)
+        fading = max(1.0 - min(ages[IMU], ages[JOINTS], ages[FEET]) / MAX_EXTRAPOLATION, 0.0)
         for k in range(3):
             sensors.angular_velocity[0, k] *= fading
-    if ages[FEET] > EXTRAPOLATED:
+    if ages[FEET] > MAX_EXTRAPOLATION:
         weight = GRAVITY * memory.pose.carried[0]
         for leg in range(2):
             sensors.foot_forces[0, leg] = (0.0 if laws.swinging[leg]
@@ -219,7 +221,7 @@ def sole_tilts(links, sensors, own, tilts):
 def _take_joints(links, latency, memory, suspect, measured, own, dt):
     """Use the joints as measured a latency in s ago, except the suspect."""
     angles, rates = own.sensors.joint_positions[0], own.sensors.joint_velocities[0]
-    ahead = min(latency, EXTRAPOLATED) if latency > PROMPT else 0.0
+    ahead = min(latency, MAX_EXTRAPOLATION) if latency > MIN_EXTRAPOLATION else 0.0
     predicted, rate = 0.0, 0.0
     if suspect >= 0:
         _move(links, memory, own, dt)
@@ -259,14 +261,14 @@ def _move(links, memory, own, dt):
         for k in range(3):
             system[k, 6], system[3 + k, 6] = -(laws.velocity[k] + turned[k]), -laws.turning[k]
             if laws.swinging[leg]:
-                system[k, 6] += laws.path[1, k] + FOLLOWED * (laws.path[0, k] - sole[k])
+                system[k, 6] += laws.path[1, k] + PATH_GAIN * (laws.path[0, k] - sole[k])
         for j in range(len(chain)):
             moved, axis = column(pose, chain[j], sole), pose.axes[chain[j]]
             for k in range(3):
                 columns[j, k], columns[j, 3 + k] = moved[k], axis[k]
         for row in range(6):
             for k in range(6):
-                system[row, k] = DAMPED if row == k else 0.0
+                system[row, k] = DAMPING if row == k else 0.0
                 for j in range(len(chain)):
                     system[row, k] += columns[j, row] * columns[j, k]
         _solve(system)
@@ -276,7 +278,7 @@ def _move(links, memory, own, dt):
                 rate += columns[j, k] * system[k, 6]
             rates[chain[j] - 1] = rate
     for k in range(len(rates)):
-        own.angles[k] += dt * min(max(rates[k], -FASTEST), FASTEST)
+        own.angles[k] += dt * min(max(rates[k], -MAX_JOINT_SPEED), MAX_JOINT_SPEED)
     own.sensors.joint_positions[0] = own.angles
 
 

@@ -24,20 +24,20 @@ from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.substitutes import FEET
 from cpg_ros.feedback.closed_loop import (
-    CONTRARY,
+    CONTACTS_DISAGREE,
     FRACTION,
     Instant,
     LoopData,
     MOUNT,
-    NOW,
-    SPENT,
-    WANTED,
+    OFF_TIME,
+    REQUESTED,
+    TIME,
 )
 from cpg_ros.feedback.estimate import Odometry
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, Memory
 from cpg_ros.feedback.kinematics import Geometry
-from cpg_ros.feedback.leg_rates import MOUNTED
+from cpg_ros.feedback.leg_rates import MOUNT_TEXTS
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.ros.feedback.sensor_input import SensorInput
@@ -169,11 +169,11 @@ class FeedbackLoop(SensorLoop):
     @property
     def wanted(self) -> bool:
         """Whether the feedback is enabled."""
-        return self._state[WANTED] > 0.0
+        return self._state[REQUESTED] > 0.0
 
     @wanted.setter
     def wanted(self, wanted: bool) -> None:
-        self._state[WANTED] = wanted
+        self._state[REQUESTED] = wanted
 
     @property
     def fraction(self) -> float:
@@ -201,7 +201,7 @@ class FeedbackLoop(SensorLoop):
         """Start again, as where simulated time jumps back."""
         wanted = self.wanted
         self._state[:] = 0.0
-        self._state[[WANTED, SPENT]] = wanted, math.inf
+        self._state[[REQUESTED, OFF_TIME]] = wanted, math.inf
         self.feedback.reset()
         self.inputs.restart()
         self._data.rates[0][:] = 0.0
@@ -221,14 +221,14 @@ class FeedbackLoop(SensorLoop):
     def faults(self) -> str:
         """Faults that interrupt it, such as 'imu: no messages for 3.2 s'; none while active."""
         inputs, plan = self.inputs, self._pattern.plan
-        reasons, _ = inputs.faults(self._instant.numbers[NOW])
-        if mounted := MOUNTED[int(self._state[MOUNT])]:
+        reasons, _ = inputs.faults(self._instant.numbers[TIME])
+        if mounted := MOUNT_TEXTS[int(self._state[MOUNT])]:
             reasons.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
                          f'legs on the ground: it seems to be mounted {mounted} '
                          '(feedback.imu_mount)')
         if plan.motion.efference is None:
             reasons.append(f"the robot file has no efference copy of the gait '{plan.name}'")
-        if self._state[CONTRARY]:
+        if self._state[CONTACTS_DISAGREE]:
             reasons.append(f'{inputs.feet}: the contacts do not go with the gait')
         return '; '.join(reasons)
 
@@ -303,7 +303,7 @@ class BalanceLoop(SensorLoop):
     def faults(self) -> str:
         """Faults of the inputs, such as 'imu: no messages for 3.2 s'; '' for none."""
         inputs = self.inputs
-        faults, _ = inputs.faults(self._numbers[NOW])
+        faults, _ = inputs.faults(self._numbers[TIME])
         faults += [f'{inputs.feet if k == FEET else inputs.monitors[k].name}: {why}'
                    for k, why in self._pattern.doubts.items()]
         return '; '.join(faults)

@@ -24,7 +24,7 @@ from cpg_ros.feedback.closed_loop import (
     CONTACTS,
     EFFORTS,
     FOOT_CONTACTS,
-    FORCE,
+    FORCE_SIZE,
     Senses,
     WRENCHES,
 )
@@ -239,7 +239,8 @@ class SensorInput:
         self.inputs[0].expect(DOUBLE * (np.arange(IMU) - IMU), -(HEADER + DOUBLE * IMU))
         for source in self.inputs[2:]:
             if contacts == WRENCHES:
-                source.expect(DOUBLE * (np.arange(FORCE) - WRENCH), -(HEADER + DOUBLE * WRENCH))
+                source.expect(DOUBLE * (np.arange(FORCE_SIZE) - WRENCH),
+                              -(HEADER + DOUBLE * WRENCH))
         self.monitors: Sequence[InputMonitor] = [source.monitor for source in self.inputs]
         self.joints = self.monitors[1]
         self._library = native.library()

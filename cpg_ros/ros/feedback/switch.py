@@ -26,7 +26,7 @@ from cpg_ros.feedback.closed_loop import CONTACTS
 from cpg_ros.feedback.estimate import Odometry, SCALE
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS, leg_length, robot_gains, shorter_times
-from cpg_ros.feedback.input_checks import DELAYED, LATE, LATE_BALANCE
+from cpg_ros.feedback.input_checks import MAX_AGE, MAX_AGE_BALANCE, MAX_STAMP_OFFSET
 from cpg_ros.feedback.kinematics import Geometry, geometry_of, GRAVITY
 from cpg_ros.feedback.laws.law import Gain
 from cpg_ros.motion.body_file import GAIT_SPEEDS
@@ -71,11 +71,11 @@ TOPICS = fixed({
     f'{PREFIX}imu_mount': Spec([0.0, 0.0, 0.0], "roll, pitch and yaw of the IMU's frame in that "
                                'of the base [rad], as in the origin of its URDF joint; by default '
                                'that of the robot file'),
-    f'{PREFIX}max_delay': Spec(LATE, 'largest age of measurements when they are used, by their '
+    f'{PREFIX}max_delay': Spec(MAX_AGE, 'largest age of measurements when they are used, by their '
                                'stamps [s]: feedback fades out above it; '
-                               f"by default {LATE:g}, less for legs shorter than a Go2's, and "
-                               f'{LATE_BALANCE:g} for a robot with soles',
-                               0.001, DELAYED),
+                               f"by default {MAX_AGE:g}, less for legs shorter than a Go2's, and "
+                               f'{MAX_AGE_BALANCE:g} for a robot with soles',
+                               0.001, MAX_STAMP_OFFSET),
     f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, computed from the '
                                     "robot's legs and IMU, such as odom; none by default"),
     f'{PREFIX}odometry_scale': Spec(1.0, 'true distance divided by odometry distance, for this '
@@ -119,7 +119,7 @@ def specs(robot: Robot) -> dict[str, Spec]:
     """
     mount = robot.feedback.imu_mount if robot.feedback is not None else ()
     short = 1.0 if robot.geometry is None else shorter_times(leg_length(geometry_of(robot)))
-    latest = LATE_BALANCE if robot.biped is not None else round(LATE * short, 4)
+    latest = MAX_AGE_BALANCE if robot.biped is not None else round(MAX_AGE * short, 4)
     topics = {**TOPICS, **{f'{PREFIX}{name}': replace(TOPICS[f'{PREFIX}{name}'], default=value)
                            for name, value in (('imu_mount', list(mount) or [0.0] * 3),
                                                ('max_delay', latest))}}

@@ -26,7 +26,7 @@ from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.common.files import read_bytes
 from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS, SPEEDS
 from cpg_ros.feedback.estimate import BodyState, SensorData
-from cpg_ros.feedback.gait_tables import POINTS, Timetable
+from cpg_ros.feedback.gait_tables import NUM_PHASES, Timetable
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.fitting.gaits.stride import find_stride
 from cpg_ros.fitting.recordings.recording import Recording
@@ -130,13 +130,13 @@ def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Seque
     still = table.in_place[:, columns]
     parts = [part - part.mean(axis=0) for part in (still, table.angles[:, columns] - still)]
     target = mean - mean.mean(axis=0)
-    left = np.empty(POINTS)
-    for k in range(POINTS):
-        bins = np.round(theta * POINTS).astype(int) + k
-        rows = np.stack([part[bins % POINTS].ravel() for part in parts], axis=1)
+    left = np.empty(NUM_PHASES)
+    for k in range(NUM_PHASES):
+        bins = np.round(theta * NUM_PHASES).astype(int) + k
+        rows = np.stack([part[bins % NUM_PHASES].ravel() for part in parts], axis=1)
         weights, *_ = np.linalg.lstsq(rows, target.ravel(), rcond=None)
         left[k] = np.square(rows @ weights - target.ravel()).sum() if weights[0] > 0.0 else np.inf
-    return float(left.argmin()) / POINTS
+    return float(left.argmin()) / NUM_PHASES
 
 
 def with_efference(robot: Robot, calibrated: Sequence[Calibrated]) -> Robot:

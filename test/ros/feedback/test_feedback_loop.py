@@ -21,7 +21,7 @@ from c_ticks import CTicks
 from cpg_ros.feedback.closed_loop import check_inputs
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.input_checks import FADE, GOOD, STALE
+from cpg_ros.feedback.input_checks import FADE, MAX_SILENCE, RECOVERY_TIME
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.strides import StrideCommand
@@ -191,10 +191,11 @@ def test_a_wrong_input_takes_the_feedback_out_and_it_comes_back(monkeypatch, cal
     untold = topic == 'foot_contacts' and how == 'delayed'
     # Ten times a foot that hardly stands is nothing impossible.
     late = 0.8 if untold else 0.02 if (topic, how) == ('foot_contacts', 'scaled') else 0.0
-    out = begins + round((STALE + FADE + 3 * DT + late) / DT)
+    out = begins + round((MAX_SILENCE + FADE + 3 * DT + late) / DT)
     assert fraction[begins - 1] == 1.0 and (fraction[out:ends] == 0.0).all()
     if not untold:
-        assert fraction[ends + round((GOOD + FADE) / DT) + 5] == 1.0 and not robot.loop.faults
+        whole = ends + round((RECOVERY_TIME + FADE) / DT) + 5
+        assert fraction[whole] == 1.0 and not robot.loop.faults
     assert np.abs(np.diff(fraction)).max() < 1.6 * DT / FADE
     # No jerk: nothing is faster, or changes its speed faster, than where nothing is wrong.
     _, usual = calm
