@@ -123,7 +123,8 @@ def measure(job: Job) -> tuple[Job, dict[str, float]]:
     assert robot.biped is not None
     gains = BipedGains.of({**robot.biped.gains, **ABLATIONS.get(job.ablation, {})}, job.gait)
     feedback = (Metronome if job.ablation == EVEN else BipedFeedback)(
-        robot, gains, gait_plan(robot, job.gait))
+        robot, gait_plan(robot, job.gait))
+    feedback.set_gains(job.gait, gains)
     pushes: tuple[tuple[float, float, float], ...] = ()
     if job.impulse:
         direction, phase = divmod(job.number, PHASES)

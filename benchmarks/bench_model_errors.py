@@ -128,8 +128,14 @@ ROWS: dict[str, Row] = {
 #: Rows of a biped, by changes of its sensors' noise; duration of each run, s.
 BIPED: dict[str, dict[str, float]] = {
     'as modelled': {},
-    **{f'IMU tilted by {size:g} rad': {'orientation_bias': size} for size in (0.02, 0.04)},
-    **{f'sensors {late:g} ms late': {'delay': 1e-3 * late} for late in (10, 14, 20)}}
+    **{f'roll and pitch wrong by {size:g} rad': {'orientation_bias': size}
+       for size in (0.02, 0.04)},
+    'IMU mounted at a tilt of 0.04 rad': {'imu_tilt': 0.04},
+    **{f'sensors {late:g} ms late': {'delay': 1e-3 * late} for late in (10, 14, 20)},
+    'roll and pitch wrong by 0.04 rad, sensors 14 ms late': {'orientation_bias': 0.04,
+                                                             'delay': 0.014},
+    'IMU mounted at a tilt of 0.04 rad, sensors 14 ms late': {'imu_tilt': 0.04, 'delay': 0.014},
+    'a foot sensor stuck at 100 N': {'stuck': 100.0}}
 BIPED_WALK = 12.0
 
 

@@ -112,7 +112,9 @@ class NoisySenses:
         self._later = round(noise.delay / dt)
         self._waiting: list[SensorData] = []
         self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
-        self._tilt = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
+        signs = self._rng.choice([-1.0, 1.0], (runs, 2))
+        self._bias = (noise.orientation_bias + noise.imu_tilt) * signs
+        self._tilt = noise.imu_tilt * np.column_stack([signs, np.zeros(runs)])
 
     def __call__(self, true: SensorData) -> SensorData:
         """Return the data that arrives now."""
@@ -122,10 +124,13 @@ class NoisySenses:
         if noise.stuck is not None:
             loads[:, 0] = noise.stuck
         rpy = true.rpy.copy()
-        rpy[:, :2] += self._tilt
-        angular_velocity = (true.angular_velocity + noise.gyroscope_bias
+        rpy[:, :2] += self._bias
+        # Vectors in the axes of a unit that is tilted by a small angle.
+        turning, faster = (vectors + np.cross(vectors, self._tilt) if noise.imu_tilt else vectors
+                           for vectors in (true.angular_velocity, true.acceleration))
+        angular_velocity = (turning + noise.gyroscope_bias
                             + noise.gyroscope_noise * rng.normal(size=rpy.shape))
-        acceleration = true.acceleration + noise.accelerometer_bias
+        acceleration = faster + noise.accelerometer_bias
         if noise.accelerometer_noise:
             acceleration += noise.accelerometer_noise * rng.normal(size=rpy.shape)
         self._waiting.append(SensorData(true.joint_positions.copy(), true.joint_velocities.copy(),

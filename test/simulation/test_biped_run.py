@@ -59,6 +59,22 @@ def test_it_walks_as_fast_as_it_is_told(name, speed):
     assert found.steps > 28 and found.tilt < 0.3
 
 
+@pytest.mark.parametrize('error', ['orientation_bias', 'imu_tilt'])
+@pytest.mark.parametrize('name', ['humanoid', 'unitree_g1'])
+def test_it_finds_the_roll_of_a_tilted_imu_and_walks_straight(name, error):
+    run = runner(name)
+    run.noise = replace(NOISE, **{error: 0.04})
+    try:
+        for seed in (3, 5):
+            feedback = BipedFeedback(run.robot)
+            found = run.run(10.0, ((1.0, 0.3, 0.0, 0.0),), feedback=feedback, seed=seed)
+            assert math.isinf(found.fell)
+            assert abs(found.speed[1]) < 0.05
+            assert abs(abs(feedback.memory.roll_error) - 0.04) < 0.012
+    finally:
+        run.noise = NOISE
+
+
 def test_the_cost_of_transport_counts_all_motors_and_no_work_that_joints_give_back(monkeypatch):
     run, work = runner(), []
     body, step = run.body, run.body.step

@@ -61,3 +61,17 @@ def test_the_seed_draws_the_signs_of_the_bias_of_roll_and_pitch():
     assert np.abs(list(tilts.values())) == pytest.approx(0.02, abs=1e-4)
     assert {tuple(np.sign(tilt)) for tilt in tilts.values()} == {
         (a, b) for a in (-1.0, 1.0) for b in (-1.0, 1.0)}
+
+
+def test_a_tilted_unit_shows_gravity_and_turning_in_its_own_axes():
+    """Its orientation and its accelerometer agree, unlike those of a biased filter."""
+    body = Body('go2', ROBOT)
+    body.rates[3:] = 0.0, 0.0, 1.0
+    for seed in range(4):
+        x, y, z, w, *vectors = SimulatedSensors(
+            body, 0.002, SensorNoise(imu_tilt=0.02, seed=seed)).measure(0)[1]
+        # The vertical in the unit's axes, by its orientation.
+        up = np.array([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)])
+        assert np.abs(up[:2]) == pytest.approx(0.02, abs=1e-3)
+        assert vectors[:3] == pytest.approx(up, abs=1e-3)
+        assert np.array(vectors[3:])[:2] / 9.81 == pytest.approx(up[:2], abs=2e-3)

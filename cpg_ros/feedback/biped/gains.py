@@ -50,14 +50,17 @@ STAND, SHIFT, WALK = 0, 1, 2
 #: the weight that each leg is to bear; dcm_error: of the capture point, forward and left, m;
 #: force: that the ground is to exert on all feet, N; reaction: moment that the swing leg takes, N
 #: m; path: of a swinging foot, scratch; clock: factor of the clock, and by how much it is to leap,
-#: cycles; crouch: how much lower than usual the centre of mass is to be, m.
+#: cycles; crouch: how much lower than usual the centre of mass is to be, m; rpy: roll, pitch and
+#: yaw of the base, rad; roll_error: of the measured roll, rad; left_speed: of the centre of mass,
+#: m/s.
 LAWS = np.dtype([
     *((name, float, shape) for name, shape in (
         ('velocity', 3), ('center', (2, 3)), ('turning', 3), ('soles', (2, 6)), ('loads', 2),
         ('wanted', 2), ('phases', 2), ('before', 2), ('lift_off', (2, 3)), ('target', (2, 3)),
         ('fractions', 2), ('dcm_error', 2), ('force', 3), ('reaction', 3), ('path', (3, 3)),
-        ('clock', 2))),
-    *((name, float) for name in ('heading', 'integral', 'ground', 'crouch')),
+        ('clock', 2), ('rpy', 3))),
+    *((name, float) for name in ('heading', 'integral', 'ground', 'crouch', 'roll_error',
+                                 'left_speed')),
     ('swinging', np.int8, 2), ('landed', np.int8, 2)])
 
 

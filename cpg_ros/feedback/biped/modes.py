@@ -110,7 +110,7 @@ def stand_anew(laws, state, weight, crouch):
     laws.phases[:] = laws.dcm_error[:] = laws.reaction[:] = laws.before[:] = 0.0
     laws.center[:] = laws.lift_off[:] = laws.target[:] = 0.0
     laws.soles[:], laws.path[:], laws.fractions[:] = 0.0, 0.0, 0.5
-    laws.heading = laws.integral = laws.ground = 0.0
+    laws.heading = laws.integral = laws.ground = laws.roll_error = laws.left_speed = 0.0
     laws.swinging[:] = laws.landed[:] = False
     laws.force[0], laws.force[1], laws.force[2] = 0.0, 0.0, weight
     laws.clock[0], laws.clock[1], laws.crouch = 1.0, 0.0, crouch

@@ -307,7 +307,8 @@ def _lean_on_sole(links, memory, own, fraction, dt, pushed):
     sole_velocity(links, pose, leg, still, rates, own.sole)
     # The base seen from the sole: the sole's rotation from the base, transposed.
     turned = pose.rotations[links.chains[leg, -1]]
-    rpy[0] += fraction * (math.atan2(turned[1, 2], turned[2, 2]) - rpy[0])
+    # As the inertial unit would measure it, whose roll error the laws subtract.
+    rpy[0] += fraction * (math.atan2(turned[1, 2], turned[2, 2]) + laws.roll_error - rpy[0])
     rpy[1] += fraction * (math.asin(-min(max(turned[0, 2], -1.0), 1.0)) - rpy[1])
     rpy[2] = laws.heading
     for k in range(3):

@@ -71,6 +71,39 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
                                    + second * (soles[1, k] + velocity[k]))
 
 
+# Roll error of an inertial unit that is tilted, or whose filter is biased.
+
+#: LEVELLED, STOOD: time constants in a walk and in a stand, s; STEEPEST: largest error, rad.
+LEVELLED, STOOD, STEEPEST = 2.0, 0.7, 0.06
+#: WHOLE: by how much the loads of two feet may differ from the weight, as a fraction of it; LIGHT:
+#: least fraction on each.
+WHOLE, LIGHT = 0.1, 0.1
+
+
+@jit
+def show_balance(loads):
+    """Return whether the measured loads, fractions of the weight, are those of two feet."""
+    return abs(loads[0] + loads[1] - 1.0) < WHOLE and min(loads[0], loads[1]) > LIGHT
+
+
+@jit
+def roll_error(error, lean, faster, step):
+    """Return the roll error of the inertial unit, rad, a tick later.
+
+    The centre of mass moves as c'' = g (c - p) / h by the centre of pressure p. A roll measured
+    too large by e puts it to the right by h e: e' = (c'' / g - (c - p) / h) / time approaches e.
+
+    Args:
+        error: a tick earlier, rad.
+        lean: (c - p) / h to the left, with that error subtracted.
+        faster: change of the centre of mass's speed to the left, m/s.
+        step: duration of the tick, s, and the time constant, s.
+
+    """
+    dt, time = step
+    return min(max(error + (faster / GRAVITY - dt * lean) / time, -STEEPEST), STEEPEST)
+
+
 @jit
 def _trust(sole, load, velocity):
     """Return the weight of a sole in the velocity, 0 to 1: 1 if it bears load and is still.

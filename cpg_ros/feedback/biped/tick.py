@@ -38,7 +38,9 @@ def _sense(links, gains, memory, sensors, dt):
     """Fill pose, velocities and loads from the measurements."""
     laws = memory.laws[0]
     pose, rates, weight = memory.pose, sensors.joint_velocities[0], GRAVITY
-    place(links, sensors.rpy[0], sensors.joint_positions[0], pose)
+    laws.rpy[:] = sensors.rpy[0]
+    laws.rpy[0] -= laws.roll_error
+    place(links, laws.rpy, sensors.joint_positions[0], pose)
     weight *= pose.carried[0]
     for k in range(3):
         laws.turning[k] = carry(pose.rotations[0], sensors.angular_velocity[0], k)
@@ -161,6 +163,31 @@ def _fly(links, gains, memory, axes, kind, dt):
 
 
 @jit
+def _level(memory, axes, fractions, aside, step):
+    """Update the roll error of the inertial unit.
+
+    Args:
+        memory: BipedMemory, changed in place.
+        axes: cosine and sine of the heading.
+        fractions: of the weight on each foot, shape (2,).
+        aside: place of the pressure in the soles, to the left of their middles, m.
+        step: time since the last tick, s, and the time constant, s; infinite for no change.
+
+    """
+    laws = memory.laws[0]
+    center, velocity, soles, (c, s) = laws.center[0], laws.center[1], memory.pose.soles, axes
+    left, height = -aside, 0.0
+    for leg in range(2):
+        x, y = center[0] - soles[leg, 0], center[1] - soles[leg, 1]
+        left += fractions[leg] * (c * y - s * x)
+        height += fractions[leg] * (center[2] - soles[leg, 2])
+    speed = c * velocity[1] - s * velocity[0]
+    laws.roll_error = support.roll_error(laws.roll_error, left / max(height, 0.3),
+                                         speed - laws.left_speed, step)
+    laws.left_speed = speed
+
+
+@jit
 def _upward(gains, memory, mass, mode, kind, level):
     """Return the upward force on all legs, N; level of the soles that bear."""
     laws = memory.laws[0]
@@ -193,8 +220,8 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
     cop = (a * points[0][0] + b * points[1][0], a * points[0][1] + b * points[1][1],
            a * points[0][2] + b * points[1][2])
     up = _upward(gains, memory, pose.carried[0], mode, kind, a * first[2] + b * second[2])
-    x, y, z = support.attitude_moment(sensors.rpy[0], laws.turning,
-                                     wrapped(laws.heading - sensors.rpy[0, 2]),
+    x, y, z = support.attitude_moment(laws.rpy, laws.turning,
+                                     wrapped(laws.heading - laws.rpy[2]),
                                      laws.reaction, gains)
     # Feet that bear little cannot turn the body.
     firm = 1.0 if kind == stepping.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
@@ -275,7 +302,11 @@ def tick(links, gains, memory, sensors, command, mode, step):
         laws.integral = stepping.integrate(laws.integral, laws.wanted[0] - ahead, dt)
         shift = (support.cop_shift(laws.dcm_error, links.half, gains) if kind == stepping.WALKS
                  else (0.0, 0.0))
+        _level(memory, axes, laws.fractions, shift[1],
+               (dt, support.LEVELLED if kind == stepping.WALKS else math.inf))
     else:
+        _level(memory, axes, laws.loads, 0.0,
+               (dt, support.STOOD if support.show_balance(laws.loads) else math.inf))
         _stand(links, gains, memory, xi, axes, rate,
                shifted if mode == SHIFT and kind != stepping.HOPS else 0.0)
         reach = links.half[0]
