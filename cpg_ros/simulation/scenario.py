@@ -79,11 +79,12 @@ class SensorNoise:
         delay: of all measurements, s.
         force_bias, force_noise: of each foot's force, as fractions of it; the bias is drawn once.
         orientation_bias: of roll and pitch, rad; each run draws the signs once.
-        imu_tilt: of the whole inertial unit about its x and y axes, rad, signs likewise.
         gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
         accelerometer_noise, accelerometer_bias: likewise, m/s^2.
         stuck: what the sensor of the first foot shows all the time, N; None if it works.
         seed: of the random numbers.
+        imu_tilt: of the whole inertial unit about its x and y axes, rad, with signs as of
+            orientation_bias.
 
     """
 
@@ -91,13 +92,13 @@ class SensorNoise:
     force_bias: float = 0.0
     force_noise: float = 0.0
     orientation_bias: float = 0.0
-    imu_tilt: float = 0.0
     gyroscope_noise: float = 0.0
     gyroscope_bias: float = 0.0
     accelerometer_noise: float = 0.0
     accelerometer_bias: float = 0.0
     stuck: float | None = None
     seed: int = 0
+    imu_tilt: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
