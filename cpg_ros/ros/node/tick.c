@@ -15,15 +15,15 @@
 #define NOTHING_TAKEN 401
 #define OUTPUTS 4
 
-/* PATIENCE: longest time for which /clock is waited for before requests are looked at; COARSE:
- * step of simulated time that is not a stall, as /clock may be coarse or lose a message; JITTER:
- * step back above which it is a jump: after a smaller one (messages out of order, two publishers
- * of /clock) ticks wait until time is past its last value; STOPPED: time by the steady clock after
- * which a stop no longer waits for a still /clock; all in ns. */
-#define PATIENCE 20000000
-#define COARSE 50000000
-#define JITTER 100000000
-#define STOPPED 200000000
+/* CLOCK_TIMEOUT: longest time for which /clock is waited for before requests are looked at;
+ * MAX_CLOCK_STEP: step of simulated time that is not a stall, as /clock may be coarse or lose a
+ * message; MAX_CLOCK_JITTER: step back above which it is a jump: after a smaller one (messages out
+ * of order, two publishers of /clock) ticks wait until time is past its last value; STOP_TIMEOUT:
+ * time by the steady clock after which a stop no longer waits for a still /clock; all in ns. */
+#define CLOCK_TIMEOUT 20000000
+#define MAX_CLOCK_STEP 50000000
+#define MAX_CLOCK_JITTER 100000000
+#define STOP_TIMEOUT 200000000
 
 /* Same layout as rcutils_uint8_array_t. */
 typedef struct {
@@ -374,15 +374,15 @@ static int by_steady_clock(loop *l, int64_t *deadline)
     return stalled && !l->resume ? RESUME : 0;
 }
 
-/* Wait for a message of /clock; return its time, ns, or 0 if none comes within PATIENCE. */
+/* Wait for a message of /clock; return its time, ns, or 0 if none comes within CLOCK_TIMEOUT. */
 static int64_t read_clock(simulated *c)
 {
     int error = c->clear(c->set);
     error = error ? error : c->add(c->set, c->subscription, NULL);
-    error = error ? error : c->wait(c->set, PATIENCE);
+    error = error ? error : c->wait(c->set, CLOCK_TIMEOUT);
     if (error && error != TIMED_OUT) {
         c->forget();
-        wait_until(steady_time() + PATIENCE);
+        wait_until(steady_time() + CLOCK_TIMEOUT);
     }
     int64_t time = 0;
     while (!(error = c->take(c->subscription, &c->message, NULL, NULL))) {
@@ -409,7 +409,7 @@ static int take_time(loop *l, int64_t now)
     c->step = now - c->time;
     c->time = now;
     l->behind = now - l->deadline - l->period;
-    if (l->behind < l->stall || c->step <= 2 * usual || c->step <= COARSE) {
+    if (l->behind < l->stall || c->step <= 2 * usual || c->step <= MAX_CLOCK_STEP) {
         return 0;
     }
     l->deadline += leave_out(l, &l->deadline) ? l->period : 0;
@@ -445,11 +445,12 @@ static int by_clock(loop *l)
         if (now > c->time) {
             c->moved = steady_time();
         } else if (stopping && l->deadline
-                   && ((now && back > JITTER) || steady_time() >= c->moved + STOPPED)) {
+                   && ((now && back > MAX_CLOCK_JITTER)
+                       || steady_time() >= c->moved + STOP_TIMEOUT)) {
             c->deadline = steady_time();
             continue;
         }
-        if (now && !(back >= 0 && back <= JITTER)) {
+        if (now && !(back >= 0 && back <= MAX_CLOCK_JITTER)) {
             const int event = take_time(l, now);
             if (event) {
                 return event;

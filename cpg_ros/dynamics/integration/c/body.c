@@ -1,8 +1,8 @@
 
-/* DAMPED: damping of the steps to a foot's place, m^2. */
-#define DAMPED 1e-9
-/* AT_POSE: distance from its target, m and rad, and rate at which a pose has reached it. */
-#define AT_POSE 1e-5
+/* STEP_DAMPING: damping of the steps to a foot's place, m^2. */
+#define STEP_DAMPING 1e-9
+/* POSE_TOLERANCE: distance from its target, m and rad, and rate at which a pose has reached it. */
+#define POSE_TOLERANCE 1e-5
 
 static void cross(const cpg_real *a, const cpg_real *b, cpg_real *out)
 {
@@ -68,7 +68,7 @@ static cpg_real step_to(const cpg_body *b, int16_t leg, const cpg_real *place, c
     for (int16_t i = 0; i < 3; i++) {
         gap[i] = place[i] - foot[i];
         for (int16_t k = 0; k < 3; k++) {
-            square[i][k] = i == k ? DAMPED : 0.0;
+            square[i][k] = i == k ? STEP_DAMPING : 0.0;
             for (int16_t n = 0; n < 3; n++) {
                 square[i][k] += slope[n][i] * slope[n][k];
             }
@@ -123,8 +123,8 @@ static void move_body(cpg *c, cpg_real dt)
     approach(pose, 3, dt * b->pace);
     uint8_t there = 1;
     for (int16_t k = 0; k < 4; k++) {
-        there = there && fabs(pose->now[k] - pose->target[k]) < AT_POSE
-                      && fabs(pose->rate[k]) < AT_POSE;
+        there = there && fabs(pose->now[k] - pose->target[k]) < POSE_TOLERANCE
+                      && fabs(pose->rate[k]) < POSE_TOLERANCE;
     }
     for (int16_t joint = 0; joint < c->joints; joint++) {
         b->rate[joint] = -c->offset[joint] / dt;
@@ -137,7 +137,7 @@ static void move_body(cpg *c, cpg_real dt)
         __atomic_store_n(&b->moving, 0, __ATOMIC_RELEASE);
         for (int16_t k = 0; k < 4; k++) {
             /* A target may have come meanwhile. */
-            if (fabs(pose->now[k] - pose->target[k]) >= AT_POSE) {
+            if (fabs(pose->now[k] - pose->target[k]) >= POSE_TOLERANCE) {
                 __atomic_store_n(&b->moving, 1, __ATOMIC_RELEASE);
             }
         }

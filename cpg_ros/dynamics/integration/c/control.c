@@ -1,8 +1,8 @@
 
-#define SHORTEST R(0.05)
-/* LONGEST: longest ramp or fade, s; LONGEST_TICK: longest tick, s. */
-#define LONGEST R(3600.0)
-#define LONGEST_TICK R(1.0)
+#define MIN_RAMP R(0.05)
+/* MAX_RAMP: longest ramp or fade, s; MAX_TICK: longest tick, s. */
+#define MAX_RAMP R(3600.0)
+#define MAX_TICK R(1.0)
 
 void cpg_start(cpg *c, uint8_t gait, cpg_real ramp)
 {
@@ -29,19 +29,19 @@ void cpg_start(cpg *c, uint8_t gait, cpg_real ramp)
     c->slowing = c->slower = R(1.0);
     c->frequency = cpg_gaits[gait].frequency;
     c->level = c->ramp.level = c->ramp.rate = c->transition = R(0.0);
-    ramp_to(&c->ramp, R(1.0), time_within(ramp, SHORTEST, LONGEST));
+    ramp_to(&c->ramp, R(1.0), time_within(ramp, MIN_RAMP, MAX_RAMP));
 }
 
 void cpg_enable(cpg *c, uint8_t enabled, cpg_real ramp)
 {
-    ramp_to(&c->ramp, enabled ? R(1.0) : R(0.0), time_within(ramp, SHORTEST, LONGEST));
+    ramp_to(&c->ramp, enabled ? R(1.0) : R(0.0), time_within(ramp, MIN_RAMP, MAX_RAMP));
 }
 
 void cpg_switch(cpg *c, uint8_t gait, cpg_real transition)
 {
     if (gait < CPG_GAITS) {
         c->waiting = (uint8_t)(gait + 1);
-        c->transition = time_within(transition, SHORTEST, LONGEST);
+        c->transition = time_within(transition, MIN_RAMP, MAX_RAMP);
     }
 }
 
@@ -88,7 +88,7 @@ static void take_waiting(cpg *c)
 void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS];
-    dt = time_within(dt, R(0.0), LONGEST_TICK);
+    dt = time_within(dt, R(0.0), MAX_TICK);
 #ifdef CPG_STEERING
     /* Point to the strides of this struct, which may have been copied. */
     for (int16_t n = 0; n < c->tracks; n++) {

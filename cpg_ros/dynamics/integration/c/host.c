@@ -1,17 +1,17 @@
 
-/* ABSORB: time over which jumps are absorbed, s. */
-#define ABSORB 0.3
-/* LONGEST: longest time for which the clock runs slow after a stall, s; otherwise as long as the
+/* ABSORB_TIME: time over which jumps are absorbed, s. */
+#define ABSORB_TIME 0.3
+/* MAX_STALL: longest time for which the clock runs slow after a stall, s; otherwise as long as the
  * stall. */
-#define LONGEST 0.5
+#define MAX_STALL 0.5
 
-/* SHORTEST: least duration of a ramp or fade, s. The clock adapts from substep to substep: a joint
+/* MIN_RAMP: least duration of a ramp or fade, s. The clock adapts from substep to substep: a joint
  * that accelerated within a single one would exceed its speed limit before the clock slows. */
-#define SHORTEST 0.05
+#define MIN_RAMP 0.05
 
 void cpg_ramp_to(cpg_ramp *ramp, cpg_real end, cpg_real time)
 {
-    ramp_to(ramp, end, most(time, SHORTEST));
+    ramp_to(ramp, end, most(time, MIN_RAMP));
 }
 
 /* Bring the joints from their first angles to the stand, none faster than half of its limit. */
@@ -51,11 +51,11 @@ static void take(cpg *c)
 /* Take over the wanted angles; the difference after a jump decays smoothly. */
 static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *rate)
 {
-    const uint8_t absorbing = c->absorbed < ABSORB;
+    const uint8_t absorbing = c->absorbed < ABSORB_TIME;
     if (absorbing && c->jumped) {
         c->absorbed += dt;
     }
-    const cpg_real done = least(1.0, c->absorbed / ABSORB);
+    const cpg_real done = least(1.0, c->absorbed / ABSORB_TIME);
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
         cpg_real gap = 0.0, gap_rate = 0.0;
         if (absorbing) {
@@ -63,14 +63,14 @@ static void absorb(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real *
                 c->jump[joint] = c->wanted[joint] + dt * c->rate[joint] - wanted[joint];
                 c->jump_rate[joint] = c->rate[joint] - rate[joint];
             }
-            const cpg_ramp_part way = {c->jump[joint], c->jump_rate[joint], 0.0, ABSORB};
+            const cpg_ramp_part way = {c->jump[joint], c->jump_rate[joint], 0.0, ABSORB_TIME};
             gap = come_to_rest(&way, done, &gap_rate);
         }
         c->wanted[joint] = wanted[joint] + gap;
         c->rate[joint] = rate[joint] + gap_rate;
     }
     c->jumped = 1;
-    c->recovering = c->recovering && c->absorbed < ABSORB;
+    c->recovering = c->recovering && c->absorbed < ABSORB_TIME;
 }
 
 static cpg_real pace_at(const cpg *c, cpg_real s)
@@ -84,7 +84,7 @@ void cpg_resume(cpg *c, cpg_real stall)
 {
     const cpg_real pace = c->stall > 0.0 ? pace_at(c, c->stall_past / c->stall) : 1.0;
     c->stall_low = pace * most(0.0, 1.0 - stall / HOLD);
-    c->stall = least(LONGEST, stall + c->stall - c->stall_past);
+    c->stall = least(MAX_STALL, stall + c->stall - c->stall_past);
     c->stall_past = 0.0;
 }
 
@@ -119,7 +119,7 @@ void cpg_plan(cpg *c, cpg_real dt)
     clock *= c->frequency_scale;
     c->fraction *= c->frequency_scale;
     if (c->tracks == 1 && c->ramp.parts == 0 && c->approach.parts == 0
-            && !(c->absorbed < ABSORB)) {
+            && !(c->absorbed < ABSORB_TIME)) {
         if (cruise(c, clock, c->wanted, c->rate)) {
             carry(c, c->rate);
             return;

@@ -1,9 +1,10 @@
 
-/* A network is off its orbit if, for more than PATIENCE strides, a cell is further away than the
- * fraction FAR of the peak, or the phase differs from the clock by more than ASTRAY cycles. */
-#define FAR 0.3
-#define ASTRAY 0.15
-#define PATIENCE 0.5
+/* A network is off its orbit if, for more than MAX_STRIDES strides, a cell is further away than
+ * the fraction ORBIT_DISTANCE of the peak, or the phase differs from the clock by more than
+ * MAX_PHASE_ERROR cycles. */
+#define ORBIT_DISTANCE 0.3
+#define MAX_PHASE_ERROR 0.15
+#define MAX_STRIDES 0.5
 
 /* Read joints and legs off a track, a number of strides after the last time. */
 void cpg_track_look(cpg_track *t, cpg_real strides)
@@ -18,7 +19,7 @@ static uint8_t settle(cpg_track *t, cpg_real strides)
 {
     const cpg_gait *gait = t->gait;
     /* It has settled after a whole stride on the orbit: a small state may look so at times. */
-    t->calm = t->distance < FAR / 3.0 ? t->calm + strides : 0.0;
+    t->calm = t->distance < ORBIT_DISTANCE / 3.0 ? t->calm + strides : 0.0;
     t->settling = t->calm > 1.0 ? 0.0 : t->settling - strides;
     cpg_real moving = 0.0;
     for (int16_t i = 0; i < gait->components; i++) {
@@ -46,14 +47,14 @@ static uint8_t move(cpg_track *t, cpg_real strides)
     if (t->settling > 0.0) {
         if (settle(t, strides)) {
             t->settling = 0.0;
-            t->astray = 2.0 * PATIENCE;
+            t->astray = 2.0 * MAX_STRIDES;
         }
-    } else if (t->distance > FAR || fabs(error) > ASTRAY) {
+    } else if (t->distance > ORBIT_DISTANCE || fabs(error) > MAX_PHASE_ERROR) {
         t->astray += strides;
     } else {
         t->astray = 0.0;
     }
-    return t->astray <= PATIENCE;
+    return t->astray <= MAX_STRIDES;
 }
 
 int cpg_track_advance(cpg_track *t, cpg_real strides)

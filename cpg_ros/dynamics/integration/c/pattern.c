@@ -1,14 +1,16 @@
 
-/* SHIFTING: joint speed allowed in ramps and fades, 1/s, per rad from the stand to the gait's
+/* RAMP_SPEED: joint speed allowed in ramps and fades, 1/s, per rad from the stand to the gait's
  * mean.
- * SHORT_OF: fraction of the speed bound up to which the clock lets joints go.
- * ABOVE: factor of the speed limit that absorbs rounding, so that a joint at it is not held back.
- * BESIDE: how far a step may be outside of the velocities at its ends, over the speed limit.
+ * SPEED_MARGIN: fraction of the speed bound up to which the clock lets joints go.
+ * ROUNDING_FACTOR: factor of the speed limit that absorbs rounding, so that a joint at it is not
+ * held back.
+ * STEP_TOLERANCE: how far a step may be outside of the velocities at its ends, over the speed
+ * limit.
  * FADES: whether two gaits can fade into each other. */
-#define SHIFTING R(2.0)
-#define SHORT_OF R(0.997)
-#define ABOVE R(1.000000001)
-#define BESIDE R(0.05)
+#define RAMP_SPEED R(2.0)
+#define SPEED_MARGIN R(0.997)
+#define ROUNDING_FACTOR R(1.000000001)
+#define STEP_TOLERANCE R(0.05)
 #define FADES (CPG_TRACKS > 1)
 
 /* Smooth step from 0 to 1, 3 s^2 - 2 s^3, and its derivative. */
@@ -81,12 +83,12 @@ static cpg_real slowed(cpg *c, const cpg_real *rate, uint8_t approaching)
         cpg_real bound = R(0.0);
         for (int16_t n = 0; n < c->tracks; n++) {
             CPG_ROM cpg_gait *gait = gait_of(TRACK(n));
-            bound = most(bound, gait->speed[joint] + SHIFTING * F(fabs)(gait->shift[joint]));
+            bound = most(bound, gait->speed[joint] + RAMP_SPEED * F(fabs)(gait->shift[joint]));
         }
 #ifdef CPG_HOST
-        bound += approaching ? SHIFTING * fabs(c->found[joint]) : 0.0;
+        bound += approaching ? RAMP_SPEED * fabs(c->found[joint]) : 0.0;
 #endif
-        bound = most(SHORT_OF * least(bound, cpg_limits[2][joint]), R(1e-9));
+        bound = most(SPEED_MARGIN * least(bound, cpg_limits[2][joint]), R(1e-9));
         const cpg_real ahead = c->followed ? R(2.0) * rate[joint] - c->last_rate[joint]
                                            : rate[joint];
         worst = most(worst, F(fabs)(ahead) / bound);
@@ -215,18 +217,18 @@ static void confine(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real 
     c->held = 0;
     for (int16_t joint = 0; joint < CPG_JOINTS; joint++) {
         const cpg_real last = c->position[joint], fastest = cpg_limits[2][joint];
-        const cpg_real reach = fastest * dt * ABOVE;
+        const cpg_real reach = fastest * dt * ROUNDING_FACTOR;
         cpg_real position = within(wanted[joint], last - reach, last + reach);
         position = within(position, cpg_limits[0][joint], cpg_limits[1][joint]);
         cpg_real rate = wanted_rate[joint];
         /* NaN is held back, too. */
         const uint8_t held = !(position <= wanted[joint] && position >= wanted[joint]);
-        const uint8_t fast = F(fabs)(rate) > fastest * ABOVE;
+        const uint8_t fast = F(fabs)(rate) > fastest * ROUNDING_FACTOR;
         uint8_t turned = 0;
 #ifdef CPG_HOST
         const cpg_real before = c->velocity[joint], step = dt > 0.0 ? (position - last) / dt : 0.0;
         turned = fabs(step - within(step, least(rate, before), most(rate, before)))
-               > BESIDE * fastest;
+               > STEP_TOLERANCE * fastest;
 #endif
         if (held || fast || turned || c->behind[joint]) {
             rate = dt > R(0.0) ? (position - last) / dt : R(0.0);

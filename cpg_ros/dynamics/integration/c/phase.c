@@ -1,10 +1,10 @@
 
-#define PULL R(1.0)
+#define PHASE_GAIN R(1.0)
 #define SMOOTHING R(0.25)
-#define MOST_TURN R(0.5)
-#define FURTHEST R(2.0)
+#define MAX_TURN R(0.5)
+#define MAX_STATE R(2.0)
 
-enum { PHASE, SPEED, NEXT_SPEED, AMOUNT, GROWTH, NEXT_GROWTH };
+enum { PHASE, SPEED, NEXT_SPEED, AMPLITUDE, GROWTH, NEXT_GROWTH };
 
 #ifndef CPG_HOST
 static void output(const cpg_track *t, cpg_real *state)
@@ -21,7 +21,7 @@ static void begin_clocks(cpg_track *t, cpg_real phase)
             t->clocks[k][cell] = R(0.0);
         }
         t->clocks[PHASE][cell] = fraction(phase + gait->phase[cell]);
-        t->clocks[AMOUNT][cell] = R(1.0);
+        t->clocks[AMPLITUDE][cell] = R(1.0);
     }
 }
 
@@ -32,13 +32,13 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
     const int16_t wave = gait->wave[cell];
     CPG_ROM cpg_real *shape = gait->shapes + 4 * wave, *circle = gait->circles + 4 * wave;
     CPG_ROM cpg_real *table = gait->waves + (int32_t)wave * CPG_VARIABLES * gait->points * 2;
-    const cpg_real phase = t->clocks[PHASE][cell], amount = t->clocks[AMOUNT][cell];
-    const cpg_real pull = PULL / (R(1.0) + R(2.0) * PULL * strides);
+    const cpg_real phase = t->clocks[PHASE][cell], amplitude = t->clocks[AMPLITUDE][cell];
+    const cpg_real pull = PHASE_GAIN / (R(1.0) + R(2.0) * PHASE_GAIN * strides);
     const cpg_real gain = strides / (SMOOTHING + strides);
     const cpg_real c1 = F(cos)(TURN * phase), s1 = F(sin)(TURN * phase);
     cpg_real rest, slope, off[2];
 #ifdef CPG_HOST
-    watch(t, amount - R(1.0));
+    watch(t, amplitude - R(1.0));
 #endif
     const int16_t low = place_of(phase, gait->points, &rest);
     for (int16_t v = 0; v < 2; v++) {
@@ -49,14 +49,14 @@ static void pull_clock(cpg_track *t, int16_t cell, cpg_real strides, const cpg_r
 #ifdef CPG_HOST
         watch(t, (now[v] - there) / half);
 #endif
-        off[v] = within(at, -FURTHEST, FURTHEST) - amount * (there - mean) / half;
+        off[v] = within(at, -MAX_STATE, MAX_STATE) - amplitude * (there - mean) / half;
     }
     const cpg_real along = (circle[0] * c1 + circle[1] * s1) * off[0]
                          + (circle[2] * c1 + circle[3] * s1) * off[1];
     const cpg_real across = (circle[1] * c1 - circle[0] * s1) * off[0]
                           + (circle[3] * c1 - circle[2] * s1) * off[1];
     t->clocks[NEXT_SPEED][cell] += gain * (
-        within(pull * across / TURN, -MOST_TURN, MOST_TURN) - t->clocks[NEXT_SPEED][cell]);
+        within(pull * across / TURN, -MAX_TURN, MAX_TURN) - t->clocks[NEXT_SPEED][cell]);
     t->clocks[NEXT_GROWTH][cell] += gain * (pull * along - t->clocks[NEXT_GROWTH][cell]);
 }
 
@@ -66,7 +66,7 @@ static void signal_of(const cpg_track *t, int16_t cell, int16_t joint, cpg_real 
     CPG_ROM cpg_gait *gait = gait_of(t);
     CPG_ROM cpg_real *terms = gait->terms + gait->wave[cell] * 2 * (1 + CPG_HARMONICS);
     cpg_real phase = t->clocks[PHASE][cell], steep = R(1.0);
-    const cpg_real amount = t->clocks[AMOUNT][cell];
+    const cpg_real amplitude = t->clocks[AMPLITUDE][cell];
 #ifdef CPG_RETIMED
     if (gait->maps[joint][0] != R(1.0)) {
         phase = retimed_phase(phase, gait->maps[joint], &steep);
@@ -87,10 +87,10 @@ static void signal_of(const cpg_track *t, int16_t cell, int16_t joint, cpg_real 
     }
     cpg_real scale = R(1.0), rate = R(0.0);
     const cpg_real speed = steep * TURN * (R(1.0) + t->clocks[SPEED][cell]);
-    if (amount < R(1.0)) {
-        const cpg_real left = amount > R(0.0) ? R(1.0) - amount * amount : R(1.0);
+    if (amplitude < R(1.0)) {
+        const cpg_real left = amplitude > R(0.0) ? R(1.0) - amplitude * amplitude : R(1.0);
         scale = R(1.0) - left * left * left;
-        rate = R(6.0) * most(amount, R(0.0)) * left * left * t->clocks[GROWTH][cell];
+        rate = R(6.0) * most(amplitude, R(0.0)) * left * left * t->clocks[GROWTH][cell];
     }
     signal[0] = scale * x;
     signal[1] = scale * y;
@@ -111,7 +111,7 @@ static void look(cpg_track *t, cpg_real strides)
             t->clocks[PHASE][cell] = fraction(t->clocks[PHASE][cell] + strides * (R(1.0) + R(0.5) * (
                 t->clocks[SPEED][cell] + t->clocks[NEXT_SPEED][cell])));
             t->clocks[SPEED][cell] = t->clocks[NEXT_SPEED][cell];
-            t->clocks[AMOUNT][cell] += R(0.5) * strides * (
+            t->clocks[AMPLITUDE][cell] += R(0.5) * strides * (
                 t->clocks[GROWTH][cell] + t->clocks[NEXT_GROWTH][cell]);
             t->clocks[GROWTH][cell] = t->clocks[NEXT_GROWTH][cell];
             pull_clock(t, cell, strides, now);

@@ -1,5 +1,5 @@
 
-#define LEAST_SQUARE R(1e-12)
+#define MIN_SQUARE R(1e-12)
 
 #ifndef CPG_HOST
 static void begin_clocks(cpg_track *t, cpg_real phase)
@@ -24,8 +24,8 @@ static void retime(CPG_ROM cpg_gait *gait, CPG_ROM cpg_real *map, cpg_real z, cp
                    cpg_real *y, cpg_real *dx, cpg_real *dy)
 {
     const cpg_real square = *x * *x + *y * *y;
-    const cpg_real turning = square > LEAST_SQUARE ? (*y * *y - *x * z) / square : R(1.0);
-    cpg_real growing = square > LEAST_SQUARE ? *y * (*x + z) / square : R(0.0);
+    const cpg_real turning = square > MIN_SQUARE ? (*y * *y - *x * z) / square : R(1.0);
+    cpg_real growing = square > MIN_SQUARE ? *y * (*x + z) / square : R(0.0);
     cpg_real slope, steep;
     const cpg_real angle = F(atan2)(-*y, *x) / TURN;
     const cpg_real theta = angle + periodic(gait->phase_offset_slope, 2, angle, &slope);
