@@ -30,7 +30,7 @@ import tempfile
 from common import by_turns, emit, log
 from cpg_ros.fitting.recordings.bag_reader import read_bag
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
-from cpg_ros.fitting.recordings.rosbags_library import STORE
+from cpg_ros.fitting.recordings.rosbags_library import TYPESTORE
 import numpy as np
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
@@ -46,12 +46,12 @@ ROUNDS = 5
 def serialised() -> list[tuple[int, memoryview]]:
     """Return receive times and messages of a walk."""
     rng = np.random.default_rng(0)
-    time, header, message = (STORE.types[name] for name in (
+    time, header, message = (TYPESTORE.types[name] for name in (
         'builtin_interfaces/msg/Time', 'std_msgs/msg/Header', JOINT_STATE))
     made = []
     for stamp in range(START, START + STEP * MESSAGES, STEP):
         values = rng.normal(size=(2, len(JOINTS)))
-        made.append((stamp, STORE.serialize_cdr(message(
+        made.append((stamp, TYPESTORE.serialize_cdr(message(
             header(time(stamp // 10**9, stamp % 10**9), 'base'), JOINTS, *values, np.zeros(0)),
             JOINT_STATE)))
     return made
@@ -59,7 +59,7 @@ def serialised() -> list[tuple[int, memoryview]]:
 
 def write(path: Path, storage: str, messages: list[tuple[int, memoryview]]) -> Path:
     with Writer(path, version=9, storage_plugin=STORAGES[storage]) as writer:
-        connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=STORE)
+        connection = writer.add_connection('/joint_states', JOINT_STATE, typestore=TYPESTORE)
         for received, message in messages:
             writer.write(connection, received, message)
     return path
@@ -70,7 +70,7 @@ def by_the_library(path: Path) -> tuple[np.ndarray, np.ndarray]:
     stamps, positions = [], []
     with Reader(path) as reader:
         for connection, _, raw in reader.messages():
-            message = STORE.deserialize_cdr(raw, connection.msgtype)
+            message = TYPESTORE.deserialize_cdr(raw, connection.msgtype)
             stamps.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
             positions.append(message.position)
     return np.array(stamps), np.array(positions)

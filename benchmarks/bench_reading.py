@@ -35,7 +35,7 @@ from cpg_ros.fitting.recordings.bag_reader import read_bag
 from cpg_ros.fitting.recordings.bag_writer import BagWriter
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
 from cpg_ros.fitting.recordings.csv_reader import read_csv
-from cpg_ros.fitting.recordings.rosbags_library import STORE
+from cpg_ros.fitting.recordings.rosbags_library import TYPESTORE
 from cpg_ros.networks.library.delayed import Delayed
 from hostile_recordings import LEGS
 import numpy as np
@@ -70,14 +70,14 @@ def write_table(path: Path, rows: int) -> None:
 
 def write_bag(path: Path, rows: int, topics: int) -> None:
     """Write a bag with the joints on so many topics."""
-    head, stamp, message = (STORE.types[name] for name in (
+    head, stamp, message = (TYPESTORE.types[name] for name in (
         'std_msgs/msg/Header', 'builtin_interfaces/msg/Time', JOINT_STATE))
     angles, fraction = made(), len(JOINTS) // topics
     writer, serialised = BagWriter(path), []
     for first in range(0, len(JOINTS), fraction):
         own = slice(first, first + fraction)
         connection = writer.connect(f'/part{first}/joint_states', JOINT_STATE, str)
-        serialised.append((connection, [bytearray(STORE.serialize_cdr(message(
+        serialised.append((connection, [bytearray(TYPESTORE.serialize_cdr(message(
             head(stamp(0, 0), ''), JOINTS[own], row, np.zeros(0), np.zeros(0)), JOINT_STATE))
             for row in angles[:, own].copy()]))
     for row in range(rows):

@@ -37,13 +37,13 @@ import tempfile
 from typing import IO
 
 _LOGGER = logging.getLogger(__name__)
-#: KEPT: number of folders that are kept, of about 1 MB, the last used ones; those of running
-#: processes always are. The package's tests use 31, and each edit of a source makes new ones.
-KEPT = 128
+#: MAX_FOLDERS: of about 1 MB, the last used ones; those of running processes are kept always. The
+#: package's tests use 31, and each edit of a source makes new ones.
+MAX_FOLDERS = 128
 #: File in each folder that the processes using it lock; its time is that of the last start.
-_LOCK = 'in_use'
+_LOCK_FILE = 'in_use'
 #: Locks of this process, which the system releases when it ends, however it does.
-_HELD: list[IO[bytes]] = []
+_LOCKS: list[IO[bytes]] = []
 
 
 @cache
@@ -213,24 +213,24 @@ def _use(folder: Path) -> None:
     while True:
         folder.mkdir(mode=0o700, exist_ok=True)
         try:
-            lock = (folder / _LOCK).open('ab')
+            lock = (folder / _LOCK_FILE).open('ab')
         except FileNotFoundError:
             continue    # Removed in between.
         # On file systems without locks nothing is removed.
         with contextlib.suppress(OSError):
             fcntl.flock(lock, fcntl.LOCK_SH)
         with contextlib.suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(lock.fileno()), (folder / _LOCK).stat()):
+            if os.path.samestat(os.fstat(lock.fileno()), (folder / _LOCK_FILE).stat()):
                 os.utime(lock.fileno())
-                _HELD.append(lock)
+                _LOCKS.append(lock)
                 return
         lock.close()
 
 
 def _remove_unused(folder: Path) -> None:
     """Remove all folders except the last used ones and those that a process has locked."""
-    locks = sorted(folder.glob(f'*/{_LOCK}'), key=_last_used)
-    for path in locks[:-KEPT]:
+    locks = sorted(folder.glob(f'*/{_LOCK_FILE}'), key=_last_used)
+    for path in locks[:-MAX_FOLDERS]:
         # Folders stay that are in use, or whose users cannot be determined.
         with contextlib.suppress(OSError), path.open('rb') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -105,12 +105,12 @@ def refuse_repeated(option: str, names: Sequence[str]) -> None:
 # Plain text: JSON without numbers that it lacks, and tables in aligned columns.
 
 #: Characters that stand for bytes of a file's name that are not UTF-8 (surrogate escapes).
-_BYTE = re.compile('[\udc80-\udcff]')
+_SURROGATE = re.compile('[\udc80-\udcff]')
 
 
 def printable(text: str) -> str:
     r"""Return a text that UTF-8 can encode; undecodable bytes are written as \xff."""
-    text = _BYTE.sub(lambda byte: f'\\x{ord(byte[0]) - 0xdc00:02x}', text)
+    text = _SURROGATE.sub(lambda byte: f'\\x{ord(byte[0]) - 0xdc00:02x}', text)
     return text.encode(errors='backslashreplace').decode()
 
 
@@ -144,8 +144,8 @@ def table(rows: Sequence[tuple[str, ...]], right: str = '') -> list[str]:
 
 # A progress bar on standard error, shown only when work takes longer than two seconds.
 
-PATIENCE = 2.0
-WIDTH = 30
+PROGRESS_DELAY = 2.0
+BAR_WIDTH = 30
 
 
 @contextmanager
@@ -161,15 +161,15 @@ def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callab
     def update(done: int) -> None:
         nonlocal shown
         spent = time.monotonic() - started
-        if not enabled or spent < PATIENCE or (done >= total and shown < 0):
+        if not enabled or spent < PROGRESS_DELAY or (done >= total and shown < 0):
             return
         fraction = done / total
         mark = int(fraction * (100 if live else 10))
         if mark == shown:
             return
         shown = mark
-        bar = '#' * int(fraction * WIDTH)
-        line = f'{what} [{bar:<{WIDTH}}] {fraction:4.0%}' + (
+        bar = '#' * int(fraction * BAR_WIDTH)
+        line = f'{what} [{bar:<{BAR_WIDTH}}] {fraction:4.0%}' + (
             f', {spent / fraction - spent:.0f} s left' if fraction else '')
         sys.stderr.write(f'\r{line}\x1b[K' if live else line + '\n')
         sys.stderr.flush()
@@ -182,7 +182,7 @@ def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callab
 
 
 #: Exit code after Ctrl-C: 128 + the number of SIGINT.
-INTERRUPTED = 130
+EXIT_INTERRUPTED = 130
 
 
 class Parser(argparse.ArgumentParser):
@@ -227,7 +227,7 @@ def run(parser: Parser, work: Callable[[argparse.Namespace], int],
     except KeyboardInterrupt as interrupt:
         if message := str(interrupt) or stopped:
             note(parser.prog, message)
-        return INTERRUPTED
+        return EXIT_INTERRUPTED
 
 
 def note(tool: str, line: str) -> None:

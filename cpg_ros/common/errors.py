@@ -27,10 +27,10 @@ from typing import Any, ClassVar
 
 # Results that print in one line, whatever arrays they hold.
 
-#: LONGEST: longest text of one value, characters; LONGEST_OF_ALL: longest text of all values.
-LONGEST, LONGEST_OF_ALL = 60, 300
-#: MOST: number of entries from which on a collection is abbreviated.
-MOST = 9
+#: Longest texts of one value, and of all values, characters.
+MAX_VALUE_LENGTH, MAX_LENGTH = 60, 300
+#: MAX_ENTRIES: from which on a collection is abbreviated.
+MAX_ENTRIES = 9
 
 
 class ShortRepr:
@@ -38,8 +38,8 @@ class ShortRepr:
 
     def __repr__(self) -> str:
         text = self._summary()
-        if len(text) > LONGEST_OF_ALL:
-            text = text[:LONGEST_OF_ALL - 3] + '...'
+        if len(text) > MAX_LENGTH:
+            text = text[:MAX_LENGTH - 3] + '...'
         return f'{type(self).__name__}({text})'
 
     def _summary(self) -> str:
@@ -58,14 +58,15 @@ def short(value: Any) -> str:
         return f'array{tuple(value.shape)}'
     if value is None or isinstance(value, (bool, int, str)):
         text = repr(value)
-        return text if len(text) <= LONGEST else text[:LONGEST - 4] + "...'"
+        return text if len(text) <= MAX_VALUE_LENGTH else text[:MAX_VALUE_LENGTH - 4] + "...'"
     if isinstance(value, Mapping):
-        text = ', '.join(f'{key}: {short(item)}' for key, item in list(value.items())[:MOST])
-        few = len(value) < MOST and len(text) < LONGEST
+        items = list(value.items())[:MAX_ENTRIES]
+        text = ', '.join(f'{key}: {short(item)}' for key, item in items)
+        few = len(value) < MAX_ENTRIES and len(text) < MAX_VALUE_LENGTH
         return f'{{{text}}}' if few else f'{{{len(value)} keys}}'
     if isinstance(value, Sequence):
-        text = ', '.join(short(item) for item in value[:MOST])
-        few = len(value) < MOST and len(text) < LONGEST
+        text = ', '.join(short(item) for item in value[:MAX_ENTRIES])
+        few = len(value) < MAX_ENTRIES and len(text) < MAX_VALUE_LENGTH
         return f'({text})' if few else f'({len(value)} items)'
     return type(value).__name__
 

@@ -92,9 +92,9 @@ def resource_folder(kind: str) -> Path:
 # XML as a tree, without entities and of a bounded depth.
 
 #: Depth of nested elements; descriptions of robots have a dozen, assemblies in Collada more.
-DEEPEST = 200
-#: MOST: most elements of a document; a robot with meshes has a few thousand.
-MOST = 1_000_000
+MAX_DEPTH = 200
+#: MAX_ELEMENTS: of a document; a robot with meshes has a few thousand.
+MAX_ELEMENTS = 1_000_000
 
 
 def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
@@ -114,11 +114,11 @@ def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, count
         depth, count = depth + 1, count + 1
-        if count > MOST:
-            raise fail(f'it has more than {MOST} elements')
-        if depth > DEEPEST:
+        if count > MAX_ELEMENTS:
+            raise fail(f'it has more than {MAX_ELEMENTS} elements')
+        if depth > MAX_DEPTH:
             raise fail(f'line {parser.CurrentLineNumber}: elements are nested more than '
-                       f'{DEEPEST} deep')
+                       f'{MAX_DEPTH} deep')
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -156,16 +156,16 @@ def is_loopback(host: str) -> bool:
         return False
 
 
-#: LARGEST: largest file that is read at once, bytes.
-LARGEST = 64_000_000
-#: KINDS: type of a file that is refused -> its name.
-KINDS = {stat.S_IFIFO: 'a pipe', stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device',
-         stat.S_IFSOCK: 'a socket'}
+#: MAX_SIZE: of a file that is read at once, bytes.
+MAX_SIZE = 64_000_000
+#: FILE_KINDS: of files that are refused.
+FILE_KINDS = {stat.S_IFIFO: 'a pipe', stat.S_IFCHR: 'a device', stat.S_IFBLK: 'a device',
+              stat.S_IFSOCK: 'a socket'}
 
 
 @contextmanager
 def opened(path: str | Path, error: type[CpgError], what: str = '',
-           largest: float = LARGEST) -> Iterator[BinaryIO]:
+           largest: float = MAX_SIZE) -> Iterator[BinaryIO]:
     """Open a regular file to read its bytes.
 
     Args:
@@ -185,7 +185,7 @@ def opened(path: str | Path, error: type[CpgError], what: str = '',
         if stat.S_ISDIR(status.st_mode):
             raise error(one_line(f'{name}: {os.strerror(errno.EISDIR)}'))
         if not stat.S_ISREG(status.st_mode):
-            kind = KINDS.get(stat.S_IFMT(status.st_mode), 'something else')
+            kind = FILE_KINDS.get(stat.S_IFMT(status.st_mode), 'something else')
             raise error(one_line(f'{name}: is {kind}, not a regular file'))
         if status.st_size > largest:
             raise error(one_line(f'{name}: has {status.st_size / 1e6:.4g} MB, more than the '
@@ -207,7 +207,7 @@ def opened(path: str | Path, error: type[CpgError], what: str = '',
 
 
 def read_bytes(path: str | Path, error: type[CpgError], what: str = '',
-               largest: float = LARGEST) -> bytes:
+               largest: float = MAX_SIZE) -> bytes:
     """Read a regular file; arguments and errors as of ``opened``."""
     with opened(path, error, what, largest) as file:
         try:

@@ -33,9 +33,9 @@ from cpg_ros.common.errors import CpgError
 
 # The progress of many jobs: done, failed, rate and time left.
 
-#: MINUTE: time between lines if there is no terminal, s; REDRAWN: time between updates on a
-#: terminal, s; PATIENCE: time before the first of these, s.
-MINUTE, REDRAWN, PATIENCE = 60.0, 0.2, 2.0
+#: LINE_PERIOD: between lines if there is no terminal, s; REDRAW_PERIOD: between updates on a
+#: terminal, s; PROGRESS_DELAY: before the first of these, s.
+LINE_PERIOD, REDRAW_PERIOD, PROGRESS_DELAY = 60.0, 0.2, 2.0
 
 
 def _time(seconds: float) -> str:
@@ -93,9 +93,10 @@ class JobProgress:
     def tick(self) -> None:
         """Report the progress if it is due."""
         now = self._clock()
-        if not self._enabled or now - self._reported < (REDRAWN if self._live else MINUTE):
+        period = REDRAW_PERIOD if self._live else LINE_PERIOD
+        if not self._enabled or now - self._reported < period:
             return
-        if self._live and now - self._began < PATIENCE:
+        if self._live and now - self._began < PROGRESS_DELAY:
             return
         self._reported, self._drawn = now, True
         self._write()
@@ -115,12 +116,12 @@ class JobProgress:
                 self._stream.write('\n')
 
 
-#: TICK: longest time between two calls of tick, s.
-TICK = 0.5
-#: DEATHS: number of workers that die under a job, while it runs alone, at which it is blamed.
-DEATHS = 2
-#: ROOM: default number of jobs that an executor has room for.
-ROOM = 8
+#: TICK_PERIOD: longest time between two calls of tick, s.
+TICK_PERIOD = 0.5
+#: MAX_DEATHS: of workers under a job while it runs alone; then it is blamed.
+MAX_DEATHS = 2
+#: DEFAULT_ROOM: number of jobs that an executor has room for.
+DEFAULT_ROOM = 8
 
 Job = TypeVar('Job')
 
@@ -157,7 +158,7 @@ class ResilientExecutor(Executor):
 
     what = ''
 
-    def __init__(self, inner: Executor, room: int = ROOM,
+    def __init__(self, inner: Executor, room: int = DEFAULT_ROOM,
                  renew: Callable[[], tuple[Executor, int]] | None = None,
                  close: Callable[[bool], None] = lambda wait: None) -> None:
         """Run jobs with an executor.
@@ -251,8 +252,8 @@ class _Stream(Generic[Job]):
                 return
 
     def ended(self) -> Iterator[JobOutcome[Job]]:
-        """Yield the outcomes of jobs that have ended; wait TICK at most."""
-        done, _ = wait(self.flying, TICK, FIRST_COMPLETED)
+        """Yield the outcomes of jobs that have ended; wait TICK_PERIOD at most."""
+        done, _ = wait(self.flying, TICK_PERIOD, FIRST_COMPLETED)
         broken: BaseException | None = None
         back: list[Job] = []
         for future in done:
@@ -273,7 +274,7 @@ class _Stream(Generic[Job]):
         if self.alone is not None:
             job, deaths = self.alone
             self.alone = None
-            if died and deaths + 1 >= DEATHS:
+            if died and deaths + 1 >= MAX_DEATHS:
                 yield JobOutcome(job, None, WorkerDied('the process that worked on this job died'))
             else:
                 self.suspects.appendleft((job, deaths + died))

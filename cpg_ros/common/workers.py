@@ -43,7 +43,7 @@ from cpg_ros.common.jobs import ResilientExecutor
 
 # TLS between this process and a dask cluster, and a warning where there is none.
 
-TLS = 'tls://'
+TLS_SCHEME = 'tls://'
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,9 @@ def security(address: str, certificates: Certificates | None) -> Any:
     if certificates is None:
         settings = Security()
     else:
-        if not address.startswith(TLS):
-            raise InputError(f"--tls needs an address that begins with {TLS}, not '{address}'")
+        if not address.startswith(TLS_SCHEME):
+            raise InputError(f'--tls needs an address that begins with {TLS_SCHEME}, not '
+                             f"'{address}'")
         for file in (certificates.authority, certificates.certificate, certificates.key):
             if not Path(file).is_file():
                 raise InputError(f'{file}: no such file')
@@ -90,7 +91,7 @@ def security(address: str, certificates: Certificates | None) -> Any:
         context = settings.get_connection_args('client')['ssl_context']
     except OSError as error:
         raise InputError(f'the certificates for {address} cannot be used: {error}') from error
-    if context is None and address.startswith(TLS):
+    if context is None and address.startswith(TLS_SCHEME):
         raise InputError(f"{address} needs --tls CA CERT KEY, or dask's configuration "
                          'distributed.comm.tls')
     return settings
@@ -104,18 +105,17 @@ def exposed(*addresses: str) -> str:
 
     """
     for address in addresses:
-        if not address.startswith(TLS) and not is_loopback(urlsplit(address).hostname or ''):
+        if not (address.startswith(TLS_SCHEME) or is_loopback(urlsplit(address).hostname or '')):
             return address
     return ''
 
 
-#: ANSWERS: longest time for an address to answer, s; RETURNS: longest wait for a lost scheduler,
-#: s.
-ANSWERS, RETURNS = 6.0, 300.0
-#: AHEAD: jobs per thread of a worker that run or wait there.
-AHEAD = 2
-#: EXPECTED: assumed number of threads of a cluster that has no workers yet.
-EXPECTED = 4
+#: Longest waits for an address to answer, and for a lost scheduler, s.
+CONNECT_TIMEOUT, RECONNECT_TIMEOUT = 6.0, 300.0
+#: JOBS_PER_THREAD: of a worker, that run or wait there.
+JOBS_PER_THREAD = 2
+#: DEFAULT_THREADS: of a cluster that has no workers yet.
+DEFAULT_THREADS = 4
 
 
 class NoCluster(CpgError):
@@ -162,7 +162,7 @@ def processes(jobs: int = 0) -> ResilientExecutor:
 
     def made() -> tuple[Executor, int]:
         held[:] = [ProcessPoolExecutor(count, _Workers(), _begin, (os.getpid(),))]
-        return held[0], AHEAD * count
+        return held[0], JOBS_PER_THREAD * count
 
     def close(wait: bool) -> None:
         # Children of the pool; its own list of them is private.
@@ -222,15 +222,16 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
         client = Client(address, timeout=seconds, set_as_default=False, security=safe)
         held[:] = [client]
         threads = sum(client.nthreads().values())
-        return (client.get_executor(pure=False), AHEAD * (threads or EXPECTED))
+        return (client.get_executor(pure=False), JOBS_PER_THREAD * (threads or DEFAULT_THREADS))
 
     def again() -> tuple[Executor, int]:
-        say(f'the scheduler at {address} is lost; waiting for it for up to {RETURNS:g} s')
+        say(f'the scheduler at {address} is lost; waiting for it for up to '
+            f'{RECONNECT_TIMEOUT:g} s')
         _leave(held)
-        end = time.monotonic() + RETURNS
+        end = time.monotonic() + RECONNECT_TIMEOUT
         while True:
             try:
-                connected = connect(ANSWERS)
+                connected = connect(CONNECT_TIMEOUT)
             except (NoCluster, OSError, TimeoutError):
                 if time.monotonic() > end:
                     raise
@@ -244,7 +245,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
     def close(wait: bool) -> None:
         _leave(held)
 
-    fleet = ResilientExecutor(*connect(ANSWERS), again, close)
+    fleet = ResilientExecutor(*connect(CONNECT_TIMEOUT), again, close)
     if where := exposed(address, *own):
         say(f'warning: the scheduler at {where} can be reached from other machines without TLS: '
             'anyone who can reach it can run any program on its workers and here')
@@ -279,7 +280,7 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
         answers = asyncio.run(asyncio.wait_for(ask(), seconds))
     except (OSError, TimeoutError) as error:
         raise NoCluster(f'no dask scheduler answers at {address}' + (
-            ' to these certificates' if address.startswith(TLS) else '')) from error
+            ' to these certificates' if address.startswith(TLS_SCHEME) else '')) from error
     except (ValueError, RuntimeError, ImportError) as error:
         raise InputError(f'{address}: {" ".join(str(error).split())}') from error
     # Another protocol is taken for a message of any length.
@@ -316,10 +317,10 @@ def _workers_checked(client: Any, address: str) -> None:
 
 # The options that choose where jobs run, the same for all executables that run many.
 
-#: MOST: largest number of processes; more are a mistake.
-MOST = 1024
-#: KEPT: message after Ctrl-C for jobs whose results are kept as they come.
-KEPT = 'stopped; what was finished is kept, and the same command continues from there'
+#: MAX_PROCESSES: more are a mistake.
+MAX_PROCESSES = 1024
+#: INTERRUPT_MESSAGE: after Ctrl-C, for jobs whose results are kept as they come.
+INTERRUPT_MESSAGE = 'stopped; what was finished is kept, and the same command continues from there'
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -343,8 +344,8 @@ def chosen_fleet(args: Namespace, say: Callable[[str], None]) -> ResilientExecut
         NoCluster: no scheduler responds at the address.
 
     """
-    if not 0 <= args.jobs <= MOST:
-        raise InputError(f'argument --jobs: {args.jobs} is not between 0 and {MOST}')
+    if not 0 <= args.jobs <= MAX_PROCESSES:
+        raise InputError(f'argument --jobs: {args.jobs} is not between 0 and {MAX_PROCESSES}')
     if args.tls and not args.dask:
         raise InputError('argument --tls: it needs --dask')
     if not args.dask:

@@ -27,10 +27,10 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, read_bytes, write_atomically
 import yaml
 
-#: DEEPEST: deepest nesting of nodes; MOST: most nodes, including those that aliases stand for.
-DEEPEST, MOST = 50, 1_000_000
-#: LARGEST: largest YAML file, bytes: a robot of a hundred joints has 30 thousand.
-LARGEST = 4_000_000
+#: MAX_NODES: including those that aliases stand for.
+MAX_DEPTH, MAX_NODES = 50, 1_000_000
+#: MAX_SIZE: of a file, bytes: a robot of a hundred joints has 30 thousand.
+MAX_SIZE = 4_000_000
 
 Value = TypeVar('Value')
 #: Returns why a number cannot be used, or ''.
@@ -50,16 +50,17 @@ class _UniqueKeys(yaml.SafeLoader):
         event, before = self.peek_event(), self._nodes  # type: ignore[no-untyped-call]
         mark, alias = event.start_mark, isinstance(event, yaml.AliasEvent)
         self._depth += 1
-        if self._depth > DEEPEST:
-            raise yaml.composer.ComposerError(None, None, f'nested more than {DEEPEST} deep', mark)
+        if self._depth > MAX_DEPTH:
+            raise yaml.composer.ComposerError(None, None, f'nested more than {MAX_DEPTH} deep',
+                                              mark)
         node = super().compose_node(parent, index)
         self._depth -= 1
         if alias and id(node) not in self._sizes:
             raise yaml.composer.ComposerError(None, None, 'an alias of what it is part of', mark)
         self._nodes += self._sizes[id(node)] if alias else 1
-        if self._nodes > MOST:
-            raise yaml.composer.ComposerError(None, None, f'more than {MOST} nodes, with those '
-                                              'that aliases stand for', mark)
+        if self._nodes > MAX_NODES:
+            raise yaml.composer.ComposerError(None, None, f'more than {MAX_NODES} nodes, with '
+                                              'those that aliases stand for', mark)
         self._sizes.setdefault(id(node), self._nodes - before)
         return node
 
@@ -150,7 +151,7 @@ class YamlReader:
 
     def tree(self) -> Any:
         """Parse the file."""
-        data = read_bytes(self.path, self.error, self.what, LARGEST)
+        data = read_bytes(self.path, self.error, self.what, MAX_SIZE)
         try:
             return parsed(data.decode())
         except (yaml.YAMLError, UnicodeDecodeError) as error:

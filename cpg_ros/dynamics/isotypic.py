@@ -33,7 +33,7 @@ from itertools import chain
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
 from cpg_ros.networks.equations import equations_of, Field
-from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network
+from cpg_ros.networks.network import asymmetry, MAX_ASYMMETRY, Network
 from cpg_ros.networks.symmetry import (
     compose,
     generators,
@@ -226,10 +226,10 @@ def group_of(network: Network) -> Group:
     group = symmetry.group
     whole = Symmetry.of(group, dict.fromkeys(group.elements, Fraction(0)), symmetry.variables)
     if not network.broken(whole) and not (equations_of(type(network)).by_cell and type(
-            network).families is Network.families and asymmetry(network, whole) > ASYMMETRIC):
+            network).families is Network.families and asymmetry(network, whole) > MAX_ASYMMETRY):
         return group
     return group.subgroup(tuple(name for name in group.elements if asymmetry(
-        network, Symmetry.of(group, {name: Fraction(0)}, symmetry.variables)) <= ASYMMETRIC))
+        network, Symmetry.of(group, {name: Fraction(0)}, symmetry.variables)) <= MAX_ASYMMETRY))
 
 
 def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:

@@ -24,7 +24,7 @@ from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.isotypic import power
 from cpg_ros.networks.equations import equations_of
-from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network, other_gait, stated_gait
+from cpg_ros.networks.network import asymmetry, MAX_ASYMMETRY, Network, other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
@@ -253,7 +253,7 @@ def check_values(network: Network, gait: str) -> None:
     if broken:
         raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
     if (equations_of(type(network)).by_cell
-            and asymmetry(network, network.symmetry(gait)) > ASYMMETRIC):
+            and asymmetry(network, network.symmetry(gait)) > MAX_ASYMMETRY):
         raise NoOrbit(f'no {gait} with these weights: the equations do not have its symmetry')
     if other := other_gait(network, gait):
         raise NoOrbit(other)

@@ -74,9 +74,9 @@ def _function(name: str) -> Callable[[Number], Term]:
 
 
 #: Functions of terms, by the names that they have in mathematics.
-_NAMES = 'tanh', 'cosh', 'exp', 'log', 'sin', 'cos', 'sqrt'
-tanh, cosh, exp, log, sin, cos, sqrt = map(_function, _NAMES)
-for _name in _NAMES:
+_FUNCTION_NAMES = 'tanh', 'cosh', 'exp', 'log', 'sin', 'cos', 'sqrt'
+tanh, cosh, exp, log, sin, cos, sqrt = map(_function, _FUNCTION_NAMES)
+for _name in _FUNCTION_NAMES:
     # numpy's functions of an object are methods of it.
     setattr(Term, _name, _function(_name))
 

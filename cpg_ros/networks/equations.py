@@ -39,7 +39,7 @@ import numpy as np
 # Code that is compiled and generated from a network's equations, kept on disk between processes.
 
 #: Subpackages with compiled code and with the constants that are compiled into it.
-_COMPILED = ('networks', 'dynamics', 'motion', 'feedback')
+_COMPILED_PACKAGES = ('networks', 'dynamics', 'motion', 'feedback')
 
 
 def folder(key: str = 'package') -> Path | None:
@@ -63,7 +63,7 @@ def _sources_digest() -> str:
     """Return a digest of all files with compiled code."""
     digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
-    for room in _COMPILED:
+    for room in _COMPILED_PACKAGES:
         for source in sorted((package / room).rglob('*.py')):
             digest.update(source.read_bytes())
     return digest.hexdigest()[:14]

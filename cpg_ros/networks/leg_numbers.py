@@ -37,10 +37,9 @@ BIPED = ('left', 'right')
 ROBOTS = {2: 'biped', 4: 'quadruped', 6: 'hexapod'}
 #: GIRDLES: names of the pairs of legs, from the head on.
 GIRDLES = ('fore', 'middle', 'hind')
-#: Largest number of legs.
-MOST = 32
+MAX_LEGS = 32
 
-_NUMBERED = re.compile(r'(?P<family>\w*?[a-z_])(?P<legs>\d+)')
+_NUMBERED_NAME = re.compile(r'(?P<family>\w*?[a-z_])(?P<legs>\d+)')
 
 
 def pairs(legs: int) -> tuple[str, ...]:
@@ -50,8 +49,8 @@ def pairs(legs: int) -> tuple[str, ...]:
         InputError: the number is not even, or not from 2 to MOST.
 
     """
-    if legs % 2 or not 2 <= legs <= MOST:
-        raise InputError(f'{legs} legs are not an even number from 2 to {MOST}')
+    if legs % 2 or not 2 <= legs <= MAX_LEGS:
+        raise InputError(f'{legs} legs are not an even number from 2 to {MAX_LEGS}')
     if legs == 2:
         return ('',)
     if legs <= 6:
@@ -134,7 +133,7 @@ def unpickle(family: type[AnyDefinition], legs: int, values: tuple[float, ...]) 
 
 def split_name(name: str) -> tuple[str, int] | None:
     """Split a name such as 'delayed6' into the family's name and the number of legs."""
-    match = _NUMBERED.fullmatch(name)
+    match = _NUMBERED_NAME.fullmatch(name)
     return (match['family'], int(match['legs'])) if match and len(match['legs']) < 4 else None
 
 

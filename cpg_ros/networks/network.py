@@ -334,9 +334,9 @@ class ParameterLine:
             name: sign * value for name, sign in zip(self.names, self.signs, strict=True)})
 
 
-#: ASYMMETRIC: change of the rates by a symmetry, over their size, that is no rounding error;
-#: STATES: number of random states at which it is computed.
-ASYMMETRIC, STATES = 1e-9, 8
+#: MAX_ASYMMETRY: change of the rates by a symmetry, over their size, that may be a rounding
+#: error; NUM_STATES: random states at which it is computed.
+MAX_ASYMMETRY, NUM_STATES = 1e-9, 8
 
 
 @lru_cache(maxsize=256)
@@ -347,14 +347,14 @@ def asymmetry(network: Network, symmetry: Symmetry) -> float:
     """
     field, variables = Field(network), network.variables
     cells = np.arange(variables)[:, None] * network.cells
-    now, past = np.random.default_rng(0).standard_normal((2, STATES, network.components))
+    now, past = np.random.default_rng(0).standard_normal((2, NUM_STATES, network.components))
     images = [((cells + np.array(symmetry.group.elements[name])).ravel(), 1.0)
               for name in symmetry.h]
     if symmetry.odd:
         images.append((np.arange(network.components), -1.0))
     with np.errstate(all='ignore'):
         rates = field.rates(now, past)
-        sizes = np.abs(rates).reshape(STATES, variables, -1).max(axis=(0, 2))
+        sizes = np.abs(rates).reshape(NUM_STATES, variables, -1).max(axis=(0, 2))
         gaps = [np.abs(field.rates(sign * now[:, image], sign * past[:, image])
                        - sign * rates[:, image]) / sizes.repeat(network.cells)
                 for image, sign in images]

@@ -27,9 +27,9 @@ from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 import numpy as np
 
-#: Largest absolute value of a parameter.
-LARGEST = 1e6
-DEFAULT = 'delayed'
+#: MAX_VALUE: of a parameter, absolute.
+MAX_VALUE = 1e6
+DEFAULT_NETWORK = 'delayed'
 
 
 def add_network_options(parser: ArgumentParser) -> None:
@@ -37,7 +37,7 @@ def add_network_options(parser: ArgumentParser) -> None:
     parser.add_argument('--network', metavar='NAME',
                         help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
                         f'one; quadruped+current is the quadruped with its constant current as a '
-                        f'parameter (default: {DEFAULT}, or that of --presets)')
+                        f'parameter (default: {DEFAULT_NETWORK}, or that of --presets)')
     parser.add_argument('--presets', type=Path, metavar='FILE', help='take --preset from this '
                         'file: preset.yaml of optimize, or the parameter file of inversion')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
@@ -52,8 +52,8 @@ def add_network_options(parser: ArgumentParser) -> None:
 
 def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
     """Return the network, its presets, and the name of the default preset or ''."""
-    name, file = args.network or DEFAULT, args.presets
-    reader = None if file is None else YamlReader(file, 'preset file', PresetError, LARGEST)
+    name, file = args.network or DEFAULT_NETWORK, args.presets
+    reader = None if file is None else YamlReader(file, 'preset file', PresetError, MAX_VALUE)
     tree = reader.tree() if reader else {}
     fitted = tree.get('/**') if isinstance(tree, dict) else None
     if reader and args.network is None:
@@ -117,8 +117,8 @@ def preset_from(args: Namespace) -> tuple[Preset, Network]:
     for key, value in args.set:
         if not np.isfinite(value):
             raise InputError(f'--set: {key} is {value:g}, it must be finite')
-        if abs(value) > LARGEST:
-            raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
+        if abs(value) > MAX_VALUE:
+            raise InputError(f'--set: {key} is {value:g}, it must be at most {MAX_VALUE:g}')
         network = network.replace(**{key: value})
     delay = kind.delay_parameter
     if delay and network.delay <= 0.0:

@@ -25,8 +25,8 @@ from cpg_ros.common.files import resource_folder
 from cpg_ros.common.yaml_reader import positive, within, write_yaml, YamlReader
 from cpg_ros.networks.definition import AnyDefinition
 
-#: LARGEST: largest number in a preset.
-LARGEST = 1e3
+#: MAX_VALUE: of a number in a preset.
+MAX_VALUE = 1e3
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,7 +64,7 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
         PresetError: the file cannot be read, is for another network, or has a bad value.
 
     """
-    reader = YamlReader(Path(path), 'preset file', PresetError, LARGEST)
+    reader = YamlReader(Path(path), 'preset file', PresetError, MAX_VALUE)
     tree = reader.keys(reader.tree(), 'file', {'network', 'presets'})
     if tree['network'] != network.name:
         raise reader.fail('network', f"is '{tree['network']}', not '{network.name}'")

@@ -37,11 +37,11 @@ from cpg_ros.common import files
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.networks.leg_numbers import GIRDLES, split_name, with_legs
 from cpg_ros.networks.library import shipped
-from cpg_ros.networks.network import ASYMMETRIC, asymmetry, Network, ParameterLine, Preset
+from cpg_ros.networks.network import asymmetry, MAX_ASYMMETRY, Network, ParameterLine, Preset
 
 #: Attributes that every network has.
-STATED = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs', 'usual_gait', 'free',
-          'line')
+REQUIRED_ATTRIBUTES = ('name', 'cells', 'states', 'readout', 'step', 'ranges', 'legs',
+                       'usual_gait', 'free', 'line')
 
 
 def definition_error(network: type[Network]) -> str:
@@ -51,7 +51,7 @@ def definition_error(network: type[Network]) -> str:
         ValueError: its presets or its line cannot be read.
 
     """
-    lacking = [name for name in STATED if not hasattr(network, name)]
+    lacking = [name for name in REQUIRED_ATTRIBUTES if not hasattr(network, name)]
     if lacking:
         return f'{network.__name__} does not state {", ".join(lacking)}'
     return next(chain(_names(network), _legs(network), _gaits(network)), '')
@@ -151,14 +151,14 @@ def _gaits(network: type[Network]) -> Iterator[str]:
                 yield f'{where}: its symmetry is of {count} cells, not {network.cells}'
             elif not preset.network.broken(symmetry):
                 change = asymmetry(preset.network, symmetry)
-                if change > ASYMMETRIC:
+                if change > MAX_ASYMMETRY:
                     yield (f'symmetry: the equations do not have that of the {preset.gait}, '
                            f'which changes their rates by {change:.1g} of their size')
 
 
-GROUP = 'cpg_ros.networks'
-#: LARGEST: largest file of a network, bytes.
-LARGEST = 4_000_000
+ENTRY_POINT_GROUP = 'cpg_ros.networks'
+#: MAX_SIZE: of a network's file, bytes.
+MAX_SIZE = 4_000_000
 #: SHIPPED: name -> network that comes with the package.
 SHIPPED: dict[str, type[Network]] = {network.name: network for network in shipped()}
 
@@ -178,7 +178,7 @@ class _Networks(Mapping[str, type[Network]]):
 
     @cached_property
     def _offered(self) -> dict[str, EntryPoint]:
-        return {point.name: point for point in entry_points(group=GROUP)
+        return {point.name: point for point in entry_points(group=ENTRY_POINT_GROUP)
                 if point.name not in SHIPPED}
 
     def __repr__(self) -> str:
@@ -335,7 +335,7 @@ def _of_file(path: Path) -> type[Network]:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise NetworkError(f'{path}: it is not a Python file')
-    with files.opened(path, NetworkError, largest=LARGEST):
+    with files.opened(path, NetworkError, largest=MAX_SIZE):
         pass
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     loader = spec.loader

@@ -233,7 +233,7 @@ def test_a_mesh_placed_without_end(tmp_path, monkeypatch, corners, nodes, words)
 
 
 def test_more_elements_than_any_robot_has(monkeypatch):
-    monkeypatch.setattr(files, 'MOST', 1000)
+    monkeypatch.setattr(files, 'MAX_ELEMENTS', 1000)
     assert len(files.parse(b'<a>' + b'<b/>' * 999 + b'</a>', InputError)) == 999
     with pytest.raises(InputError, match='it has more than 1000 elements'):
         files.parse(b'<a>' + b'<b/>' * 1000 + b'</a>', InputError)

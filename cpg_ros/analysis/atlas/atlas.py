@@ -45,7 +45,7 @@ from cpg_ros.analysis.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.common.command_line import named_interval, note, Parser, refuse_repeated, run, say
 from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.common.jobs import JobProgress, outcomes, ResilientExecutor
-from cpg_ros.common.workers import add_options, KEPT, working
+from cpg_ros.common.workers import add_options, INTERRUPT_MESSAGE, working
 from cpg_ros.fitting.inversion.results import library
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.network_options import add_network_options, network_from
@@ -238,7 +238,7 @@ def _map(args: argparse.Namespace) -> int:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Draw an atlas; return the exit code."""
-    return run(_parser(), _map, arguments, KEPT)
+    return run(_parser(), _map, arguments, INTERRUPT_MESSAGE)
 
 
 if __name__ == '__main__':

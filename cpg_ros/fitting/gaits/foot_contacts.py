@@ -29,24 +29,22 @@ from cpg_ros.fitting.gaits.steady_stretch import true_runs
 from cpg_ros.fitting.recordings.recording import FootLoads
 import numpy as np
 
-#: LOADED: a foot is on the ground above this fraction of the span from its least to its largest
-#: load. ALWAYS: a foot is never lifted if its least load exceeds this fraction of its largest.
-LOADED, ALWAYS = 0.15, 0.5
-#: LEAST, LARGEST: percentiles of a foot's loads that count as its least and largest.
-LEAST, LARGEST = 5.0, 95.0
-#: BOUNCE: fraction of a stride below which a contact or a lift is a bounce and is ignored.
-BOUNCE = 0.08
-#: STRIDES: fewest strides from which the phase of touchdown is read; DISAGREE: largest mean
-#: distance of touchdowns from their median, cycles; LONG: shortest contact that counts, over the
-#: usual one.
-STRIDES, DISAGREE, LONG = 3, 0.12, 0.5
-#: FEWEST: smallest number of samples of a stride that tells stance from swing.
-FEWEST = 12
-#: WALK: fraction of the time in flight up to which a gait is a walk; RUN: fraction from which it
-#: is a run. WALK is above 0, as a foot that is about to be lifted bears little and may count as
-#: lifted.
-#: By the motion of the feet it is a run from WALK on, and a walk from as much double support on.
-WALK, RUN = 0.1, 0.15
+#: CONTACT_THRESHOLD: of a foot on the ground, over the span from its least to its largest load.
+#: MAX_SWING_LOAD: least load of a foot that is lifted at all, over its largest.
+CONTACT_THRESHOLD, MAX_SWING_LOAD = 0.15, 0.5
+#: Percentiles of a foot's loads that count as its least and largest.
+LOW_PERCENTILE, HIGH_PERCENTILE = 5.0, 95.0
+#: MIN_DURATION: of a contact or lift, over the stride; shorter ones are bounces and are ignored.
+MIN_DURATION = 0.08
+#: For the phase of touchdown. MAX_PHASE_SCATTER: mean distance of touchdowns from their median,
+#: cycles; MIN_STANCE_RATIO: of a contact that counts, over the usual one.
+MIN_STRIDES, MAX_PHASE_SCATTER, MIN_STANCE_RATIO = 3, 0.12, 0.5
+#: MIN_STRIDE_SAMPLES: samples of a stride that tell stance from swing.
+MIN_STRIDE_SAMPLES = 12
+#: Fractions of the time in flight. MAX_WALK_FLIGHT is above 0, as a foot that is about to be
+#: lifted bears little and may count as lifted. By the motion of the feet it is a run from
+#: MAX_WALK_FLIGHT on, and a walk from as much double support on.
+MAX_WALK_FLIGHT, MIN_RUN_FLIGHT = 0.1, 0.15
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,9 +90,12 @@ class FootContacts(ShortRepr):
     def gait(self) -> str | None:
         """Walk or run, or None if the flight is between theirs."""
         if self.by_motion:
-            both = float(self.down.all(axis=1).mean())
-            return 'run' if self.flight >= WALK else 'walk' if both >= WALK else None
-        return 'walk' if self.flight <= WALK else 'run' if self.flight >= RUN else None
+            if self.flight >= MAX_WALK_FLIGHT:
+                return 'run'
+            return 'walk' if self.down.all(axis=1).mean() >= MAX_WALK_FLIGHT else None
+        if self.flight <= MAX_WALK_FLIGHT:
+            return 'walk'
+        return 'run' if self.flight >= MIN_RUN_FLIGHT else None
 
     def leads(self, phase: Callable[[np.ndarray], np.ndarray], legs: Sequence[str]
               ) -> dict[str, float] | None:
@@ -110,34 +111,36 @@ class FootContacts(ShortRepr):
             None for too few strides, or if the strides disagree.
 
         """
-        landed = {}
+        touchdowns = {}
         for leg in legs:
             begins, _, stances = self.strides(leg).T
-            if begins.size < STRIDES:
+            if begins.size < MIN_STRIDES:
                 return None
             # Of a foot that bounces, the begin of the longer contact counts.
-            own = phase(begins[stances > LONG * np.median(stances)])
+            own = phase(begins[stances > MIN_STANCE_RATIO * np.median(stances)])
             middle = float(np.angle(np.exp(2j * np.pi * own).mean())) / (2.0 * np.pi)
             off = (own - middle + 0.5) % 1.0 - 0.5
-            if np.abs(off - np.median(off)).mean() > DISAGREE:
+            if np.abs(off - np.median(off)).mean() > MAX_PHASE_SCATTER:
                 return None
-            landed[leg] = middle + float(np.median(off))
-        return {leg: (landed[legs[0]] - own) % 1.0 for leg, own in landed.items()}
+            touchdowns[leg] = middle + float(np.median(off))
+        return {leg: (touchdowns[legs[0]] - own) % 1.0 for leg, own in touchdowns.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
         down = self.down[:, self.legs.index(leg)]
-        touched = self.times[1:][down[1:] & ~down[:-1]]
-        lifted = self.times[1:][~down[1:] & down[:-1]]
-        ends = touched[1:]
-        stance = lifted[np.searchsorted(lifted, touched[:-1])] if len(ends) else ends
-        return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
+        touchdowns = self.times[1:][down[1:] & ~down[:-1]]
+        liftoffs = self.times[1:][~down[1:] & down[:-1]]
+        begins, ends = touchdowns[:-1], touchdowns[1:]
+        stance = liftoffs[np.searchsorted(liftoffs, begins)] if len(ends) else ends
+        return np.column_stack([begins, ends - begins, stance - begins])
 
 
-#: FALLS: downward acceleration over GRAVITY (m/s^2) from which on a body falls freely.
-#: NEVER, OFTEN: fractions of a stride of free fall up to which it walks, and from which on it
-#: runs. HARMONICS: number of harmonics of the body's height; POINTS: phases of its fall.
-FALLS, GRAVITY, NEVER, OFTEN, HARMONICS, POINTS = 0.7, 9.81, 0.02, 0.1, 6, 200
+#: FREE_FALL_RATIO: downward acceleration over GRAVITY (m/s^2) from which on a body falls freely.
+#: MAX_WALK_FALL, MIN_RUN_FALL: fractions of a stride of free fall up to which it walks, and from
+#: which on it runs. HARMONICS: number of harmonics of the body's height; POINTS: phases of its
+#: fall.
+FREE_FALL_RATIO, GRAVITY, MAX_WALK_FALL, MIN_RUN_FALL = 0.7, 9.81, 0.02, 0.1
+HARMONICS, POINTS = 6, 200
 
 
 def falling_fraction(phases: np.ndarray, height: np.ndarray, frequency: float) -> float:
@@ -156,7 +159,7 @@ def falling_fraction(phases: np.ndarray, height: np.ndarray, frequency: float) -
     grid = (np.exp(np.multiply.outer(np.arange(POINTS) / POINTS, exponents))
             * (exponents * frequency)**2)
     downward = -(grid.real @ weights[0] + grid.imag @ weights[1])
-    return float(np.mean(downward > FALLS * GRAVITY))
+    return float(np.mean(downward > FREE_FALL_RATIO * GRAVITY))
 
 
 def foot_contacts(loads: FootLoads, legs: Collection[str], begin: float, end: float,
@@ -178,17 +181,18 @@ def foot_contacts(loads: FootLoads, legs: Collection[str], begin: float, end: fl
         return None
     inside = (loads.times >= begin) & (loads.times <= end)
     times, rows = loads.times[inside], loads.loads[inside]
-    if len(times) < FEWEST * (end - begin) / period or not np.isfinite(rows).all():
+    if len(times) < MIN_STRIDE_SAMPLES * (end - begin) / period or not np.isfinite(rows).all():
         return None
-    least, largest = np.percentile(rows, [LEAST, LARGEST], axis=0)
-    level = np.where(least > ALWAYS * largest, -np.inf, least + LOADED * (largest - least))
-    down = rows > level
+    least, largest = np.percentile(rows, [LOW_PERCENTILE, HIGH_PERCENTILE], axis=0)
+    threshold = np.where(least > MAX_SWING_LOAD * largest, -np.inf,
+                         least + CONTACT_THRESHOLD * (largest - least))
+    down = rows > threshold
     # A foot that bounces touches down once.
     for state in (False, True):
         for column in down.T:
             for first, last in true_runs(column == state):
                 inner = first > 0 and last + 1 < len(times)
-                if inner and times[last + 1] - times[first] < BOUNCE * period:
+                if inner and times[last + 1] - times[first] < MIN_DURATION * period:
                     column[first:last + 1] = not state
     return FootContacts(named, times, down, loads.by_motion)
 

@@ -38,13 +38,13 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
          'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
          'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh',
          'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
-#: Words of joints of no leg. ARMS: of arms; APPENDAGES: of neither; OTHER: of both, and of the
-#: body; UPPER: of a biped's arms, which a quadruped's fore legs have as well.
+#: Words of joints of no leg. ARMS: of arms; APPENDAGES: of neither; NON_LEGS: of both, and of the
+#: body; UPPER_LIMBS: of a biped's arms, which a quadruped's fore legs have as well.
 ARMS = {'arm', 'gripper', 'finger', 'thumb', 'hand'}
 APPENDAGES = {'neck', 'head', 'tail', 'wheel', 'caster', 'rotor', 'eye', 'ear', 'camera',
               'antenna'}
-OTHER = {*ARMS, *APPENDAGES, 'torso', 'waist', 'trunk', 'spine', 'pelvis', 'thorax', 'progress'}
-UPPER = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
+NON_LEGS = {*ARMS, *APPENDAGES, 'torso', 'waist', 'trunk', 'spine', 'pelvis', 'thorax', 'progress'}
+UPPER_LIMBS = {'shoulder', 'sho', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 #: JOINTS: names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
           'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
@@ -53,9 +53,9 @@ HEXAPOD, QUADRUPED, BIPED = leg_names(6), leg_names(4), leg_names(2)
 
 _WORD = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
 #: Code of a leg that is counted from the head on, such as l1.
-_COUNTED = re.compile(r'(?<![a-z])([lr])([1-9])(?!\d)', re.IGNORECASE)
-_STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))',
-                    re.IGNORECASE)
+_NUMBERED_LEG = re.compile(r'(?<![a-z])([lr])([1-9])(?!\d)', re.IGNORECASE)
+_LEG_PREFIX = re.compile(
+    rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))', re.IGNORECASE)
 
 
 class LegsError(CpgError):
@@ -92,7 +92,7 @@ class Legs:
 
 def words_of(name: str) -> list[str]:
     """Split a name into lower-case words, at signs, digits, capitals, and after a code."""
-    words = [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
+    words = [word.lower() for word in _WORD.findall(_LEG_PREFIX.sub(r'\1_', name))]
     side = next((k for k, word in enumerate(words) if word in SIDES), len(words))
     return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
 
@@ -134,13 +134,13 @@ def limb_of(joints: Sequence[str]) -> str:
     Either ``other``, which is no leg, ``arm``, or ``upper``, an arm or a fore leg.
     """
     words = {word for name in joints[:-1] or joints for word in _moved(words_of(name))}
-    return next((kind for kind, known in (('other', APPENDAGES), ('arm', ARMS), ('upper', UPPER))
-                 if words & known), '')
+    return next((kind for kind, known in (('other', APPENDAGES), ('arm', ARMS),
+                                          ('upper', UPPER_LIMBS)) if words & known), '')
 
 
 def role_of(name: str) -> str:
     """Return a joint's name without its leg, equal for the same joint of each leg."""
-    counted, rest = _COUNTED.findall(name), _COUNTED.sub('', name)
+    counted, rest = _NUMBERED_LEG.findall(name), _NUMBERED_LEG.sub('', name)
     if len(counted) == 1 and any(sign.isalpha() for sign in rest):
         return ' '.join(words_of(rest))
     words = words_of(name)
@@ -161,16 +161,15 @@ def legs_of(joints: Sequence[str]) -> Legs:
     """
     counted = _counted(joints)
     if counted:
-        words_used = {name: ('', '',
-                             frozenset(_COUNTED.findall(name)[0])) for names in counted.values()
-                      for name in names}
+        words_used = {name: ('', '', frozenset(_NUMBERED_LEG.findall(name)[0]))
+                      for names in counted.values() for name in names}
         return Legs(counted, _explanation(counted, words_used, joints), _rest(counted, joints))
     _refuse_two(joints)
     words = {name: words_of(name) for name in joints}
     read = {name: _read(words[name]) for name in joints}
     # A code is a name's own, an L a hint: first four legs are looked for, or six.
     more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
-    for labels, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
+    for labels, column, others in ((more, 0, NON_LEGS), (BIPED, 1, NON_LEGS | UPPER_LIMBS)):
         legs = {leg: tuple(name for name in joints if read[name][column] == leg
                             and not others & set(_moved(words[name]))) for leg in labels}
         there = [leg for leg in labels if legs[leg]]
@@ -195,11 +194,12 @@ def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """
     by_leg: dict[tuple[str, int], list[str]] = {}
     for name in joints:
-        words_used = _COUNTED.findall(name)
+        words_used = _NUMBERED_LEG.findall(name)
         if len(words_used) == 1:
             by_leg.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
     pairs = len(by_leg) // 2
-    roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in by_leg.values()}
+    roles = {tuple(sorted(_NUMBERED_LEG.sub('', name) for name in names))
+             for names in by_leg.values()}
     expected = {(side, k + 1) for side in 'lr' for k in range(pairs)}
     if pairs < 3 or set(by_leg) != expected or len(roles) > 1 or len(next(iter(roles))) < 2:
         return {}
@@ -235,7 +235,7 @@ def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
     """
     ended = [name for name in joints if read[name][0] in there]
     plain = {role_of(name) for name in joints if read[name][1] and not read[name][0]
-             and not (OTHER | UPPER) & set(words_of(name))}
+             and not (NON_LEGS | UPPER_LIMBS) & set(words_of(name))}
     return (len({leg[1] for leg in there}) == 1 and all(read[name][1] for name in ended)
             and bool(plain) and plain.isdisjoint(map(role_of, ended)))
 

@@ -26,7 +26,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from cpg_ros.fitting.gaits.foot_contacts import FootContacts, NEVER, OFTEN
+from cpg_ros.fitting.gaits.foot_contacts import FootContacts, MAX_WALK_FALL, MIN_RUN_FALL
 from cpg_ros.fitting.gaits.leg_names import HEXAPOD, role_of
 from cpg_ros.fitting.gaits.mean_cycle import blocks, evaluate_coefficients, PhaseAverage
 from cpg_ros.fitting.gaits.recognition import best_shift, recognise
@@ -36,11 +36,9 @@ from scipy.special import stdtrit
 
 # Scatter of the legs' phases: by how much each leg is early or late in every stride.
 
-#: ENOUGH: least slope of a stride, as a fraction of the median stride's, for its phase to be
-#: estimated.
-ENOUGH = 0.5
-#: STRIDES: fewest strides from which a scatter is estimated.
-STRIDES = 3
+#: MIN_POWER_RATIO: squared slope of a stride, over the median stride's, for a phase of its own.
+MIN_POWER_RATIO = 0.5
+MIN_STRIDES = 3
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, average: PhaseAverage,
             for sums, values in ((along, left), (power, slopes)):
                 sums[row] += np.bincount(
                     stride[part], np.sum(values[:, columns] * slopes[:, columns], axis=1), count)
-    reliable = power > ENOUGH * np.median(power, axis=1, keepdims=True)
+    reliable = power > MIN_POWER_RATIO * np.median(power, axis=1, keepdims=True)
     early = np.full_like(along, np.nan)
     early[reliable] = along[reliable] / power[reliable]
     return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
@@ -100,7 +98,7 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, average: PhaseAverage,
 
 def _scatter(early: np.ndarray) -> PhaseScatter:
     reliable = early[np.isfinite(early)]
-    if reliable.size < STRIDES:
+    if reliable.size < MIN_STRIDES:
         return PhaseScatter(np.nan, np.nan, np.nan, reliable.size)
     spread = float(reliable.std(ddof=1))
     error = spread / np.sqrt(reliable.size)
@@ -116,10 +114,10 @@ JOINTS = (('coxayaw', 'thcyaw'), ('coxa', 'coxapitch', 'thcpitch'), ('coxaroll',
           ('femur', 'femurpitch', 'ctrpitch'), ('femurroll', 'ctrroll'),
           ('tibia', 'tibiapitch', 'ftipitch'))
 AXES = 'xyzyzy'
-#: LENGTHS: pair of legs of a fruit fly -> lengths of coxa, femur, and tibia with tarsus, mm;
-#: BEGINS: index of the joint after which each begins.
-LENGTHS = {'f': (0.40, 0.69, 1.17), 'm': (0.18, 0.78, 1.24), 'h': (0.20, 0.83, 1.39)}
-BEGINS = (2, 4, 5)
+#: SEGMENT_LENGTHS: pair of legs of a fruit fly -> lengths of coxa, femur, and tibia with tarsus,
+#: mm; SEGMENT_JOINTS: index of the joint after which each begins.
+SEGMENT_LENGTHS = {'f': (0.40, 0.69, 1.17), 'm': (0.18, 0.78, 1.24), 'h': (0.20, 0.83, 1.39)}
+SEGMENT_JOINTS = (2, 4, 5)
 #: POINTS: number of points of a cycle.
 POINTS = 128
 
@@ -145,8 +143,9 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
     turned, position = Rotation.identity(), np.zeros((angles[0].size, 3))
     for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
         turned = turned * Rotation.from_euler(axis, angle[:, None])
-        if k in BEGINS:
-            position -= LENGTHS[pair][BEGINS.index(k)] * turned.apply((0.0, 0.0, 1.0))
+        if k in SEGMENT_JOINTS:
+            length = SEGMENT_LENGTHS[pair][SEGMENT_JOINTS.index(k)]
+            position -= length * turned.apply((0.0, 0.0, 1.0))
     return position
 
 
@@ -176,18 +175,16 @@ def foot_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             for leg, position in forward.items()}
 
 
-#: SIGNED: ratio of a joint's mean angle to its RMS motion above which the mean has a sign.
-SIGNED = 1.0
-#: CLEARER: least difference of the correlations in either sense that decides a joint's sense.
-CLEARER = 0.2
-#: TELLING: variance of a joint, as a fraction of the largest, below which it decides no leg's
-#: phase.
-TELLING = 0.05
-#: SCATTER: RMS distance of real legs from the phases of their gait, cycles, for the odds of gaits.
-SCATTER = 0.06
-#: BY_CELLS: largest violation of a symmetry, over the cells' RMS; SAMPLES: samples of a cycle for
-#: it.
-BY_CELLS, SAMPLES = 0.2, 128
+#: MIN_MEAN_RATIO: of a joint's mean angle to its RMS motion, for the mean to have a sign.
+MIN_MEAN_RATIO = 1.0
+#: MIN_CORRELATION_GAIN: of one sense of a joint over the other, to decide between them.
+MIN_CORRELATION_GAIN = 0.2
+#: MIN_VARIANCE_RATIO: of a joint that decides a leg's phase, over the largest.
+MIN_VARIANCE_RATIO = 0.05
+#: PHASE_STD: RMS distance of real legs from the phases of their gait, cycles.
+PHASE_STD = 0.06
+#: SYMMETRY_TOLERANCE: violation over the cells' RMS; SAMPLES: of a cycle for it.
+SYMMETRY_TOLERANCE, SAMPLES = 0.2, 128
 
 
 @dataclass(frozen=True)
@@ -228,12 +225,12 @@ def _power(c: np.ndarray) -> float:
 def _sense(a: np.ndarray, b: np.ndarray) -> float:
     """Return 1 if two joints have the same sign convention, -1 if opposite ones, 0 if unknown."""
     levels, sizes = (a[0].real, b[0].real), np.sqrt([2.0 * _power(a), 2.0 * _power(b)])
-    if all(abs(level) > SIGNED * size for level, size in zip(levels, sizes, strict=True)):
+    if all(abs(level) > MIN_MEAN_RATIO * size for level, size in zip(levels, sizes, strict=True)):
         return float(np.sign(levels[0] * levels[1]))
     terms = _cross(a, b)
     gain = best_shift(terms)[1] - best_shift(-terms)[1]
     gain /= max(np.sqrt(_power(a) * _power(b)), 1e-300)
-    return float(np.sign(gain)) if abs(gain) > CLEARER else 0.0
+    return float(np.sign(gain)) if abs(gain) > MIN_CORRELATION_GAIN else 0.0
 
 
 def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
@@ -303,7 +300,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
     Also return the joints with opposite sign conventions, and whether any convention is known.
     """
     power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
-    least = TELLING**2 * max(power.values())
+    least = MIN_VARIANCE_RATIO**2 * max(power.values())
     senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
     # Pairs whose sense is known come first: the other pairs have to agree with them.
     pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
@@ -350,7 +347,7 @@ def _apart(phases: np.ndarray, target: np.ndarray, waves: np.ndarray) -> float:
 
 def _odds(nearest: float, other: float, legs: int) -> float:
     """Return the odds of a gait against the nearest one, from the distances of both."""
-    return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / SCATTER**2))
+    return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / PHASE_STD**2))
 
 
 def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch:
@@ -413,7 +410,7 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
     """
     table = {gait: _symmetry(network, gait) for gait in network.gaits()}
     cycle = evaluate_coefficients(c, np.arange(SAMPLES) / SAMPLES).T
-    recognised = recognise(cycle, next(iter(table.values())).group, table, BY_CELLS)
+    recognised = recognise(cycle, next(iter(table.values())).group, table, SYMMETRY_TOLERANCE)
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
                         for size in (recognised.distance, recognised.distance + recognised.margin))
@@ -438,7 +435,7 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
     if falling is not None:
         # Before what is only estimated of the feet, after what was measured of them.
         evidence.insert(0 if contacts is None or contacts.by_motion else 1, (
-            'walk' if falling <= NEVER else 'run' if falling >= OFTEN else None,
+            'walk' if falling <= MAX_WALK_FALL else 'run' if falling >= MIN_RUN_FALL else None,
             f'by the height of the body, which falls freely in {falling:.0%} of the stride'))
     gait, why = next(((name, words) for name, words in evidence if name), (None, ''))
     if gait is None:

@@ -23,13 +23,11 @@ import numpy as np
 
 # A harmonic series, its rows and its least-squares fit.
 
-#: HARMONICS: most harmonics of a mean cycle.
-HARMONICS = 32
-#: DETERMINED: least eigenvalue of the harmonics' normal matrix, at most 1, with which they are
-#: fitted.
-DETERMINED = 0.1
-#: BINS: phases of the cycle that are distinguished for that; many more than harmonics.
-BINS = 4096
+MAX_HARMONICS = 32
+#: MIN_EIGENVALUE: of the harmonics' normal matrix, at most 1, with which they are fitted.
+MIN_EIGENVALUE = 0.1
+#: PHASE_BINS: of a cycle for that matrix; many more than harmonics.
+PHASE_BINS = 4096
 
 
 def weights_of(c: np.ndarray) -> np.ndarray:
@@ -77,13 +75,13 @@ def resolvable_harmonics(t: np.ndarray, period: float) -> int:
     # Loaded where it is used, as is all of scipy here, for programs that fit nothing.
     from scipy.linalg import toeplitz
 
-    most = min(HARMONICS, (t.size - 1) // 4)
-    bins = np.bincount((t / period % 1.0 * BINS).astype(int) % BINS, minlength=BINS)
-    sums = np.fft.fft(bins)[:2 * most + 1] / t.size
+    most = min(MAX_HARMONICS, (t.size - 1) // 4)
+    bins = (t / period % 1.0 * PHASE_BINS).astype(int) % PHASE_BINS
+    sums = np.fft.fft(np.bincount(bins, minlength=PHASE_BINS))[:2 * most + 1] / t.size
     low, high = 0, most + 1
     while high - low > 1:
         middle = (low + high) // 2
-        if np.linalg.eigvalsh(toeplitz(sums[:2 * middle + 1]))[0] > DETERMINED:
+        if np.linalg.eigvalsh(toeplitz(sums[:2 * middle + 1]))[0] > MIN_EIGENVALUE:
             low = middle
         else:
             high = middle
@@ -124,16 +122,16 @@ def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 # The mean cycle, and how far each cycle is from it.
 
-#: AVERAGE_HARMONICS: most harmonics of a mean cycle.
+#: AVERAGE_HARMONICS: most harmonics of a PhaseAverage.
 AVERAGE_HARMONICS = 24
-#: A sample is a spike if it is off the mean cycle by more than FAR times the median distance and
-#: by more than WILD standard deviations of the joint.
-FAR, WILD = 30.0, 3.0
-#: BLOCK: samples of a long recording that are fitted at once; CYCLES: fewest cycles in them.
-BLOCK, CYCLES = 1 << 15, 20.0
-#: ENOUGH: fewest cycles with which the scatter is estimated at every phase; POOLED: number of
-#: cycles as which the scatter of all phases counts there, as that of a few may be small by chance.
-ENOUGH, POOLED = 4, 4
+#: A sample is a spike if it is off the mean cycle by more than SPIKE_MEDIAN_RATIO times the median
+#: distance and by more than SPIKE_STD_RATIO standard deviations of the joint.
+SPIKE_MEDIAN_RATIO, SPIKE_STD_RATIO = 30.0, 3.0
+#: BLOCK_SIZE: samples of a long recording that are fitted at once.
+BLOCK_SIZE, MIN_BLOCK_CYCLES = 1 << 15, 20.0
+#: MIN_CYCLES: for a scatter of its own at every phase; PRIOR_CYCLES: number of cycles as which the
+#: scatter of all phases counts there, as that of a few may be small by chance.
+MIN_CYCLES, PRIOR_CYCLES = 4, 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,7 +163,7 @@ class PhaseAverage(ShortRepr):
 
 def blocks(phases: np.ndarray) -> list[slice]:
     """Cut a long recording into parts of many cycles each, to limit memory."""
-    count = min(-(-phases.size // BLOCK), int((phases[-1] - phases[0]) / CYCLES))
+    count = min(-(-phases.size // BLOCK_SIZE), int((phases[-1] - phases[0]) / MIN_BLOCK_CYCLES))
     edges = np.linspace(0, phases.size, max(count, 1) + 1).astype(int)
     return [slice(low, high) for low, high in pairwise(edges)]
 
@@ -212,7 +210,8 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
         weights[:, alike], rest, bins = _fitted(at, x)
         for row, joint in enumerate(alike):
             far, variance = np.abs(rest[row]), float(x[row].var())
-            keep = (far <= FAR * np.median(far)) | (far <= WILD * np.sqrt(variance))
+            keep = far <= max(SPIKE_MEDIAN_RATIO * np.median(far),
+                              SPIKE_STD_RATIO * np.sqrt(variance))
             rests[joint] = at, rest[row], bins
             if not keep.all():
                 some, own, fewer = _fitted(at[keep], x[row:row + 1, keep])
@@ -260,8 +259,8 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
     # A single value has no scatter.
     free = np.maximum(number - 1, 0)
     pooled = square[free > 0].sum() / max(free.sum(), 1)
-    square = (np.full(bins, pooled) if np.median(number) < ENOUGH
-              else (square + POOLED * pooled) / (free + POOLED))
+    square = (np.full(bins, pooled) if np.median(number) < MIN_CYCLES
+              else (square + PRIOR_CYCLES * pooled) / (free + PRIOR_CYCLES))
     spread = np.sqrt(square)
     error = np.sqrt(square / np.maximum(number, 1) + middle**2)
     centres = (np.arange(bins) + 0.5) / bins

@@ -36,37 +36,37 @@ from cpg_ros.fitting.gaits.steady_stretch import longest_run, resample_evenly, S
 import numpy as np
 from scipy.linalg import solveh_banded
 
-#: BLOCKS: blocks in a period, at each of which a window begins; POINTS: points in a block.
-BLOCKS, POINTS = 8, 4
+#: NUM_BLOCKS: in a period, at each of which a window begins; BLOCK_SIZE: points in a block.
+NUM_BLOCKS, BLOCK_SIZE = 8, 4
 # A motion is steady if it meets the following four limits.
-#: WEAKEST: least amplitude, as a fraction of the typical one.
-WEAKEST = 0.4
-#: STRONGEST: largest amplitude, as a multiple of the typical one.
-STRONGEST = 2.5
-#: TOLERANCE: largest relative difference of a stride's rate from the median.
-TOLERANCE = 0.15
-#: ALIKE: least fraction of the motion in the typical direction; a walk has 1/4 of a trot's.
-ALIKE = 0.5
-#: A stride at the end of a stretch is left out if its RMS residual exceeds ODD times the median
-#: one and MARKED of the motion,
-ODD, MARKED = 3.0, 0.05
-#: or if its rate differs from the median by more than ODD_RATE times the median deviation and by
-#: more than the fraction MARKED_RATE.
-ODD_RATE, MARKED_RATE = 4.5, 0.03
-#: HARMONICS: harmonics that determine the phase; FEW: cycles below which there are no inner knots.
-HARMONICS, FEW = 8, 4.0
-#: HASTE: variance of the phase at an end, over that of strides' lengths (found by simulation:
+#: MIN_AMPLITUDE_RATIO: least amplitude, as a fraction of the typical one.
+MIN_AMPLITUDE_RATIO = 0.4
+#: MAX_AMPLITUDE_RATIO: largest amplitude, as a multiple of the typical one.
+MAX_AMPLITUDE_RATIO = 2.5
+#: RATE_TOLERANCE: relative difference of a stride's rate from the median.
+RATE_TOLERANCE = 0.15
+#: MIN_COHERENCE: fraction of the motion in the typical direction; a walk has 1/4 of a trot's.
+MIN_COHERENCE = 0.5
+#: A stride at the end of a stretch is left out if its RMS residual exceeds OUTLIER_RATIO times the
+#: median one and MIN_OUTLIER of the motion,
+OUTLIER_RATIO, MIN_OUTLIER = 3.0, 0.05
+#: or if its rate differs from the median by more than RATE_OUTLIER_RATIO times the median
+#: deviation and by more than the fraction MIN_RATE_OUTLIER.
+RATE_OUTLIER_RATIO, MIN_RATE_OUTLIER = 4.5, 0.03
+#: HARMONICS: that determine the phase; MIN_CYCLES: for knots inside.
+HARMONICS, MIN_CYCLES = 8, 4.0
+#: END_VARIANCE: of the phase at an end, over that of strides' lengths (found by simulation:
 #: strides with 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
-HASTE = 0.08
-#: DRIFTS: fewest rates in which a drift is separated from wander.
-DRIFTS = 12
-#: STEPS: steps of Gauss-Newton; FARTHEST: largest change of the phase in one, cycles.
-STEPS, FARTHEST = 6, 0.1
-#: STIFFNESS: weight of a knot's neighbours where there are no data around it.
-STIFFNESS = 1e-3
-#: MISSING: interval between samples, over the usual one or that of the grid, in which none of the
-#: grid's points count.
-MISSING = 2.5
+END_VARIANCE = 0.08
+#: MIN_DRIFT_RATES: number of rates in which a drift is separated from wander.
+MIN_DRIFT_RATES = 12
+#: MAX_STEP: change of the phase in one step, cycles.
+GAUSS_NEWTON_STEPS, MAX_STEP = 6, 0.1
+#: SMOOTHING: weight of a knot's neighbours where there are no data around it.
+SMOOTHING = 1e-3
+#: GAP_RATIO: interval between samples, over the usual one or that of the grid, in which none of
+#: the grid's points count.
+GAP_RATIO = 2.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,18 +115,18 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
         seed: stretch in which the motion repeats.
 
     """
-    step = seed.period / (BLOCKS * POINTS)
+    step = seed.period / (NUM_BLOCKS * BLOCK_SIZE)
     grid, y = resample_evenly(times, positions, 1.0 / step)
     step = grid[1] - grid[0]
-    period = BLOCKS * POINTS * step
-    blocks = len(y) // POINTS
-    parts = y[:blocks * POINTS].reshape(blocks, POINTS, -1)
-    phasor = np.exp(-2j * np.pi * np.arange(blocks * POINTS).reshape(blocks, POINTS)
-                    / (BLOCKS * POINTS))
+    period = NUM_BLOCKS * BLOCK_SIZE * step
+    blocks = len(y) // BLOCK_SIZE
+    parts = y[:blocks * BLOCK_SIZE].reshape(blocks, BLOCK_SIZE, -1)
+    phasor = np.exp(-2j * np.pi * np.arange(blocks * BLOCK_SIZE).reshape(blocks, BLOCK_SIZE)
+                    / (NUM_BLOCKS * BLOCK_SIZE))
     sums = np.concatenate([np.zeros((1, y.shape[1])),
                            np.cumsum(np.einsum('bp,bpj->bj', phasor, parts), axis=0)])
-    z = sums[BLOCKS:] - sums[:-BLOCKS]
-    middles = grid[0] + (np.arange(len(z)) + 0.5 * BLOCKS) * POINTS * step - 0.5 * step
+    z = sums[NUM_BLOCKS:] - sums[:-NUM_BLOCKS]
+    middles = grid[0] + (np.arange(len(z)) + 0.5 * NUM_BLOCKS) * BLOCK_SIZE * step - 0.5 * step
     inside = ((middles >= seed.begin + 0.499 * period) & (middles <= seed.end - 0.499 * period))
     if not inside.any():
         inside = np.abs(middles - 0.5 * (seed.begin + seed.end)) <= period
@@ -135,16 +135,16 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
     along = z @ direction.conj()
     sizes = np.abs(along)
     phases = (middles - grid[0]) / period + np.unwrap(np.angle(along)) / (2.0 * np.pi)
-    half = BLOCKS // 2
+    half = NUM_BLOCKS // 2
     ahead = np.minimum(np.arange(len(z)) + half, len(z) - 1)
     behind = np.maximum(np.arange(len(z)) - half, 0)
     rates = (phases[ahead] - phases[behind]) / np.maximum(middles[ahead] - middles[behind],
                                                           1e-300)
     typical, rate = np.median(sizes[inside]), np.median(rates[inside])
-    steady = ((sizes >= WEAKEST * typical) & (sizes <= STRONGEST * typical)
-              & (sizes**2 >= ALIKE * np.einsum('bj,bj->b', z, z.conj()).real))
-    if len(z) > BLOCKS:
-        steady &= np.abs(rates / rate - 1.0) <= TOLERANCE
+    steady = ((sizes >= MIN_AMPLITUDE_RATIO * typical) & (sizes <= MAX_AMPLITUDE_RATIO * typical)
+              & (sizes**2 >= MIN_COHERENCE * np.einsum('bj,bj->b', z, z.conj()).real))
+    if len(z) > NUM_BLOCKS:
+        steady &= np.abs(rates / rate - 1.0) <= RATE_TOLERANCE
     first, last = longest_run(steady & _joined(steady, inside)) or (0, len(z) - 1)
     # An incomplete block at the end of the recording is no reason to stop before it.
     end = times[-1] if last == len(z) - 1 else middles[last] + 0.5 * period
@@ -172,14 +172,14 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     # Convert to plain numbers, as results are written to files that accept no others.
     span = float(rough.end - rough.begin)
     within = index_range(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
-    grid, y = resample_evenly(times[within], positions[within], BLOCKS * POINTS * slope)
+    grid, y = resample_evenly(times[within], positions[within], NUM_BLOCKS * BLOCK_SIZE * slope)
     inside = index_range(grid, rough.begin, rough.end)
     # What is interpolated where many samples are missing is no motion.
     steps = np.diff(times[within])
     known = steps[np.clip(np.searchsorted(times[within], grid) - 1, 0, steps.size - 1)] <= (
-        MISSING * max(float(np.median(steps)), grid[1] - grid[0]))
+        GAP_RATIO * max(float(np.median(steps)), grid[1] - grid[0]))
     grid, x = grid[inside][known[inside]] - rough.begin, y.T[:, inside][:, known[inside]]
-    if span * slope < FEW:
+    if span * slope < MIN_CYCLES:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
         return PhaseEstimate(np.array([rough.begin, rough.end]), phases,
                              float(phases[1] - phases[0]) / span, error)
@@ -188,7 +188,7 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     while True:
         phases = _bent(grid, x, knots, phases)
         first, last = _steady(grid, x, knots, phases)
-        if last - first == knots.size - 2 or phases[last + 1] - phases[first] < FEW:
+        if last - first == knots.size - 2 or phases[last + 1] - phases[first] < MIN_CYCLES:
             break
         knots, phases = knots[first:last + 2], phases[first:last + 2]
         inside = index_range(grid, knots[0], knots[-1])
@@ -220,7 +220,7 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     rates = np.diff(phases) / np.diff(knots)
     n = rates.size
     off, free = rates - rates.mean(), n - 1
-    if n >= DRIFTS:
+    if n >= MIN_DRIFT_RATES:
         centred = np.arange(n) - 0.5 * (n - 1)
         off, free = off - centred * (centred @ rates) / (centred @ centred), n - 2
     own = float(off @ off) / max(free, 1)
@@ -235,7 +235,7 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     uneven, steps = weights - 1.0 / n, np.diff(weights, prepend=0.0, append=0.0)
     variance = (errors * (steps @ steps)
                 + wander * (2.0 * (uneven @ uneven) + uneven[1:] @ uneven[:-1]) / 3.0
-                + 2.0 * HASTE * wander / n**2)
+                + 2.0 * END_VARIANCE * wander / n**2)
     return float(weights @ rates), float(np.sqrt(max(variance, 0.0)))
 
 
@@ -261,21 +261,21 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
               ) -> tuple[np.ndarray, float]:
     """Fit a constant rate with the mean cycle eliminated; return phases and error."""
     centred = grid - 0.5 * span
-    for _ in range(2 * STEPS):
+    for _ in range(2 * GAUSS_NEWTON_STEPS):
         at = np.interp(grid, [0.0, span], phases)
         left, slope = _model(x, at)
         by_rate, rows = centred * slope, rows_of(at, HARMONICS)
         by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
         power = float(np.sum(by_rate * by_rate))
         step = float(np.sum(by_rate * left)) / max(power, 1e-300)
-        step = float(np.clip(step, -FARTHEST / span, FARTHEST / span))
+        step = float(np.clip(step, -MAX_STEP / span, MAX_STEP / span))
         phases = phases + step * span * np.array([-0.5, 0.5])
         if abs(step) * span < 1e-6:
             break
     # Blocks of an eighth of a cycle, all joints together, vary independently; the few harmonics
     # have taken their part of what is left.
     scores = np.einsum('jn,jn->n', by_rate, left)
-    block = (np.interp(grid, [0.0, span], phases - phases[0]) * BLOCKS).astype(int)
+    block = (np.interp(grid, [0.0, span], phases - phases[0]) * NUM_BLOCKS).astype(int)
     sums = np.bincount(block, scores)
     free = max(1.0 - (2 * HARMONICS + 1) / grid.size, 0.1)
     own = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
@@ -306,14 +306,15 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
     mean = x - left
     alike, power, typical = products(x, mean), products(x, x), products(mean, mean)
     rates = np.diff(phases) / np.diff(knots)
-    first, last = longest_run((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
-                              & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
-                              & (alike * np.abs(alike) >= ALIKE * power * typical)
+    first, last = longest_run((np.abs(rates / np.median(rates) - 1.0) <= RATE_TOLERANCE)
+                              & (alike >= MIN_AMPLITUDE_RATIO * typical)
+                              & (alike <= MAX_AMPLITUDE_RATIO * typical)
+                              & (alike * np.abs(alike) >= MIN_COHERENCE * power * typical)
                               ) or (0, rates.size - 1)
     apart = products(left, left)
     off = np.abs(rates - np.median(rates))
-    odd = ((apart > np.maximum(ODD**2 * np.median(apart), MARKED**2 * typical))
-           | (off > max(ODD_RATE * np.median(off), MARKED_RATE * np.median(rates))))
+    odd = ((apart > np.maximum(OUTLIER_RATIO**2 * np.median(apart), MIN_OUTLIER**2 * typical))
+           | (off > max(RATE_OUTLIER_RATIO * np.median(off), MIN_RATE_OUTLIER * np.median(rates))))
     while last - first > 2 and odd[first]:
         first += 1
     while last - first > 2 and odd[last]:
@@ -331,17 +332,17 @@ def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
         return (np.bincount(interval, low, knots.size)
                 + np.bincount(interval + 1, high, knots.size))
 
-    for _ in range(STEPS):
+    for _ in range(GAUSS_NEWTON_STEPS):
         left, slope = _model(x, np.interp(grid, knots, phases))
         stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
         bands = np.zeros((2, knots.size))
         bands[1] = gathered(stiff * before**2, stiff * after**2)
         bands[0, 1:] = np.bincount(interval, stiff * before * after, knots.size)[:-1]
-        tie = STIFFNESS * bands[1].mean() + 1e-300
+        tie = SMOOTHING * bands[1].mean() + 1e-300
         bands[1] += 2.0 * tie
         bands[0, 1:] -= tie
         step = solveh_banded(bands, gathered(pull * before, pull * after))
-        phases = phases + np.clip(step, -FARTHEST, FARTHEST)
+        phases = phases + np.clip(step, -MAX_STEP, MAX_STEP)
         if np.abs(step).max() < 1e-5:
             break
     return phases

@@ -25,34 +25,32 @@ from cpg_ros.fitting.gaits.mean_cycle import average_cycles, PhaseAverage
 from cpg_ros.fitting.gaits.phase_estimation import PhaseEstimate
 import numpy as np
 
-#: SURE: number of cycles below which the errors are rough.
-SURE = 3.0
-#: DRIFT: change of the frequency over the stretch, as a fraction of it, from which on a note is
-#: made.
-DRIFT = 0.04
-#: SAMPLES: samples per stride below which the true gait may be several times as fast (aliasing).
-SAMPLES = 20.0
-#: ALIKE: a mean cycle is n strides if less than this fraction of its power is off the multiples of
-#: n.
-ALIKE = 0.1
-#: SLOW: stride frequency, Hz, below which no leg steps; USUAL: range of frequencies, Hz, in which
-#: the same times in another unit must lie for that unit to be suggested.
-SLOW, USUAL = 0.05, (0.2, 12.5)
-#: UNITS: unit of time -> how many of it are a second.
-UNITS = {'ms': 1e3, 'us': 1e6, 'ns': 1e9}
-#: SWING: largest plausible range of a leg's joint, rad.
-SWING = 2.0 * np.pi
-#: CHANGE: change of a leg's phase between parts of a stretch, cycles, above which the gait
-#: changes.
-CHANGE = 0.1
-#: PARTS: names of the parts of a stretch that are compared; STRIDES: fewest strides of a part;
-#: FEWEST: fewest samples of each joint in a part.
-PARTS, STRIDES, FEWEST = ('at its beginning', 'in its middle', 'at its end'), 1, 16
-#: TOGETHER: largest phase difference, cycles, of legs that move together.
-#: SWAY: range of the joints, rad, below which such legs may only sway on the spot.
-TOGETHER, SWAY = 0.06, 0.3
-#: LIMPS: a leg limps if it moves by less than this fraction of the other legs' median motion.
-LIMPS = 0.6
+#: RELIABLE_CYCLES: with fewer, the errors are rough.
+RELIABLE_CYCLES = 3.0
+#: DRIFT_THRESHOLD: relative change of the frequency over the stretch that is noted.
+DRIFT_THRESHOLD = 0.04
+#: MIN_STRIDE_SAMPLES: with fewer, the true gait may be several times as fast (aliasing).
+MIN_STRIDE_SAMPLES = 20.0
+#: SUBHARMONIC_THRESHOLD: fraction of a mean cycle's power off the multiples of n, if it is n
+#: strides.
+SUBHARMONIC_THRESHOLD = 0.1
+#: MIN_FREQUENCY: of a leg's steps, Hz; FREQUENCY_RANGE: Hz, in which the same times in another
+#: unit must lie for that unit to be suggested.
+MIN_FREQUENCY, FREQUENCY_RANGE = 0.05, (0.2, 12.5)
+#: TIME_UNITS: unit of time -> how many of it are a second.
+TIME_UNITS = {'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+#: MAX_JOINT_RANGE: plausible for a leg's joint, rad.
+MAX_JOINT_RANGE = 2.0 * np.pi
+#: PHASE_CHANGE_THRESHOLD: change of a leg's phase between parts of a stretch, cycles.
+PHASE_CHANGE_THRESHOLD = 0.1
+#: Parts of a stretch that are compared; MIN_PART_SAMPLES: of each joint in a part.
+PART_NAMES = 'at its beginning', 'in its middle', 'at its end'
+MIN_PART_STRIDES, MIN_PART_SAMPLES = 1, 16
+#: IN_PHASE_TOLERANCE: of legs that move together, cycles. MAX_SWAY_RANGE: of the joints, rad, up
+#: to which such legs may only sway on the spot.
+IN_PHASE_TOLERANCE, MAX_SWAY_RANGE = 0.06, 0.3
+#: LIMP_RATIO: motion of a leg that limps, over the other legs' median motion.
+LIMP_RATIO = 0.6
 
 
 @dataclass(frozen=True)
@@ -84,21 +82,21 @@ def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndar
     power = np.sum(np.abs(c[1:])**2, axis=1)
     order = np.arange(1, len(c))
     for times in (3, 2):
-        if power[order % times > 0].sum() < ALIKE * power.sum():
+        if power[order % times > 0].sum() < SUBHARMONIC_THRESHOLD * power.sum():
             issues.append(QualityIssue(f'the mean cycle holds {times} that are alike: the gait '
                                       f'may be '
                                       f'{times} times as fast, {times * frequency:.4g} Hz', 0.2))
             break
-    if samples < SAMPLES:
+    if samples < MIN_STRIDE_SAMPLES:
         issues.append(QualityIssue(f'only {samples:.1f} samples a stride: a gait several times as '
                                   f'fast would look the same; record faster', 0.5))
-    if frequency < SLOW:
-        unit = next((unit for unit, more in UNITS.items()
-                     if USUAL[0] <= frequency * more <= USUAL[1]), '')
+    if frequency < MIN_FREQUENCY:
+        unit = next((unit for unit, more in TIME_UNITS.items()
+                     if FREQUENCY_RANGE[0] <= frequency * more <= FREQUENCY_RANGE[1]), '')
         issues.append(QualityIssue(f'a stride of {1.0 / frequency:.4g} s is slower than any leg'
                                    + (
-            f': if the times are in {unit}, it is {frequency * UNITS[unit]:.4g} Hz; declare it '
-            f'(--time {unit})' if unit else ''), 0.02))
+            f': if the times are in {unit}, it is {frequency * TIME_UNITS[unit]:.4g} Hz; declare '
+            f'it (--time {unit})' if unit else ''), 0.02))
     return issues
 
 
@@ -117,7 +115,7 @@ def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
     """Return an issue if a joint swings too far; mean cycles in rad, shape (joints, m)."""
     swing = np.ptp(mean, axis=1)
     k = int(np.argmax(swing))
-    if swing[k] <= SWING:
+    if swing[k] <= MAX_JOINT_RANGE:
         return []
     return [QualityIssue(f'{joints[k]} swings by {swing[k]:.3g} rad, more than a turn: if the '
                          f'angles are in degrees, declare it (--unit deg)', 0.5)]
@@ -132,7 +130,8 @@ def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIss
 
     """
     most = float(np.ptp(mean, axis=1).max())
-    if most >= SWAY or any(abs((phase + 0.5) % 1.0 - 0.5) > TOGETHER for phase in phases.values()):
+    if most >= MAX_SWAY_RANGE or any(abs((phase + 0.5) % 1.0 - 0.5) > IN_PHASE_TOLERANCE
+                                     for phase in phases.values()):
         return []
     return [QualityIssue(f'all legs move together, by no more than {most:.2g} rad: this also '
                          'happens when a standing body sways', 0.3)]
@@ -171,9 +170,9 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
 
     leg, pair = max(product(parts[0], combinations(range(len(parts)), 2)),
                     key=lambda couple: moved(*couple))
-    if moved(leg, pair) <= CHANGE:
+    if moved(leg, pair) <= PHASE_CHANGE_THRESHOLD:
         return []
-    at = [f'at {parts[k][leg]:.2f} {PARTS[k]}' for k in pair]
+    at = [f'at {parts[k][leg]:.2f} {PART_NAMES[k]}' for k in pair]
     return [QualityIssue(f'the gait changes within the stretch: of a cycle, {leg} is {at[0]} and '
                          f'{at[1]}', 0.2)]
 
@@ -181,10 +180,11 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
 def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
               names: Sequence[str]) -> list[dict[str, float]]:
     """Return leg -> phase, cycles, for each part of a stretch; nothing if it is too short."""
-    span, averages = phases[-1] - phases[0], []
-    edges = np.searchsorted(phases, phases[0] + span * np.arange(1, len(PARTS)) / len(PARTS))
+    span, averages, count = phases[-1] - phases[0], [], len(PART_NAMES)
+    edges = np.searchsorted(phases, phases[0] + span * np.arange(1, count) / count)
     for interval in map(slice, [0, *edges], [*edges, len(phases)]):
-        if span < len(PARTS) * STRIDES or (np.isfinite(x[interval]).sum(axis=0) < FEWEST).any():
+        samples = np.isfinite(x[interval]).sum(axis=0)
+        if span < count * MIN_PART_STRIDES or (samples < MIN_PART_SAMPLES).any():
             return []
         try:
             part = average_cycles(phases[interval], x[interval], np.zeros(1), [0])
@@ -202,7 +202,7 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
     limping_legs = []
     for leg, own in size.items():
         usual = float(np.median([other for name, other in size.items() if name != leg]))
-        if own < LIMPS * usual:
+        if own < LIMP_RATIO * usual:
             limping_legs.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
     return limping_legs
 
@@ -210,14 +210,14 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
 def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[str]) -> list[str]:
     """Return a line each on few cycles, a drift of the frequency, and dropped samples."""
     notes = []
-    if warp.cycles < SURE:
+    if warp.cycles < RELIABLE_CYCLES:
         notes.append(f'only {warp.cycles:.1f} cycles: errors are approximate, one value for each '
                      "joint's cycle, from the parts that occur twice")
     elif warp.knots.size > 4:
         middles = 0.5 * (warp.knots[1:] + warp.knots[:-1])
         slope = np.polyfit(middles, np.diff(warp.phases) / np.diff(warp.knots), 1)
         ends = np.polyval(slope, warp.knots[[0, -1]])
-        if abs(ends[1] - ends[0]) > DRIFT * warp.frequency:
+        if abs(ends[1] - ends[0]) > DRIFT_THRESHOLD * warp.frequency:
             notes.append(f'the frequency drifts from {ends[0]:.3g} to {ends[1]:.3g} Hz')
     wild = [f'{name} ({count})' for name, count in zip(names, average.spikes, strict=True)
             if count]
@@ -228,16 +228,16 @@ def quality_notes(warp: PhaseEstimate, average: PhaseAverage, names: Sequence[st
 
 # Travel, which phases do not show: whether legs walk on, step on the spot, or turn.
 
-#: PATH, SURE_AREA: area of the loop that two joints of a leg describe, relative to an ellipse of
-#: the same amplitudes. Below PATH the leg goes to and fro; above SURE_AREA its sense is certain.
-PATH, SURE_AREA = 0.25, 0.4
-#: MOVES: a joint is ignored if it moves by less than this fraction of the leg's largest motion.
-MOVES = 0.1
-#: COPY: largest fraction of its motion that a copy of another joint has for itself.
+#: Area of the loop that two joints of a leg describe, relative to an ellipse of the same
+#: amplitudes: below the first the leg goes to and fro, above the second its sense is certain.
+MIN_LOOP_AREA, CLEAR_LOOP_AREA = 0.25, 0.4
+#: MIN_MOTION_RATIO: of a joint that counts, over the leg's largest motion.
+MIN_MOTION_RATIO = 0.1
+#: COPY_TOLERANCE: fraction of its motion that a copy of another joint has for itself.
 #: JOINT_WORDS: words in common of joints that are copies whatever their ratio.
-COPY, JOINT_WORDS = 0.1, frozenset({'hip', 'thigh', 'knee', 'calf', 'shank', 'ankle'})
-#: TRAVELS: travel of the body in a stride from which on it does not step on the spot, m.
-TRAVELS = 0.1
+COPY_TOLERANCE, JOINT_WORDS = 0.1, frozenset({'hip', 'thigh', 'knee', 'calf', 'shank', 'ankle'})
+#: MIN_TRAVEL: of the body in a stride, m; with less it steps on the spot.
+MIN_TRAVEL = 0.1
 
 
 def _area(a: np.ndarray, b: np.ndarray) -> float:
@@ -256,9 +256,9 @@ def _without_copies(legs: Sequence[Mapping[str, str]], c: Mapping[str, np.ndarra
             pairs = [(c[own[other]][1:], c[own[role]][1:]) for own in legs]
             ratios = [float(np.sum(a.conj() * b).real / max(np.sum(np.abs(a)**2), 1e-300))
                       for a, b in pairs]
-            alike = all(np.sum(np.abs(b - ratio * a)**2) < COPY**2 * np.sum(np.abs(b)**2)
+            alike = all(np.sum(np.abs(b - ratio * a)**2) < COPY_TOLERANCE**2 * np.sum(np.abs(b)**2)
                         for ratio, (a, b) in zip(ratios, pairs, strict=True))
-            return alike and (all(abs(abs(ratio) - 1.0) < COPY for ratio in ratios)
+            return alike and (all(abs(abs(ratio) - 1.0) < COPY_TOLERANCE for ratio in ratios)
                               or bool(JOINT_WORDS & set(other.split()) & set(role.split())))
         if not any(map(copies, kept)):
             kept.append(role)
@@ -275,7 +275,7 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
     power = {role: sum(float(np.sum(np.abs(c[own[role]][1:])**2)) for own in roles)
              for role in sorted(set.intersection(*map(set, roles)))}
     most = _without_copies(roles, c, sorted(power, key=lambda role: -power[role]))[:2]
-    if len(most) < 2 or power[most[1]] < MOVES**2 * power[most[0]]:
+    if len(most) < 2 or power[most[1]] < MIN_MOTION_RATIO**2 * power[most[0]]:
         return {}, set()
     return ({leg: _area(*(c[own[role]] for role in sorted(most)))
              for leg, own in zip(legs, roles, strict=True)},
@@ -296,9 +296,9 @@ def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
 
     """
     loops, joints = _loops(legs, c)
-    if not loops or travel > TRAVELS:
+    if not loops or travel > MIN_TRAVEL:
         return []
-    if max(map(abs, loops.values())) < PATH:
+    if max(map(abs, loops.values())) < MIN_LOOP_AREA:
         return [QualityIssue('the joints of each leg go to and fro on one path: the legs step, '
                              'or hop, on the spot', 0.5)]
     # Fore and hind knees may bend in opposite senses: legs are compared across the body.
@@ -306,7 +306,7 @@ def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
     for leg, area in loops.items():
         across.setdefault(girdles.get(leg, ''), []).append(area)
     if not joints & set(opposite) and all(
-            min(own) < -SURE_AREA and max(own) > SURE_AREA for own in across.values()):
+            min(own) < -CLEAR_LOOP_AREA and max(own) > CLEAR_LOOP_AREA for own in across.values()):
         return [QualityIssue('the legs of one side step forward and those of the other back: it '
                              'turns on the spot', 0.3)]
     return []

@@ -29,10 +29,9 @@ import numpy as np
 
 # Comparison of waveforms: their lag, their difference in shape, the steadiness of their turning.
 
-TURN = 2.0 * np.pi
-#: GRID: number of shifts of a cycle that are tried; a mean cycle has far fewer harmonics.
-#: NEWTON: steps of Newton's method from the best of them.
-GRID, NEWTON = 1024, 6
+TWO_PI = 2.0 * np.pi
+#: GRID_SIZE: shifts of a cycle that are tried; a mean cycle has far fewer harmonics.
+GRID_SIZE, NEWTON_ITERATIONS = 1024, 6
 #: CENTRES: centres of a closed curve that are tried in each direction, over half its extent.
 CENTRES = np.linspace(-0.6, 0.6, 13)
 
@@ -52,15 +51,15 @@ def best_shift(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     """
     k = np.arange(terms.shape[-1])
-    start = np.fft.fft(terms, GRID).real.argmax(axis=-1) / GRID
+    start = np.fft.fft(terms, GRID_SIZE).real.argmax(axis=-1) / GRID_SIZE
     theta = start
-    for _ in range(NEWTON):
-        turned = terms * np.exp(-TURN * 1j * k * theta[..., None])
-        slope, bend = turned.imag @ k, -TURN * (turned.real @ (k * k))
+    for _ in range(NEWTON_ITERATIONS):
+        turned = terms * np.exp(-TWO_PI * 1j * k * theta[..., None])
+        slope, bend = turned.imag @ k, -TWO_PI * (turned.real @ (k * k))
         peak = bend < 0.0
         theta = np.clip(theta - np.where(peak, slope / np.where(peak, bend, 1.0), 0.0),
-                        start - 1.0 / GRID, start + 1.0 / GRID)
-    return theta, np.sum(terms * np.exp(-TURN * 1j * k * theta[..., None]), axis=-1).real
+                        start - 1.0 / GRID_SIZE, start + 1.0 / GRID_SIZE)
+    return theta, np.sum(terms * np.exp(-TWO_PI * 1j * k * theta[..., None]), axis=-1).real
 
 
 def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -82,7 +81,7 @@ def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def shifted(a: np.ndarray, theta: float) -> np.ndarray:
     """Return a(t + theta), theta in cycles, by its Fourier series."""
     terms = np.fft.rfft(a)
-    return np.fft.irfft(terms * np.exp(TURN * 1j * np.arange(terms.size) * theta), a.size)
+    return np.fft.irfft(terms * np.exp(TWO_PI * 1j * np.arange(terms.size) * theta), a.size)
 
 
 def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float:
@@ -122,12 +121,11 @@ def steadiness(v: np.ndarray, w: np.ndarray) -> float:
     x, y = v - CENTRES[:, None, None], w - CENTRES[:, None]
     speed = (x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)) / (x * x + y * y)
     # About a centre outside the curve the sum is 0, and where it turns twice in a cycle 4 pi.
-    once = np.abs(speed.sum(-1) - TURN) < np.pi
-    return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TURN
+    once = np.abs(speed.sum(-1) - TWO_PI) < np.pi
+    return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TWO_PI
 
 
-#: FEWEST: smallest number of points of a cycle.
-FEWEST = 8
+MIN_POINTS = 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -209,8 +207,8 @@ def _check(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry], tol
     if signals.ndim != 2 or signals.shape[1] != group.cells:
         raise ValueError(f'signals have the shape {signals.shape}; {group.cells} cells need '
                          f'(m, {group.cells})')
-    if len(signals) < FEWEST:
-        raise InputError(f'{len(signals)} points are not enough, at least {FEWEST} are needed')
+    if len(signals) < MIN_POINTS:
+        raise InputError(f'{len(signals)} points are not enough, at least {MIN_POINTS} are needed')
     if not np.isfinite(signals).all():
         raise InputError(f'signals holds {np.count_nonzero(~np.isfinite(signals))} values that '
                          'are not finite')

@@ -25,28 +25,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: FASTEST: largest stride frequency that is searched for, Hz.
-FASTEST = 12.5
-#: FEWEST: least points of a lag on its grid, which has up to twice as many.
-FEWEST = 12
-#: FINER: points of the even grid per sample if samples are few.
-FINER = 4.0
-#: GRID: most points of the finest grid.
-GRID = 1 << 18
-#: REPEATS: mean square difference, over twice the variance, below which signals repeat: 0 if
-#: exactly, 1 if they are unrelated.
-REPEATS = 0.25
-#: CYCLES: fewest cycles in which a repetition is found.
-CYCLES = 1.4
-#: A multiple of the lag is the period if its difference is less than the fraction BETTER of that
-#: of the lag reduced by LESS, and if it repeats for at least the fraction LASTING of the lag's
-#: stretch.
-BETTER, LESS, LASTING = 0.5, 0.02, 0.7
-#: NEAR: relative difference up to which two lags belong to one gait.
-NEAR = 0.1
+#: MAX_FREQUENCY: of strides that are searched for, Hz.
+MAX_FREQUENCY = 12.5
+#: MIN_LAG: points of a lag on its grid, which has up to twice as many.
+MIN_LAG = 12
+#: OVERSAMPLING: points of the even grid per sample if samples are few.
+OVERSAMPLING = 4.0
+MAX_GRID_SIZE = 1 << 18
+#: DIFFERENCE_THRESHOLD: mean square difference over twice the variance, below which signals
+#: repeat: 0 if exactly, 1 if they are unrelated.
+DIFFERENCE_THRESHOLD = 0.25
+#: MIN_CYCLES: of a repetition.
+MIN_CYCLES = 1.4
+#: A multiple of the lag is the period if its difference is less than MAX_DIFFERENCE_RATIO times
+#: that of the lag reduced by DIFFERENCE_OFFSET, and if it repeats for at least MIN_LENGTH_RATIO of
+#: the lag's stretch.
+MAX_DIFFERENCE_RATIO, DIFFERENCE_OFFSET, MIN_LENGTH_RATIO = 0.5, 0.02, 0.7
+#: LAG_TOLERANCE: relative difference of lags that belong to one gait.
+LAG_TOLERANCE = 0.1
 #: LAGS: lags that are tried on a grid, and windows of the local variance, points.
-LAGS = range(FEWEST - 1, 27)
-WIDTHS = (11, 14, 18, 22)
+LAGS = range(MIN_LAG - 1, 27)
+WINDOW_WIDTHS = (11, 14, 18, 22)
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,8 @@ def resample_evenly(times: np.ndarray, positions: np.ndarray, rate: float
 
     """
     span = times[-1] - times[0]
-    grid = times[0] + np.arange(int(min(span * rate, GRID)) + 1) / min(rate, GRID / span)
+    count = int(min(span * rate, MAX_GRID_SIZE)) + 1
+    grid = times[0] + np.arange(count) / min(rate, MAX_GRID_SIZE / span)
     signals = np.empty((positions.shape[1], grid.size)).T
     for signal, column in zip(signals.T, positions.T, strict=True):
         have = np.isfinite(column)
@@ -120,12 +120,12 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     squares = _summed(sum(column * column for column in columns))
     # Rounding errors of a constant signal are not motion.
     least = 1e-12 * squares[-1] / n + 1e-300
-    lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
+    lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= MIN_CYCLES * lag], int)
     variances: dict[int, np.ndarray] = {}
     differences = np.full((lags.size, n), np.inf)
     for row, lag in zip(differences, lags, strict=True):
         window = min(lag, n - lag)
-        width = min(max(k for k in WIDTHS if k <= lag), window)
+        width = min(max(k for k in WINDOW_WIDTHS if k <= lag), window)
         if width not in variances:
             means = ((sums[width:] - sums[:-width]) / width for sums in map(_summed, columns))
             variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
@@ -193,15 +193,15 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
     """
     step, start = times[1] - times[0], times[0]
     stretches = []
-    while len(y) >= CYCLES * FEWEST:
+    while len(y) >= MIN_CYCLES * MIN_LAG:
         lags, differences, variance = _differences(y)
-        for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
-            near = np.flatnonzero(np.abs(lags - lag) <= NEAR * lag)
-            for first, last in true_runs(differences[near].min(axis=0) < REPEATS):
+        for lag in lags[(lags >= MIN_LAG) & (lags < 2 * MIN_LAG)]:
+            near = np.flatnonzero(np.abs(lags - lag) <= LAG_TOLERANCE * lag)
+            for first, last in true_runs(differences[near].min(axis=0) < DIFFERENCE_THRESHOLD):
                 found_lag = _best_lag(lags, differences[:, first:last + 1], near)
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
-                if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
+                if found_lag is not None and end - begin >= MIN_CYCLES * found_lag[0]:
                     stretches.append(Stretch(
                         start + begin * step, start + end * step, found_lag[0] * step,
                         found_lag[1], found_lag[2],
@@ -219,12 +219,13 @@ def best_stretch(stretches: list[Stretch]) -> Stretch:
     """
     best = max(stretches,
                key=lambda stretch: stretch.cycles * stretch.size * (1.0 - stretch.difference))
+    limit, typical_limit = (MAX_DIFFERENCE_RATIO * (difference - DIFFERENCE_OFFSET)
+                            for difference in (best.difference, best.typical))
     for times in (2, 3):
         for stretch in stretches:
-            if (abs(stretch.period / best.period / times - 1.0) < NEAR / 2
+            if (abs(stretch.period / best.period / times - 1.0) < LAG_TOLERANCE / 2
                     and not stretch.outside(best.begin, best.end)
-                    and stretch.end - stretch.begin >= LASTING * (best.end - best.begin)
-                    and stretch.difference < BETTER * (best.difference - LESS)
-                    and stretch.typical < BETTER * (best.typical - LESS)):
+                    and stretch.end - stretch.begin >= MIN_LENGTH_RATIO * (best.end - best.begin)
+                    and stretch.difference < limit and stretch.typical < typical_limit):
                 return stretch
     return best

@@ -53,18 +53,18 @@ from cpg_ros.fitting.gaits.quality_checks import (
     check_sway,
     check_travel,
     limping,
+    MAX_JOINT_RANGE,
     quality_notes,
     QualityIssue,
-    SURE,
-    SWING,
+    RELIABLE_CYCLES,
 )
 from cpg_ros.fitting.gaits.steady_stretch import (
     best_stretch,
-    CYCLES,
-    FASTEST,
-    FEWEST,
     find_stretches,
-    FINER,
+    MAX_FREQUENCY,
+    MIN_CYCLES,
+    MIN_LAG,
+    OVERSAMPLING,
     resample_evenly,
 )
 from cpg_ros.fitting.recordings.recording import FootLoads, Recording
@@ -73,11 +73,11 @@ import numpy as np
 
 # Joints of a recording with enough samples, without spikes.
 
-#: SAMPLES: fewest samples of a joint.
-SAMPLES = 8
-#: SPIKE: a sample is a spike if it is off the mean of its neighbours by this many standard
+#: MIN_SAMPLES: of a joint.
+MIN_SAMPLES = 8
+#: SPIKE_RATIO: a sample is a spike if it is off the mean of its neighbours by this many standard
 #: deviations of the joint, and by this multiple of their difference.
-SPIKE = 3.0
+SPIKE_RATIO = 3.0
 
 
 class NoSteadyGait(CpgError):
@@ -105,24 +105,24 @@ def usable_joints(recording: Recording, legs: Mapping[str, Sequence[str]]
     for column, name in zip(x.T, listed, strict=True):
         column[:] = recording.positions[:, recording.joints.index(name)]
         column[np.isinf(column)] = np.nan
-    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
+    enough = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
     spikes = 0
     for k in np.flatnonzero(enough):
         column = x[:, k]
         before, here, after = column[:-2], column[1:-1], column[2:]
         off = np.abs(here - 0.5 * (before + after))
         with np.errstate(invalid='ignore'):
-            wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
+            wild = off > SPIKE_RATIO * np.maximum(np.nanstd(column), np.abs(after - before))
         here[wild] = np.nan
         spikes += int(np.count_nonzero(wild))
     # A joint of spikes alone has no samples left.
-    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
+    enough = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
     names = [name for name, good in zip(listed, enough, strict=True) if good]
     lost = [name for name in listed if name not in names]
     notes = [f'left out, without angles: {", ".join(lost)}'] if lost and names else []
-    if len(recording.times) < SAMPLES:
+    if len(recording.times) < MIN_SAMPLES:
         raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
-                           f'for a gait, at least {SAMPLES} are needed')
+                           f'for a gait, at least {MIN_SAMPLES} are needed')
     usable = _kept(legs, names, recording.source)
     x = x if enough.all() else x[:, enough]
     if spikes:
@@ -145,7 +145,7 @@ def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarra
         NoSteadyGait: a leg has no joint left.
 
     """
-    full = np.isfinite(x).sum(axis=0) >= SAMPLES
+    full = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
     if full.all():
         return names, legs, full
     lost = [name for name, good in zip(names, full, strict=True) if not good]
@@ -166,20 +166,19 @@ def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
     return names_of_leg
 
 
-#: POINTS: number of points of a mean cycle.
+#: POINTS: of a mean cycle.
 POINTS = 64
-#: STILL: range of all joints below which the robot stands, rad.
-STILL = 0.01
-#: ALIKE: largest mean square difference, over twice the variance, of stretches with fewer cycles
-#: than SURE.
-ALIKE = 0.1
-#: UNEXPLAINED: largest fraction of the joints' variance that the mean cycle may leave unexplained.
-UNEXPLAINED = 0.5
-#: SEEDS: most stretches that are followed; OTHERS: cycles of another one from which on it is
-#: noted.
-SEEDS, OTHERS = 4, 3.0
-#: FEW_CYCLES: factor of the confidence for fewer cycles than SURE.
-FEW_CYCLES = 0.95
+#: MIN_JOINT_RANGE: rad; a robot whose joints all move by less stands.
+MIN_JOINT_RANGE = 0.01
+#: MAX_DIFFERENCE: mean square, over twice the variance, of stretches with fewer cycles than
+#: RELIABLE_CYCLES.
+MAX_DIFFERENCE = 0.1
+#: MAX_RESIDUAL_VARIANCE: that the mean cycle may leave, over the joints' variance.
+MAX_RESIDUAL_VARIANCE = 0.5
+#: MAX_SEEDS: stretches that are followed; MIN_OTHER_CYCLES: of another one that is noted.
+MAX_SEEDS, MIN_OTHER_CYCLES = 4, 3.0
+#: FEW_CYCLES_FACTOR: of the confidence for fewer cycles than RELIABLE_CYCLES.
+FEW_CYCLES_FACTOR = 0.95
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -322,8 +321,8 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
               *check_sway(ahead, mean),
               *check_change(phases, x, leading, names, lambda part: match_gait(part, kind).gait),
               *check_travel(usable, c, kind.girdles, opposite, _travel(body, inside, warp))]
-    if warp.cycles < SURE:
-        issues.append(QualityIssue('', FEW_CYCLES))
+    if warp.cycles < RELIABLE_CYCLES:
+        issues.append(QualityIssue('', FEW_CYCLES_FACTOR))
     gait = _decide(gait, kind, (c, cells, gains), contacts, None if body is None else
                    falling_fraction(phases, body[inside][:, 2], warp.frequency), known)
     if len(gait.alike) > 1:
@@ -371,10 +370,11 @@ def _decide(gait: GaitMatch, kind: type[Network], signals: tuple[
 def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> PhaseEstimate:
     """Return the phase in a stretch, if enough of its cycles are alike."""
     warp = estimate_phase(times, x, rough)
-    if warp.cycles < CYCLES:
+    if warp.cycles < MIN_CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.2f} cycles of '
-                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed: '
-                           f'record {SURE:g} strides or more, {SURE / warp.frequency:.3g} s')
+                           f'{1.0 / warp.frequency:.3g} s are alike, {MIN_CYCLES:g} are needed: '
+                           f'record {RELIABLE_CYCLES:g} strides or more, '
+                           f'{RELIABLE_CYCLES / warp.frequency:.3g} s')
     return warp
 
 
@@ -387,7 +387,7 @@ def _average(phases: np.ndarray, x: np.ndarray, theta: np.ndarray, leading: list
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
     left = float(np.sum(average.left * power) / np.sum(power))
-    if left > UNEXPLAINED:
+    if left > MAX_RESIDUAL_VARIANCE:
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of {1.0 / frequency:.3g} s,'
                            f' leaves {100.0 * left:.0f} % of the variance')
     return average
@@ -403,55 +403,55 @@ def _travel(body: np.ndarray | None, inside: slice, warp: PhaseEstimate) -> floa
 def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
     """Find the longest stretch of steady motion; return it, and notes on the others."""
     reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
-    if reach.max() < STILL:
+    if reach.max() < MIN_JOINT_RANGE:
         raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '
                            f'{reach.max():.2g} rad')
-    rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
+    rate = min(MIN_LAG * MAX_FREQUENCY, OVERSAMPLING / float(np.median(np.diff(times))))
     stretches = find_stretches(*resample_evenly(times, x, rate))
     if not stretches:
         raise NoSteadyGait(f'{source}: no steady gait: the joints move by up to '
                            f'{reach.max():.2g} rad, but no stride of up to '
-                           f'{times[-1] / CYCLES:.3g} s repeats for {CYCLES:g} cycles' + _hint(
-                               times, x, reach))
+                           f'{times[-1] / MIN_CYCLES:.3g} s repeats for {MIN_CYCLES:g} cycles'
+                           + _hint(times, x, reach))
     regions: list[tuple[RoughPhase, float]] = []
     largest = max(stretch.size for stretch in stretches)
-    for _ in range(SEEDS):
+    for _ in range(MAX_SEEDS):
         if not stretches:
             break
         seed = best_stretch(stretches)
         # Two strides may be alike by chance, if not in all joints.
-        if seed.cycles >= SURE or seed.difference <= ALIKE:
+        if seed.cycles >= RELIABLE_CYCLES or seed.difference <= MAX_DIFFERENCE:
             regions.append((grow_stretch(times, x, seed), seed.period))
             stretches = [stretch for stretch in stretches if stretch.outside(regions[-1][0].begin,
                                                          regions[-1][0].end)]
         stretches = [stretch for stretch in stretches if stretch.outside(seed.begin, seed.end)
-                 and stretch.cycles >= OTHERS and stretch.size >= 0.5 * largest]
+                 and stretch.cycles >= MIN_OTHER_CYCLES and stretch.size >= 0.5 * largest]
     if not regions:
         raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
                            f'only roughly, and for {seed.cycles:.1f} cycles of '
-                           f'{seed.period:.3g} s: record {SURE:g} strides or more')
+                           f'{seed.period:.3g} s: record {RELIABLE_CYCLES:g} strides or more')
     regions.sort(key=lambda stretch: stretch[0].begin - stretch[0].end)
     rough = regions[0][0]
     notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {other.begin:.2f} to '
              f'{other.end:.2f} s, is shorter and left out' for other, period in regions[1:]
              if (min(other.end, rough.end) - max(other.begin, rough.begin)
                  < 0.5 * (other.end - other.begin))
-             and other.end - other.begin >= OTHERS * period]
+             and other.end - other.begin >= MIN_OTHER_CYCLES * period]
     return rough, notes
 
 
 def _hint(times: np.ndarray, x: np.ndarray, reach: np.ndarray) -> str:
     """Return a remedy where joints do not repeat: another unit, or more strides."""
-    if reach.max() > SWING:
+    if reach.max() > MAX_JOINT_RANGE:
         return ': if the angles are in degrees, declare it (--unit deg)'
     # Half a stride is at least as long as the slowest joint takes from its least to its largest.
     there = [np.flatnonzero(np.isfinite(column)) for column in x.T]
     half = max(abs(float(times[own[np.argmax(column[own])]] - times[own[np.argmin(column[own])]]))
                for own, column in zip(there, x.T, strict=True))
-    if times[-1] > 2.0 * CYCLES * half:
+    if times[-1] > 2.0 * MIN_CYCLES * half:
         return ''
-    return (f': it lasts {times[-1]:.3g} s, which may be a single stride: record {SURE:g} or '
-            f'more, {2.0 * SURE * half:.2g} s or longer')
+    return (f': it lasts {times[-1]:.3g} s, which may be a single stride: record '
+            f'{RELIABLE_CYCLES:g} or more, {2.0 * RELIABLE_CYCLES * half:.2g} s or longer')
 
 
 def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],

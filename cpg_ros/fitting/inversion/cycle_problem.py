@@ -26,10 +26,10 @@ from cpg_ros.fitting.inversion.fit_data import (
     basis,
     basis_moved,
     Joints,
+    NUM_WEIGHTS,
     project,
     Signals,
     signals,
-    WEIGHTS,
 )
 from cpg_ros.fitting.inversion.free_parameters import (
     Coordinates,
@@ -46,10 +46,10 @@ from cpg_ros.fitting.inversion.leg_duty import (
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: KEPT: number of orbits that are kept, the last ones.
-KEPT = 64
-#: ERRORS: number of harmonics of a waveform that may differ from the model's.
-ERRORS = 4
+#: MAX_ORBITS: that are kept, the last ones.
+MAX_ORBITS = 64
+#: ERROR_HARMONICS: of a waveform that may differ from the model's.
+ERROR_HARMONICS = 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -138,7 +138,7 @@ class CycleProblem:
     @property
     def weights(self) -> int:
         """Number of values of a joint's readout, with its offset."""
-        return 1 + WEIGHTS[self.order]
+        return 1 + NUM_WEIGHTS[self.order]
 
     def begin(self, values: np.ndarray) -> None:
         """Solve for a first orbit without one nearby, unless that has been done.
@@ -158,7 +158,7 @@ class CycleProblem:
 
     def _keep(self, values: np.ndarray, orbit: Orbit) -> tuple[Orbit, Signals]:
         solved = self._orbits.solved
-        while len(solved) >= KEPT:
+        while len(solved) >= MAX_ORBITS:
             del solved[next(iter(solved))]
         key = values[:self._own].tobytes()
         solved[key] = orbit, signals(orbit, self.readout.harmonics)
@@ -215,11 +215,12 @@ class CycleProblem:
     def by_waveform(self, values: np.ndarray) -> np.ndarray:
         """Return the derivative of the residual by errors of the waveforms, rad.
 
-        Errors are the cosine and sine terms of the first ``ERRORS`` harmonics of every waveform,
-        relative to half its range. Readouts are refitted. The shape is (m, joints, terms).
+        Errors are the cosine and sine terms of the first ``ERROR_HARMONICS`` harmonics of every
+        waveform, relative to half its range. Readouts are refitted. The shape is (m, joints,
+        terms).
         """
         orbit, seen = self._solve(values)
-        waves, count = len(seen.terms), min(ERRORS, seen.terms.shape[1] - 1) + 1
+        waves, count = len(seen.terms), min(ERROR_HARMONICS, seen.terms.shape[1] - 1) + 1
         slopes = np.zeros((waves, seen.terms.shape[1], waves, 2, count), dtype=complex)
         for wave in range(waves):
             slopes[wave, :count, wave] = np.eye(count)[:, None] * np.array([1.0, -1j])[:, None]

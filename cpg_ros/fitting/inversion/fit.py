@@ -37,24 +37,25 @@ from scipy.special import chdtri, stdtrit
 
 #: QUANTILE: half the width of a 95 % interval, standard errors.
 QUANTILE = 1.959964
-#: ZERO: singular value of the scaled derivative, over the largest, up to which it is 0; FRACTION:
-#: component of a number in such a direction above which the number is not determined.
-ZERO, FRACTION = 1e-7, 1e-3
-#: CURVED: half width of an interval, over the value, above which costs are not taken for
-#: quadratic; STEPS: most steps to the end of such an interval; CLOSE: relative tolerance there;
-#: FURTHER: length of a step over that of the last one, at most; SHORT: what a step that meets the
-#: edge of where there is an orbit misses of its length, at least; NEGLIGIBLE: distance from a
-#: bound, over the interval's quadratic half width, up to which a number is at the bound.
-CURVED, STEPS, CLOSE, FURTHER, SHORT, NEGLIGIBLE = 0.05, 10, 0.03, 3.0, 0.2, 1e-6
-#: Of a descent with one number given. TOLERANCE: at which it stops; MOST: most evaluations; DRAWN:
-#: width, over its size, of the residual that draws the number to its target.
-TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
-#: EXPLAINED: RMS residual, in its standard errors, up to which noise explains it.
-EXPLAINED = 1.1
-#: CHANCE: probability that noise alone is taken for an error of the model; SHOWN: variance of the
-#: noise along a waveform's harmonics, over its mean, as readouts take a part of it and mean cycles
-#: have fewer harmonics than instants.
-CHANCE, SHOWN = 0.01, 1.5
+#: RANK_TOLERANCE: singular value of the scaled derivative, over the largest, up to which it is 0;
+#: NULL_THRESHOLD: component of a number in such a direction from which on it is not determined.
+RANK_TOLERANCE, NULL_THRESHOLD = 1e-7, 1e-3
+#: MAX_QUADRATIC_WIDTH: half width of an interval, over the value, up to which costs are taken for
+#: quadratic; MAX_STEPS: to the end of a wider one; INTERVAL_TOLERANCE: relative, there;
+#: MAX_STEP_GROWTH: of a step over the last one; EDGE_THRESHOLD: fraction of its length that a step
+#: misses where orbits end; BOUND_TOLERANCE: distance from a bound, over the interval's quadratic
+#: half width, up to which a number is at the bound.
+MAX_QUADRATIC_WIDTH, MAX_STEPS, INTERVAL_TOLERANCE = 0.05, 10, 0.03
+MAX_STEP_GROWTH, EDGE_THRESHOLD, BOUND_TOLERANCE = 3.0, 0.2, 1e-6
+#: Of a descent with one number given (profile likelihood). CONSTRAINT_WIDTH: width, over its size,
+#: of the residual that draws the number to its target.
+PROFILE_TOLERANCE, MAX_EVALUATIONS, CONSTRAINT_WIDTH = 1e-4, 30, 0.3
+#: MAX_NOISE_RATIO: RMS residual that noise explains, in its standard errors.
+MAX_NOISE_RATIO = 1.1
+#: SIGNIFICANCE: of an error of the model; NOISE_VARIANCE_RATIO: variance of the noise along a
+#: waveform's harmonics, over its mean, as readouts take a part of it and mean cycles have fewer
+#: harmonics than instants.
+SIGNIFICANCE, NOISE_VARIANCE_RATIO = 0.01, 1.5
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class Spread(ShortRepr):
         """Standard errors, shape (n,); infinite for numbers that are not determined."""
         errors = np.sqrt(np.diag(self.covariance))
         if len(self.blind):
-            errors[np.abs(self.blind).max(axis=0) > FRACTION] = np.inf
+            errors[np.abs(self.blind).max(axis=0) > NULL_THRESHOLD] = np.inf
         return errors
 
     @property
@@ -148,7 +149,7 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
     size = np.linalg.norm(jacobian, axis=0)
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     values, rows = np.linalg.svd(jacobian * scale, full_matrices=False)[1:]
-    seen = values > ZERO * max(values[0], 1e-300)
+    seen = values > RANK_TOLERANCE * max(values[0], 1e-300)
     half = rows[seen] / values[seen, None]
     return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale,
                   inflation)
@@ -191,12 +192,13 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
     """
     size = np.linalg.norm(jacobian, axis=0)
     scaled = jacobian / np.where(size > 0.0, size, 1.0)
-    absorbed = np.linalg.pinv(scaled, ZERO) @ by_waveform
+    absorbed = np.linalg.pinv(scaled, RANK_TOLERANCE) @ by_waveform
     ways, seen, _ = np.linalg.svd(by_waveform - scaled @ absorbed, full_matrices=False)
-    ways, seen = ways[:, seen > ZERO * seen[0]], seen[seen > ZERO * seen[0]]**2
-    excess = float(residual @ residual) - EXPLAINED**2 * noise
-    shown, level = float(np.sum((residual @ ways)**2)), SHOWN * noise / residual.size
-    if shown > chdtri(seen.size, CHANCE) * level:
+    ways, seen = ways[:, seen > RANK_TOLERANCE * seen[0]], seen[seen > RANK_TOLERANCE * seen[0]]**2
+    excess = float(residual @ residual) - MAX_NOISE_RATIO**2 * noise
+    shown = float(np.sum((residual @ ways)**2))
+    level = NOISE_VARIANCE_RATIO * noise / residual.size
+    if shown > chdtri(seen.size, SIGNIFICANCE) * level:
         # In the few directions of such errors far less of them shows than in the whole residual.
         excess = max(excess, shown - seen.size * level)
     if excess <= 0.0 or not seen.size:
@@ -222,7 +224,7 @@ def estimates(problem: CycleProblem, values: np.ndarray, uncertainty: Spread,
     """
     result, count = {}, len(problem.free)
     halves = np.hypot(QUANTILE * uncertainty.errors, model.quantile * model.errors)[:count]
-    wide = bool((halves > CURVED * np.abs(values[:count])).any())
+    wide = bool((halves > MAX_QUADRATIC_WIDTH * np.abs(values[:count])).any())
     curved = wide and not (straight or model.size)
     for k, (free, half) in enumerate(zip(problem.free, halves.tolist(), strict=True)):
         value = float(values[k])
@@ -256,22 +258,22 @@ def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int,
     limit = problem.free[k].high if half > 0.0 else problem.free[k].low
     least, target = problem.cost(values), float(values[k]) + half
     inside, outside = (0.0, values), (np.inf, values)
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         target = limit if half * (target - limit) >= 0.0 else target
         at = inside[1]
-        if abs(target - at[k]) <= NEGLIGIBLE * abs(half):
+        if abs(target - at[k]) <= BOUND_TOLERANCE * abs(half):
             return float(at[k]), False
         there, cost = _least(problem, uncertainty, k, target, at)
         rise = float(np.sqrt(max(0.0, 2.0 * (cost - least) / uncertainty.inflation)))
-        if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+        if abs(rise - QUANTILE) <= INTERVAL_TOLERANCE * QUANTILE:
             return float(there[k]), True
         if rise > QUANTILE:
             outside = rise, there
-        elif target == limit or abs(there[k] - target) > SHORT * abs(target - at[k]):
+        elif target == limit or abs(there[k] - target) > EDGE_THRESHOLD * abs(target - at[k]):
             return float(there[k]), False
         else:
             further = (QUANTILE - rise) / max(rise - inside[0], 0.1 * (QUANTILE - rise))
-            target = float(there[k] + min(FURTHER, 1.05 * further) * (there[k] - at[k]))
+            target = float(there[k] + min(MAX_STEP_GROWTH, 1.05 * further) * (there[k] - at[k]))
             inside = rise, there
         if np.isfinite(outside[0]):
             fraction = np.clip((QUANTILE - inside[0]) / (outside[0] - inside[0]), 0.1, 0.9)
@@ -286,7 +288,7 @@ def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at
 
     An additional residual pulls number k there, so that no step starts where there is no orbit.
     """
-    row = (np.arange(at.size) == k) / (DRAWN * CLOSE * abs(target - at[k]))
+    row = (np.arange(at.size) == k) / (CONSTRAINT_WIDTH * INTERVAL_TOLERANCE * abs(target - at[k]))
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         left, slopes = problem(values)
@@ -297,19 +299,19 @@ def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at
             at, (target - at[k]) * uncertainty.covariance[:, k] / uncertainty.covariance[k, k]))
         left, slopes = problem(begin)
         others = np.delete(slopes * uncertainty.scale, k, axis=1)
-        rest = left - others @ np.linalg.lstsq(others, left, ZERO)[0]
+        rest = left - others @ np.linalg.lstsq(others, left, RANK_TOLERANCE)[0]
         cost, least = 0.5 * float(left @ left), 0.5 * float(rest @ rest)
         # Where a linear step of the others gains little, none is taken.
-        if cost - least < CLOSE * uncertainty.inflation:
+        if cost - least < INTERVAL_TOLERANCE * uncertainty.inflation:
             return begin, least
     except NoOrbit:
         begin = at
-    there = problem.coordinates.descend(evaluate, begin, TOLERANCE, MOST).values
+    there = problem.coordinates.descend(evaluate, begin, PROFILE_TOLERANCE, MAX_EVALUATIONS).values
     return there, problem.cost(there)
 
 
-#: STANDS: range of the mean cycle below which a joint stands, rad.
-STANDS = 0.01
+#: MIN_JOINT_RANGE: of a mean cycle, rad; a joint that moves by less stands.
+MIN_JOINT_RANGE = 0.01
 
 
 def rms_shares(recorded: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -321,7 +323,7 @@ def rms_shares(recorded: np.ndarray, errors: np.ndarray) -> np.ndarray:
 
     """
     spans = np.ptp(recorded, axis=1)
-    return np.sqrt(np.mean(errors**2, axis=1)) / np.where(spans > STANDS, spans, np.nan)
+    return np.sqrt(np.mean(errors**2, axis=1)) / np.where(spans > MIN_JOINT_RANGE, spans, np.nan)
 
 
 def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:

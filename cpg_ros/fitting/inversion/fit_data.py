@@ -28,8 +28,8 @@ import numpy as np
 
 # The linear readout of joints and its elimination from a fit: variable projection.
 
-#: WEIGHTS: order of a readout -> its number of weights.
-WEIGHTS = {1: 2, 2: 4, 3: 6}
+#: NUM_WEIGHTS: of a readout, by its order.
+NUM_WEIGHTS = {1: 2, 2: 4, 3: 6}
 
 
 def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
@@ -47,7 +47,7 @@ def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
 
     """
     values, by_phase = monomials(x, y, z)
-    count = WEIGHTS[order]
+    count = NUM_WEIGHTS[order]
     return (np.stack([np.ones_like(x), *values[:count]], axis=-1),
             np.stack([np.zeros_like(x), *by_phase[:count]], axis=-1))
 
@@ -65,7 +65,7 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
     ones, zero = np.ones_like(x), np.zeros_like(x)
     by_x = np.stack([zero, ones, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=-1)
     by_y = np.stack([zero, zero, ones, zero, x, zero, x * x], axis=-1)
-    count = 1 + WEIGHTS[order]
+    count = 1 + NUM_WEIGHTS[order]
     return (by_x[..., :count, None] * slopes[0][..., None, :]
             + by_y[..., :count, None] * slopes[1][..., None, :])
 
@@ -103,7 +103,7 @@ def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray, rows: np.ndarr
 
 # The signals of a gait that drive joints, as harmonics, and their derivatives by parameters.
 
-TURN = 2.0 * np.pi
+TWO_PI = 2.0 * np.pi
 #: SAMPLES: points of a cycle from which the harmonics' derivatives are computed.
 SAMPLES = 2048
 
@@ -159,7 +159,7 @@ def _waves(theta: np.ndarray, count: int) -> np.ndarray:
     """Return ``exp(2 pi i k theta)``, shape (..., count)."""
     waves = np.empty((*theta.shape, count), dtype=complex)
     waves[..., 0] = 1.0
-    waves[..., 1:] = np.exp(TURN * 1j * theta)[..., None]
+    waves[..., 1:] = np.exp(TWO_PI * 1j * theta)[..., None]
     return np.cumprod(waves, axis=-1)
 
 
@@ -200,16 +200,16 @@ def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.nda
     slopes = slopes[:harmonics + 1] * fraction[:, None] * (2.0 / SAMPLES)
     slopes[0] *= 0.5
     x = evaluate(pairs, theta)
-    ends = np.exp(TURN * 1j * np.multiply.outer(theta[[x.argmax(), x.argmin()]],
-                                                np.arange(harmonics + 1)))
+    ends = np.exp(TWO_PI * 1j * np.multiply.outer(theta[[x.argmax(), x.argmin()]],
+                                                  np.arange(harmonics + 1)))
     high, low = (ends @ slopes).real
     terms = pairs[:, 0] - 1j * pairs[:, 1]
     slopes[0] -= 0.5 * (high + low)
     return terms, (slopes - np.multiply.outer(terms, 0.5 * (high - low))) / half
 
 
-#: KNOWN: least standard error of a mean cycle, as a fraction of the joint's range.
-KNOWN = 1e-4
+#: MIN_RELATIVE_ERROR: standard error of a mean cycle over the joint's range.
+MIN_RELATIVE_ERROR = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -300,6 +300,6 @@ def joints_of(cycle: Stride, cells: Mapping[str, int], network: Network
     rows = [recorded.index(name) for name in names]
     stated = np.sqrt(np.mean(error[rows]**2, axis=1))
     spans = np.ptp(mean[rows], axis=1)
-    floor = KNOWN * np.where(spans > 0.0, spans, max(float(spans.max()), 1e-12))
+    floor = MIN_RELATIVE_ERROR * np.where(spans > 0.0, spans, max(float(spans.max()), 1e-12))
     return Joints(tuple(names), theta, mean[rows].T.copy(),
                   np.array([cells[name] - 1 for name in names]), np.maximum(stated, floor))

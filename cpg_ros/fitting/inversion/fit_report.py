@@ -23,21 +23,21 @@ from cpg_ros.common.report_page import html_table, image, page
 from cpg_ros.fitting.gaits.leg_names import role_of
 from cpg_ros.fitting.inversion import stride_report
 from cpg_ros.fitting.inversion.paper_fit import PaperFit
-from cpg_ros.fitting.inversion.recording_fit import POOR, RecordingFit
+from cpg_ros.fitting.inversion.recording_fit import POOR_THRESHOLDS, RecordingFit
 import matplotlib
 from matplotlib.figure import Figure
 import numpy as np
 
 # The pictures of an inverted recording.
 
-#: Colours on light and dark grounds. FITTED: of fitted curves; BAND: of bands and zero lines;
-#: recorded curves have the colour of text.
-FITTED, BAND = '#e04040', '#90a0b080'
-LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
-COLUMNS = 3
-#: COLUMN: most columns of the picture of a recording; SEAM: by how much phases are shown beyond
-#: the ends of the cycle, cycles.
-COLUMN, SEAM = 1200, 0.12
+#: Colours on light and dark grounds. BAND_COLOR: of bands and zero lines; recorded curves have the
+#: colour of text.
+FIT_COLOR, BAND_COLOR = '#e04040', '#90a0b080'
+LEG_COLORS = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
+NUM_COLUMNS = 3
+#: MAX_PIXELS: columns of the picture of a recording; PHASE_MARGIN: by how much phases are shown
+#: beyond the ends of the cycle, cycles.
+MAX_PIXELS, PHASE_MARGIN = 1200, 0.12
 
 
 def _text() -> str:
@@ -46,16 +46,16 @@ def _text() -> str:
 
 def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
     """Return a figure of panels in columns, those beyond the count left empty."""
-    rows = -(-count // COLUMNS)
+    rows = -(-count // NUM_COLUMNS)
     figure = Figure((10.5, 0.5 + height * rows), layout='constrained')
-    grid = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False)
+    grid = figure.subplots(rows, NUM_COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[count:]:
         axes.axis('off')
     for axes in grid.flat[:count]:
         axes.tick_params(labelsize=8)
         for side in ('top', 'right'):
             axes.spines[side].set_visible(False)
-    for column in range(COLUMNS):
+    for column in range(NUM_COLUMNS):
         below = [axes for axes in grid[:, column] if axes.axison]
         if below:
             below[-1].set_xlabel('phase [cycles]', fontsize=8)
@@ -71,20 +71,20 @@ def joint_figure(result: RecordingFit) -> Figure:
     for axes, name, recorded, fitted in zip(grid, fit.joints, fit.recorded, fit.fitted,
                                             strict=True):
         spread = stride.spread[stride.joints.index(name)]
-        axes.fill_between(fit.theta, recorded - spread, recorded + spread, color=BAND,
+        axes.fill_between(fit.theta, recorded - spread, recorded + spread, color=BAND_COLOR,
                           linewidth=0.0, label='spread of cycles')
         axes.plot(fit.theta, recorded, color=_text(), linewidth=1.4, label='recorded')
-        axes.plot(fit.theta, fitted, color=FITTED, linewidth=1.4, linestyle='--', label='fitted')
-        poor = fraction[name] > POOR[fit.order]
+        axes.plot(fit.theta, fitted, '--', color=FIT_COLOR, linewidth=1.4, label='fitted')
+        poor = fraction[name] > POOR_THRESHOLDS[fit.order]
         axes.set_title(f'{name}: {100 * fraction[name]:.1f} % of range{", poor" if poor else ""}',
-                       fontsize=8, loc='left', color=FITTED if poor else _text())
+                       fontsize=8, loc='left', color=FIT_COLOR if poor else _text())
         axes.set_ylabel('angle [rad]', fontsize=8)
     grid[0].legend(fontsize=7, frameon=False)
     strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
     figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
                     f'{fit.order}{": a poor fit" if result.poor else ""}', fontsize=10,
-                    color=FITTED if result.poor else _text())
+                    color=FIT_COLOR if result.poor else _text())
     return figure
 
 
@@ -101,7 +101,7 @@ def stride_curves(result: RecordingFit) -> Figure:
         for leg, *rows in own:
             # The end of the stride is its begin.
             mean, spread = (np.append(row, row[0]) for row in rows)
-            color = LINES[legs.index(leg) % len(LINES)]
+            color = LEG_COLORS[legs.index(leg) % len(LEG_COLORS)]
             if result.stride.cycles > 1:
                 axes.fill_between(percent, mean - spread, mean + spread, color=color, alpha=0.2,
                                   linewidth=0.0)
@@ -129,23 +129,23 @@ def phases(result: RecordingFit) -> Figure:
         height = len(result.stride.phases) - 1 - row
         marks: list[tuple[float | None, dict[str, Any]]] = [
             (phase, {'marker': 'o', 'markersize': 8, 'color': _text(), 'label': 'recorded'}),
-            (network_phases.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
+            (network_phases.get(leg), {'marker': 'D', 'markersize': 11, 'color': FIT_COLOR,
                                'markerfacecolor': 'none', 'label': result.fit.gait})]
         for value, style in marks:
             # Draw a phase near the seam on both sides of it.
             copies = [] if value is None else [
                 at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)
-                if -SEAM <= at <= 1.0 + SEAM]
+                if -PHASE_MARGIN <= at <= 1.0 + PHASE_MARGIN]
             for at in copies:
                 axes.plot(at, height, linestyle='none', **style)
     for seam in (0.0, 1.0):
-        axes.axvline(seam, color=BAND, linewidth=1.0)
+        axes.axvline(seam, color=BAND_COLOR, linewidth=1.0)
     axes.set_yticks(range(len(result.stride.phases)), list(result.stride.phases)[::-1])
     axes.set_ylim(-0.6, len(result.stride.phases) - 0.4)
-    axes.set_xlim(-SEAM, 1.0 + SEAM)
+    axes.set_xlim(-PHASE_MARGIN, 1.0 + PHASE_MARGIN)
     axes.set_xticks(np.arange(5) / 4)
     axes.set_xlabel('phase [cycles], 1 is 0 again')
-    axes.grid(axis='y', color=BAND)
+    axes.grid(axis='y', color=BAND_COLOR)
     handles = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     axes.legend(handles.values(), handles.keys(), fontsize=8, frameon=False, loc='lower center',
                 ncols=2, bbox_to_anchor=(0.5, 1.0))
@@ -160,13 +160,13 @@ def stretch(result: RecordingFit) -> Figure:
     figure = Figure((10.5, 2.4), layout='constrained')
     axes = figure.subplots()
     # Lowest and highest of each column of the picture: all there is to see of a long recording.
-    edges = np.linspace(0, len(angles), min(COLUMN, len(angles)) + 1).astype(int)[:-1]
+    edges = np.linspace(0, len(angles), min(MAX_PIXELS, len(angles)) + 1).astype(int)[:-1]
     low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
                  for extreme, none in ((np.minimum, np.inf), (np.maximum, -np.inf)))
     there = low <= high
     axes.fill_between(recording.times[edges][there], low[there], high[there], color=_text(),
                       linewidth=0.6)
-    axes.axvspan(stride.begin, stride.end, color=FITTED, alpha=0.15, linewidth=0.0)
+    axes.axvspan(stride.begin, stride.end, color=FIT_COLOR, alpha=0.15, linewidth=0.0)
     axes.set_title(f'{name}; shaded: the steady stretch, {stride.begin:.2f} to {stride.end:.2f} s '
                    f'of {recording.times[-1]:.2f} s', fontsize=9, loc='left')
     axes.set_xlim(0.0, recording.times[-1])

@@ -23,7 +23,7 @@ from contextlib import suppress
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.fitting.inversion.cycle_problem import CycleProblem
-from cpg_ros.fitting.inversion.free_parameters import Free, TINY
+from cpg_ros.fitting.inversion.free_parameters import Free, MIN_SCALE
 from cpg_ros.fitting.inversion.leg_duty import GAIT_DUTY
 import numpy as np
 
@@ -31,11 +31,13 @@ import numpy as np
 DUTY_NAMES = (GAIT_DUTY, 'duty')
 #: DUTIES: values of the gait's duty that are tried.
 DUTIES = (0.38, 0.5, 0.6, 0.7, 0.8)
-#: LATE: delays that are tried, over the critical one; PLACES: places in a narrow range, whose ends
-#: have one sign and a ratio up to NARROW; FACTORS: factors of numbers without such a range.
-LATE, FACTORS, PLACES, NARROW = (1.05, 1.4, 2.5), (0.7, 1.4), (np.arange(9) + 0.5) / 9, 10.0
-#: LEAST, MOST: numbers of starts beside the network's own values.
-LEAST, MOST = 2, 3
+#: DELAY_RATIOS: delays that are tried, over the critical one; RANGE_FRACTIONS: places in a narrow
+#: range, whose ends have one sign and a ratio up to MAX_RANGE_RATIO; FACTORS: factors of numbers
+#: without such a range.
+DELAY_RATIOS, FACTORS = (1.05, 1.4, 2.5), (0.7, 1.4)
+RANGE_FRACTIONS, MAX_RANGE_RATIO = (np.arange(9) + 0.5) / 9, 10.0
+#: Besides the network's own values.
+MIN_STARTS, MAX_STARTS = 2, 3
 
 
 def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple[float, ...]:
@@ -43,10 +45,10 @@ def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple
     if parameter.name == GAIT_DUTY:
         return DUTIES
     if k == problem.coordinates.delay:
-        return LATE
+        return DELAY_RATIOS
     low, high = parameter.low, parameter.high
-    if 0.0 < low < high <= NARROW * low:
-        return tuple(low + fraction * (high - low) for fraction in PLACES)
+    if 0.0 < low < high <= MAX_RANGE_RATIO * low:
+        return tuple(low + fraction * (high - low) for fraction in RANGE_FRACTIONS)
     return tuple(factor * here for factor in FACTORS)
 
 
@@ -73,7 +75,7 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
     own = [int(np.abs(axis - value).argmin()) for axis, value in zip(axes, here, strict=True)]
     # The nearest ones first, an orbit leads to the next; one of the network's numbers is moved at
     # a time, as an orbit takes far longer than a readout.
-    far = np.sum(np.abs(grid - here) / (np.abs(here) + TINY), axis=-1)
+    far = np.sum(np.abs(grid - here) / (np.abs(here) + MIN_SCALE), axis=-1)
     for index in sorted(np.ndindex(far.shape), key=lambda parameter: float(far[parameter])):
         if sum(k != at for k, at, parameter in zip(index, own, problem.free, strict=True)
                if parameter.members) > 1:
@@ -88,8 +90,8 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
     if not starts:
         return [begin]
     ranked = sorted(starts, key=lambda index: -explained[index])
-    best = [index for index in ranked if _highest(explained, index)][:MOST]
-    best += [index for index in ranked if index not in best][:max(LEAST - len(best), 0)]
+    best = [index for index in ranked if _highest(explained, index)][:MAX_STARTS]
+    best += [index for index in ranked if index not in best][:max(MIN_STARTS - len(best), 0)]
     return [starts[index] for index in ranked if index in (tuple(own), *best)]
 
 

@@ -33,14 +33,14 @@ from scipy.optimize import least_squares
 # Numbers of a network that a fit may move, and their bounds.
 
 N = TypeVar('N', bound=Network)
-#: APART: relative distance above which two minima are distinct; TINY: scale of a number near 0, in
-#: its unit, for relative distances.
-APART, TINY = 0.03, 1e-3
+#: DISTINCT_TOLERANCE: relative distance of two minima; MIN_SCALE: of a number near 0, in its unit,
+#: for relative distances.
+DISTINCT_TOLERANCE, MIN_SCALE = 0.03, 1e-3
 
 
 def distinct(one: np.ndarray, other: np.ndarray) -> bool:
     """Return whether values of the free numbers, shape (numbers,), differ clearly."""
-    return bool((np.abs(one - other) > APART * (np.abs(one) + TINY)).any())
+    return bool((np.abs(one - other) > DISTINCT_TOLERANCE * (np.abs(one) + MIN_SCALE)).any())
 
 
 @dataclass(frozen=True)
@@ -195,8 +195,8 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
                         result.status > 0)
 
 
-#: ABOVE: least relative distance of the delay above the critical one.
-ABOVE = 1e-7
+#: MIN_DELAY_EXCESS: of the delay over the critical one, relative.
+MIN_DELAY_EXCESS = 1e-7
 
 
 class Coordinates:
@@ -275,7 +275,7 @@ class Coordinates:
         low = np.array([*(one.low for one in self.free), -np.inf])
         high = np.array([*(one.high for one in self.free), np.inf])
         if not self.straight:
-            low[self.delay], high[self.delay] = 1.0 + ABOVE, np.inf
+            low[self.delay], high[self.delay] = 1.0 + MIN_DELAY_EXCESS, np.inf
         # Beyond 0, where there is no gait, the same waveform may have another sign and delay.
         for k, one in enumerate(self.free):
             if one.name in self._network.needed:

@@ -24,7 +24,7 @@ from typing import Any
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.common.files import write_atomically
 from cpg_ros.common.yaml_reader import quoted, YamlReader
-from cpg_ros.fitting.gaits.quality_checks import CHANGE, SURE
+from cpg_ros.fitting.gaits.quality_checks import PHASE_CHANGE_THRESHOLD, RELIABLE_CYCLES
 from cpg_ros.fitting.gaits.stride import NoSteadyGait, Stride
 from cpg_ros.fitting.inversion.parameter_files import (
     check_plan,
@@ -51,8 +51,8 @@ import yaml
 
 # Changes of the legs' phases within a stretch of one frequency, as of a walk that becomes a trot.
 
-#: FEWEST: fewest strides on either side of a change.
-FEWEST = int(SURE)
+#: MIN_STRIDES: on either side of a change.
+MIN_STRIDES = int(RELIABLE_CYCLES)
 
 
 def phase_change(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Stride
@@ -70,16 +70,16 @@ def phase_change(recording: Recording, legs: Mapping[str, Sequence[str]], stride
     """
     points = _points(recording, legs, stride)
     count = len(points)
-    if count < 2 * FEWEST:
+    if count < 2 * MIN_STRIDES:
         return None
     sums = np.cumsum(points, axis=0)
-    ends = np.arange(FEWEST, count - FEWEST + 1)[:, None]
+    ends = np.arange(MIN_STRIDES, count - MIN_STRIDES + 1)[:, None]
     before = sums[ends[:, 0] - 1] / ends
     after = (sums[-1] - sums[ends[:, 0] - 1]) / (count - ends)
     ratio = ends * (count - ends) / count * np.abs(after - before)**2
     best = int(np.argmax(ratio.sum(axis=1)))
     turned = np.angle(after[best] * before[best].conj()) / (2.0 * np.pi)
-    if np.abs(turned).max() <= CHANGE:
+    if np.abs(turned).max() <= PHASE_CHANGE_THRESHOLD:
         return None
     first = np.ceil(stride.warp.phases[0])
     return float(np.interp(first + ends[best, 0], stride.warp.phases, stride.warp.knots))
@@ -109,8 +109,8 @@ def _points(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Str
 
 # A recording that changes its gait, cut into its steady stretches, each of them fitted.
 
-#: SHORTEST: shortest remainder that is searched, s: three strides of the largest frequency.
-SHORTEST = 0.24
+#: MIN_DURATION: of a remainder that is searched, s: three strides of the largest frequency.
+MIN_DURATION = 0.24
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,20 +187,21 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
             continue
         first, last = origin + stride.begin, origin + stride.end
         longest = longest or stride
-        if stride.cycles >= SURE:
+        if stride.cycles >= RELIABLE_CYCLES:
             strides.append((first, last, stride))
         remains += _longer((begin, first), (last, end))
     if not strides:
-        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {SURE:g} strides'
-                                  + (f', only of {longest.cycles}, of '
-                                     f'{1.0 / longest.frequency:.3g} s each: record '
-                                     f'{SURE / longest.frequency:.2g} s or more'
-                                     if longest else ''))
+        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {RELIABLE_CYCLES:g} '
+                                  'strides' + (
+                                      f', only of {longest.cycles}, of '
+                                      f'{1.0 / longest.frequency:.3g} s each: record '
+                                      f'{RELIABLE_CYCLES / longest.frequency:.2g} s or more'
+                                      if longest else ''))
     return sorted(strides, key=lambda piece: piece[0])
 
 
 def _longer(*parts: tuple[float, float]) -> list[tuple[float, float]]:
-    return [(begin, end) for begin, end in parts if end - begin >= SHORTEST]
+    return [(begin, end) for begin, end in parts if end - begin >= MIN_DURATION]
 
 
 def fit_stretches(recording: Recording, robot: Robot | None = None, network: str = '', *,
@@ -245,10 +246,10 @@ def stretch_rows(fits: Sequence[StretchFit]) -> list[tuple[str, ...]]:
                     f'{100.0 * stretch.fit.fit.mean_rms_share:.1f} %') for stretch in fits]
 
 
-#: SAME: relative difference of frequencies up to which two stretches share an entry.
-SAME = 0.02
-#: LATEST: latest time of an entry, s.
-LATEST = 1e6
+#: FREQUENCY_TOLERANCE: relative, of two stretches that share an entry.
+FREQUENCY_TOLERANCE = 0.02
+#: MAX_TIME: of an entry, s.
+MAX_TIME = 1e6
 
 
 class ScheduleError(CpgError):
@@ -297,7 +298,7 @@ def schedule_of(stretches: Sequence[StretchFit], robot: str) -> GaitSchedule:
     entries = [Entry(0.0, running_parameters(fitted[0][1]))]
     for (before, old), (after, new) in itertools.pairwise(fitted):
         same = (old.fit.gait == new.fit.gait
-                and abs(new.stride.frequency / old.stride.frequency - 1.0) <= SAME)
+                and abs(new.stride.frequency / old.stride.frequency - 1.0) <= FREQUENCY_TOLERANCE)
         if not same:
             entries.append(Entry(round(0.5 * (before.end + after.begin), 3),
                                  running_parameters(new)))
@@ -370,7 +371,7 @@ def read_schedule(path: Path) -> GaitSchedule:
         ScheduleError: it cannot be read, or a value in it cannot be used.
 
     """
-    reader = YamlReader(path, 'schedule', ScheduleError, LATEST)
+    reader = YamlReader(path, 'schedule', ScheduleError, MAX_TIME)
 
     def parameters(values: Any, where: str) -> dict[str, Any]:
         if not isinstance(values, dict) or not values:

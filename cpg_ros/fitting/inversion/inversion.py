@@ -40,7 +40,7 @@ from cpg_ros.common.command_line import (
 )
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.common.workers import add_options, KEPT, working
+from cpg_ros.common.workers import add_options, INTERRUPT_MESSAGE, working
 from cpg_ros.common.yaml_reader import quoted
 from cpg_ros.fitting.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.fitting.inversion.gait_schedule import fit_stretches, stretch_rows, write_schedule
@@ -208,7 +208,7 @@ def _invert_many(args: Namespace, robot: Robot | None, starts: list[dict[str, fl
         with working(args, 'recordings', report) as fleet:
             summary = work.watch(fleet, report) if args.watch else work.run(fleet)
     except KeyboardInterrupt:
-        raise KeyboardInterrupt(KEPT) from None
+        raise KeyboardInterrupt(INTERRUPT_MESSAGE) from None
     resumed = f'; {summary.kept} were done before' if summary.kept else ''
     say(f'{summary.done} recordings, {summary.done - summary.failed} fitted, '
         f'{summary.failed} not (the table says why){resumed}\n'

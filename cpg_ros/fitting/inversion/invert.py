@@ -32,15 +32,15 @@ from cpg_ros.fitting.inversion.fit import (
     Estimate,
     estimates,
     Fit,
-    FRACTION,
     mean_share,
     model_error,
     ModelError,
+    NULL_THRESHOLD,
     QUANTILE,
     Spread,
     spread,
 )
-from cpg_ros.fitting.inversion.fit_data import Joints, joints_of, WEIGHTS
+from cpg_ros.fitting.inversion.fit_data import Joints, joints_of, NUM_WEIGHTS
 from cpg_ros.fitting.inversion.fit_starts import best_starts, upside_down
 from cpg_ros.fitting.inversion.free_parameters import (
     distinct,
@@ -59,11 +59,10 @@ import numpy as np
 
 # The caveats of a fit, in words.
 
-#: WIDE: half width of a 95 % interval, over the value, above which a warning names it.
-WIDE = 0.1
-#: TOGETHER: correlation above which a warning names it; AT_BOUND: distance from a bound, over the
-#: bounds' distance, up to which a warning names it.
-TOGETHER, AT_BOUND = 0.95, 1e-5
+#: MAX_RELATIVE_WIDTH: half width of a 95 % interval over the value, without a warning.
+MAX_RELATIVE_WIDTH = 0.1
+#: Of warnings. BOUND_TOLERANCE: distance from a bound, over the bounds' distance.
+CORRELATION_THRESHOLD, BOUND_TOLERANCE = 0.95, 1e-5
 
 
 def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Spread,
@@ -93,7 +92,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
             "counts as the network's motion, and is not known; ") + '; '.join(clauses))
     for row in spread.blind:
         blind = [estimate.name for estimate,
-                 fraction in zip(free, row, strict=False) if abs(fraction) > FRACTION]
+                 fraction in zip(free, row, strict=False) if abs(fraction) > NULL_THRESHOLD]
         if len(blind) == 1:
             lines.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
         elif blind:
@@ -104,14 +103,14 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
             lines.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
                          'changes nothing that was recorded')
     for k, (name, estimate) in enumerate(estimates.items()):
-        room = AT_BOUND * (free[k].high - free[k].low)
+        room = BOUND_TOLERANCE * (free[k].high - free[k].low)
         for end, bound in (('lower', free[k].low), ('upper', free[k].high)):
             if abs(estimate.value - bound) <= room:
                 lines.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
                              'one-sided')
         if not model.size and np.isfinite(estimate.stderr) and (not estimate.bounded or max(
                 estimate.high - estimate.value,
-                estimate.value - estimate.low) > WIDE * abs(estimate.value)):
+                estimate.value - estimate.low) > MAX_RELATIVE_WIDTH * abs(estimate.value)):
             lines.append(
                 f'{name} is poorly identifiable: any value from {estimate.low:.4g} to '
                 f'{estimate.high:.4g} fits as well'
@@ -121,7 +120,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     errors = spread.correlation
     for k in range(len(free)):
         for other in range(k):
-            if abs(errors[k, other]) > TOGETHER:
+            if abs(errors[k, other]) > CORRELATION_THRESHOLD:
                 lines.append(f'{free[other].name} and {free[k].name} are strongly correlated: '
                              f'{errors[k, other]:.3f}')
     if not best.converged:
@@ -134,22 +133,23 @@ def _listed(names: Sequence[str]) -> str:
     return ' and '.join(filter(None, [', '.join(names[:-1]), names[-1]]))
 
 
-#: EVEN: duty of legs that stand as long as they swing.
-EVEN = 0.5
-#: TOLERANCE: relative change at which a trust region stops; LAST: the same for the last one.
-TOLERANCE, LAST = 1e-5, 1e-8
-#: NEARLY: cost of a minimum, as a multiple of the least, up to which it is compared with the best.
-NEARLY = 2.0
-#: FIRST: evaluations after which a start is left whose cost is above HOPELESS times the least one
-#: plus PROMISING times its own first one.
-FIRST, HOPELESS, PROMISING = 5, 10.0, 0.01
-#: BEYOND: distances over the half width of an interval at which lags of joints are tested.
-BEYOND = (1.4, 2.0, 2.8, 4.0)
-#: WEIGHINGS: most iterations of the joints' weights; SAME: relative change of a weight at which
-#: these stop.
-WEIGHINGS, SAME = 4, 0.02
-#: HALVINGS: halvings that locate the value at which the generator begins to reject the gait.
-HALVINGS = 6
+#: DEFAULT_DUTY: of legs that stand as long as they swing.
+DEFAULT_DUTY = 0.5
+#: Relative changes at which a trust region, and the last one, stop.
+TOLERANCE, FINAL_TOLERANCE = 1e-5, 1e-8
+#: MAX_COST_RATIO: to the least, of a minimum that is compared with the best.
+MAX_COST_RATIO = 2.0
+#: TRIAL_EVALUATIONS: evaluations after which a start is left whose cost is above ABANDON_RATIO
+#: times the least one plus ABANDON_START_RATIO times its own first one.
+TRIAL_EVALUATIONS, ABANDON_RATIO, ABANDON_START_RATIO = 5, 10.0, 0.01
+#: LAG_TEST_RATIOS: distances over an interval's half width at which lags of joints are tested.
+LAG_TEST_RATIOS = (1.4, 2.0, 2.8, 4.0)
+#: MAX_REWEIGHTINGS: of the joints; WEIGHT_TOLERANCE: relative change at which they stop.
+MAX_REWEIGHTINGS, WEIGHT_TOLERANCE = 4, 0.02
+#: COST_TOLERANCE: between the costs of the same motion half a cycle later.
+COST_TOLERANCE = 0.02
+#: BISECTION_STEPS: to the value at which the generator begins to reject the gait.
+BISECTION_STEPS = 6
 
 
 def invert(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str,
@@ -214,10 +214,10 @@ def _problem(cycle: Stride, joints: Joints, network: Network, gait: str,
              numbers: tuple[Free, ...], order: int, readout: GaitReadout,
              orbits: Orbits | None) -> CycleProblem:
     """Check the arguments, which are those of ``invert``, and return the problem."""
-    if order not in WEIGHTS:
+    if order not in NUM_WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
-    taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
-    if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
+    taken = len(joints.names) * (1 + NUM_WEIGHTS[order]) + len(numbers) + 1
+    if joints.theta.size < 2 * (1 + NUM_WEIGHTS[order]) or joints.data.size <= taken:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
                          f'determine readouts of order {order} and {len(numbers)} parameters')
     return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, orbits)
@@ -253,7 +253,7 @@ def _numbers(network: Network, gait: str, names: Sequence[str],
 
 def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
     """Return values of a start, checked."""
-    duty = problem.readout.duty or EVEN
+    duty = problem.readout.duty or DEFAULT_DUTY
     values = {parameter.name: parameter.value(problem.network) if parameter.members else duty
              for parameter in problem.free}
     for name, value in start.items():
@@ -277,7 +277,7 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
         return Minimisation.without_orbit(values, error)
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, problem.left(values))
-    trial = problem.coordinates.descend(problem, values, TOLERANCE, FIRST)
+    trial = problem.coordinates.descend(problem, values, TOLERANCE, TRIAL_EVALUATIONS)
     problem.hold(trial.values)
     return trial
 
@@ -285,7 +285,7 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
 def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimisation:
     """Continue a trial until it converges, unless its cost is far above the least."""
     if trial.converged or trial.why or (
-            trial.cost > HOPELESS * least + PROMISING * trial.path[0, 0]):
+            trial.cost > ABANDON_RATIO * least + ABANDON_START_RATIO * trial.path[0, 0]):
         return trial
     rest = problem.coordinates.descend(problem, trial.values, TOLERANCE)
     problem.hold(rest.values)
@@ -295,12 +295,13 @@ def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimi
 
 def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     """Weight the joints by their residuals and fit again, until the weights settle."""
-    for last in range(WEIGHINGS):
+    for last in range(MAX_REWEIGHTINGS):
         sizes = np.maximum(problem.joints.stated, problem.left(values))
-        if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
+        if last and np.abs(sizes / problem.sizes - 1.0).max() < WEIGHT_TOLERANCE:
             break
         problem.sizes = sizes
-        values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
+        begin = problem.rephased(values)
+        values = problem.coordinates.descend(problem, begin, FINAL_TOLERANCE).values
     return values
 
 
@@ -330,7 +331,7 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
         if not trial.why and all(distinct(trial.values[:-1], candidate[:-1])
                                  for candidate in candidates):
             there = trial.values
-            if problem.cost(there) <= NEARLY * least:
+            if problem.cost(there) <= MAX_COST_RATIO * least:
                 # Joints were weighted otherwise where it was found.
                 there = problem.coordinates.descend(problem, there, TOLERANCE).values
                 problem.hold(there)
@@ -343,7 +344,7 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
     # Half a cycle later cells of some gaits are the same upside down: that is no other motion.
     for k, candidate in enumerate(candidates):
         later = candidate + np.append(np.zeros(candidate.size - 1), 0.5)
-        if reverse(candidate) and problem.cost(later) <= problem.cost(candidate) + SAME:
+        if reverse(candidate) and problem.cost(later) <= problem.cost(candidate) + COST_TOLERANCE:
             candidates[k] = later
     best = max((candidate for candidate in candidates if problem.cost(candidate) <= most),
                key=meant)
@@ -391,7 +392,7 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
         middle = (runs + refused) // 2
         runs, refused = (runs, middle) if reason_at(trail[middle]) else (middle, refused)
     here, beyond = trail[runs], trail[refused]
-    for _ in range(HALVINGS):
+    for _ in range(BISECTION_STEPS):
         between = 0.5 * (here + beyond)
         here, beyond = (here, between) if reason_at(between) else (between, beyond)
     here = problem.rephased(here)
@@ -433,7 +434,7 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
         for side, half in ((0, one.low - one.value), (1, one.high - one.value)):
             beyond = False
             with suppress(NoOrbit):
-                for times in BEYOND if one.bounded else ():
+                for times in LAG_TEST_RATIOS if one.bounded else ():
                     there = problem.coordinates.moved(
                         values, times * half * uncertainty.covariance[:, k]
                         / uncertainty.covariance[k, k])
@@ -465,7 +466,7 @@ def _fit_at(problem: CycleProblem, trials: Sequence[Minimisation], others: Seque
     if not (straight or model.size):
         warnings = [*warnings, *_if_joints_lag(problem, values, estimated, spread)]
     fractions = {}
-    for order in WEIGHTS:
+    for order in NUM_WEIGHTS:
         there = problem.at_order(order)
         rest = there.best_readouts(there.rephased(values) if order != problem.order else values)
         fractions[order] = mean_share(joints.data.T, rest.residual.T)

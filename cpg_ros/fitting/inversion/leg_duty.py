@@ -24,16 +24,15 @@ from dataclasses import dataclass, field
 import math
 from typing import NamedTuple
 
-from cpg_ros.fitting.inversion.fit_data import Signals, TURN
+from cpg_ros.fitting.inversion.fit_data import Signals, TWO_PI
 from cpg_ros.motion.robot import HARMONICS, Robot
 from cpg_ros.networks.network import Network
 import numpy as np
 
 #: GAIT_DUTY: name of the gait's duty among the free numbers; networks may have a duty, too.
 GAIT_DUTY = 'gait_duty'
-#: GRID: even phases among which a trough is searched for; STEPS: steps of Newton's method from
-#: there.
-GRID, STEPS = 1024, 4
+#: GRID_SIZE: even phases among which a trough is searched for.
+GRID_SIZE, NEWTON_ITERATIONS = 1024, 4
 
 
 @dataclass(frozen=True)
@@ -113,13 +112,13 @@ def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, 
 
     """
     terms, slopes = seen.terms[wave], seen.slopes[wave]
-    values = np.fft.irfft(np.append(terms[:1] * 2.0, terms[1:]), GRID) * (0.5 * GRID)
+    values = np.fft.irfft(np.append(terms[:1] * 2.0, terms[1:]), GRID_SIZE) * (0.5 * GRID_SIZE)
     crest, d_crest = 0.0, np.zeros(slopes.shape[1])
     if not peaks_at_0:
-        crest, d_crest = _extremum(terms, slopes, int(values.argmax()) / GRID)
+        crest, d_crest = _extremum(terms, slopes, int(values.argmax()) / GRID_SIZE)
     if stance is not None:
         return OwnStance(crest + stance[0], stance[1], d_crest, np.zeros_like(d_crest))
-    trough, d_trough = _extremum(terms, slopes, int(values.argmin()) / GRID)
+    trough, d_trough = _extremum(terms, slopes, int(values.argmin()) / GRID_SIZE)
     return OwnStance(crest, (trough - crest) % 1.0, d_crest, d_trough - d_crest)
 
 
@@ -127,11 +126,12 @@ def _extremum(terms: np.ndarray, slopes: np.ndarray, phase: float) -> tuple[floa
     """Return the phase of an extremum near a phase, cycles, and its derivatives."""
     k = np.arange(terms.size)
     bend, waves = 0.0, np.ones_like(terms)
-    for _ in range(STEPS):
-        waves = np.exp(TURN * 1j * phase * k)
+    limit = 1.0 / GRID_SIZE
+    for _ in range(NEWTON_ITERATIONS):
+        waves = np.exp(TWO_PI * 1j * phase * k)
         slope, bend = float((1j * k * terms @ waves).real), float((-k * k * terms @ waves).real)
-        phase -= float(np.clip(slope / bend / TURN, -1.0 / GRID, 1.0 / GRID)) if bend else 0.0
-    return phase % 1.0, -((1j * k * waves) @ slopes).real / (bend * TURN if bend else np.inf)
+        phase -= float(np.clip(slope / bend / TWO_PI, -limit, limit)) if bend else 0.0
+    return phase % 1.0, -((1j * k * waves) @ slopes).real / (bend * TWO_PI if bend else np.inf)
 
 
 def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,

@@ -30,7 +30,7 @@ from cpg_ros.fitting.inversion.parameter_files import robot_file_of, write_fitte
 from cpg_ros.fitting.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.fitting.inversion.results import (
     digest,
-    FITTED,
+    FIT_FOLDER,
     found,
     library,
     outline,
@@ -44,9 +44,8 @@ from cpg_ros.motion.robot import Robot
 
 # The inversion of one recording, as a job: the result in plain types, or the reason for none.
 
-#: DRAWN: most joints that are drawn; POINTS: points of their mean cycles; WIDTH, HEIGHT: size of
-#: the picture, pixels.
-DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
+#: Of a picture. POINTS: of a mean cycle; WIDTH, HEIGHT: pixels.
+MAX_CURVES, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
 
 
 @dataclass(frozen=True)
@@ -147,7 +146,7 @@ def picture(result: RecordingFit) -> str:
     """Return the mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
     recorded, fitted = result.fit.recorded, result.fit.fitted
     span = recorded.max(axis=1) - recorded.min(axis=1)
-    largest = sorted(span.argsort()[::-1][:DRAWN])
+    largest = sorted(span.argsort()[::-1][:MAX_CURVES])
     step = max(1, recorded.shape[1] // POINTS)
     lines = []
     for k, joint in enumerate(largest):
@@ -163,9 +162,8 @@ def picture(result: RecordingFit) -> str:
             f'{"".join(lines)}</svg>')
 
 
-#: While waiting for new recordings. LOOK: period of looking at the folders, s; TABLES: period of
-#: writing the tables, s.
-LOOK, TABLES = 2.0, 30.0
+#: While waiting for new recordings: periods of looking at the folders and of writing tables, s.
+SCAN_PERIOD, TABLE_PERIOD = 2.0, 30.0
 
 
 @dataclass(frozen=True)
@@ -211,7 +209,7 @@ class Folders:
         for recording in recordings:
             row = self.results.get(recording)
             yield Task(recording.absolute(), self.settings, row['digest'] if row else '',
-                       (self.results.folder / FITTED).absolute(), self.results.name(recording))
+                       (self.results.folder / FIT_FOLDER).absolute(), self.results.name(recording))
 
     def keep(self, outcome: JobOutcome[Task], shown: Path, tally: JobProgress) -> None:
         """Store the result of a job, unless the recording was done before."""
@@ -266,7 +264,7 @@ class Folders:
         """
         seen: dict[Path, Any] = {}
         done: dict[Path, Any] = {}
-        written, waits = time.monotonic() - TABLES, False
+        written, waits = time.monotonic() - TABLE_PERIOD, False
         try:
             while goes_on():
                 self.recordings = list(found(self.folders))
@@ -281,10 +279,10 @@ class Folders:
                         self._through(executor, ready, tally)
                     done |= {recording: now[recording] for recording in ready}
                     waits = True
-                if waits and time.monotonic() - written >= TABLES:
+                if waits and time.monotonic() - written >= TABLE_PERIOD:
                     self.write()
                     written, waits = time.monotonic(), False
-                time.sleep(LOOK)
+                time.sleep(SCAN_PERIOD)
         finally:
             summary = self.write()
         return summary

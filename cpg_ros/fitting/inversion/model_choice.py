@@ -27,7 +27,7 @@ from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.fitting.gaits.mean_cycle import average_cycles
 from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.fit import rms_shares
-from cpg_ros.fitting.inversion.fit_data import WEIGHTS
+from cpg_ros.fitting.inversion.fit_data import NUM_WEIGHTS
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout
 from cpg_ros.fitting.inversion.recording_fit import (
     fit_with_fallbacks,
@@ -40,8 +40,8 @@ from cpg_ros.fitting.recordings.recording import Recording
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: DISTINCT: difference of errors, in its standard errors, above which two networks are distinct.
-DISTINCT = 2.0
+#: MIN_DIFFERENCE: of the errors of two distinct networks, in its standard errors.
+MIN_DIFFERENCE = 2.0
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
                      if np.isfinite(value)}
         comparisons.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
-            free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=fractions))
+            free, free + len(fit.joints) * (1 + NUM_WEIGHTS[fit.order]), by_joint=fractions))
     done(1.0)
     least = min(comparisons, key=lambda comparison: (comparison.error, comparison.numbers))
     comparisons = [replace(comparison, alike=not comparison.why
@@ -135,7 +135,7 @@ def _distinct(comparison: NetworkComparison, least: NetworkComparison) -> bool:
                      if name in least.by_joint])
     if more.size < 2:
         return comparison.error > least.error
-    return bool(more.mean() > DISTINCT * more.std(ddof=1) / np.sqrt(more.size))
+    return bool(more.mean() > MIN_DIFFERENCE * more.std(ddof=1) / np.sqrt(more.size))
 
 
 def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:

@@ -138,8 +138,8 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
 
 # A recorded gait inverted as Liu & Zhang (2024) do it: eight joints taken for the eight cells.
 
-#: POINTS: instants of a cycle; SHIFTS: phases between recording and orbit that are tried.
-POINTS, SHIFTS = 20, 60
+#: POINTS: instants of a cycle; NUM_SHIFTS: phases between recording and orbit.
+POINTS, NUM_SHIFTS = 20, 60
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -231,6 +231,6 @@ def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:
     def gap(shift: float) -> float:
         return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))
 
-    near = min(np.arange(SHIFTS) / SHIFTS, key=gap)
+    near = min(np.arange(NUM_SHIFTS) / NUM_SHIFTS, key=gap)
     return float(minimize_scalar(gap, method='bounded', options={'xatol': 1e-9},
-                                 bounds=(near - 1.0 / SHIFTS, near + 1.0 / SHIFTS)).x)
+                                 bounds=(near - 1.0 / NUM_SHIFTS, near + 1.0 / NUM_SHIFTS)).x)

@@ -31,12 +31,12 @@ from cpg_ros.networks.registry import find_network, NETWORKS, reference
 import numpy as np
 import yaml
 
-#: Limits of joints without a robot file. ROOM: margin on either side of the recorded range, as a
-#: fraction of it; FASTER: speed limit as a multiple of the fastest fitted speed.
-ROOM, FASTER = 0.25, 3.0
-#: IN_PLACE: factors of a robot file's weights at a stride of 0; the largest one that keeps the
-#: joints within their limits, with the fitted offsets, is used.
-IN_PLACE = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
+#: Limits of joints without a robot file. LIMIT_MARGIN: on either side, over the recorded range;
+#: VELOCITY_RATIO: to the fastest fitted speed.
+LIMIT_MARGIN, VELOCITY_RATIO = 0.25, 3.0
+#: IN_PLACE_FACTORS: factors of a robot file's weights at a stride of 0; the largest one that keeps
+#: the joints within their limits, with the fitted offsets, is used.
+IN_PLACE_FACTORS = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
 
 
 def robot_file_of(path: Path) -> Path:
@@ -64,7 +64,7 @@ def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
         remaining = {gait: motion for gait, motion in robot.motions.items() if gait in presets}
         robot = replace(robot, networks=networks, harmonics=fit.harmonics, motions=remaining)
         motion = fitted_motion(result, robot)
-        for fraction in IN_PLACE:
+        for fraction in IN_PLACE_FACTORS:
             moved = replace(robot, motions={**remaining, fit.gait: _scaled(motion, fraction)})
             if _within_limits(moved, result):
                 break
@@ -157,11 +157,11 @@ def _guessed(name: str, leg: str, result: RecordingFit) -> Joint:
     offset, weights = fit.readouts[name]
     row = fit.joints.index(name)
     angles = np.concatenate([fit.recorded[row], fit.fitted[row], [offset]])
-    room = max(ROOM * float(np.ptp(angles)), 0.05)
+    room = max(LIMIT_MARGIN * float(np.ptp(angles)), 0.05)
     step = 1.0 / (fit.theta.size * result.stride.frequency)
     fastest = float(np.abs(np.diff(fit.fitted[row], append=fit.fitted[row, 0])).max()) / step
     return Joint(name, leg, fit.cells[name], offset, weights, float(angles.min()) - room,
-                 float(angles.max()) + room, max(FASTER * fastest, 1.0))
+                 float(angles.max()) + room, max(VELOCITY_RATIO * fastest, 1.0))
 
 
 def running_parameters(result: RecordingFit, robot: Robot | None = None) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.fitting.gaits.leg_names import legs_of
 from cpg_ros.fitting.gaits.leg_phases import PhaseScatter
-from cpg_ros.fitting.gaits.stride import FEW_CYCLES, find_stride, NoSteadyGait, Stride
+from cpg_ros.fitting.gaits.stride import FEW_CYCLES_FACTOR, find_stride, NoSteadyGait, Stride
 from cpg_ros.fitting.inversion.cycle_problem import Orbits
 from cpg_ros.fitting.inversion.fit import Estimate, Fit
 from cpg_ros.fitting.inversion.fit_data import cells_of
@@ -48,12 +48,11 @@ import numpy as np
 
 # A fit to every steady gait: where the requested fit has no orbit, a simpler one.
 
-#: STAYS: half width of the bounds that hold a parameter at its value, as a fraction of that value.
-STAYS = 1e-9
-#: ASKED: standard errors by which the cells' own stance must fit worse before duty is fitted.
-#: KNOWN: standard error of the duty (fraction of a stride) from which on a warning calls it
-#: unknown.
-ASKED, KNOWN = 3.3, 0.03
+#: FIXED_BOUND_WIDTH: half width of the bounds that hold a parameter, over its value.
+FIXED_BOUND_WIDTH = 1e-9
+#: DUTY_THRESHOLD: standard errors by which the cells' own stance must fit worse before duty is
+#: fitted. MAX_DUTY_STDERR: fraction of a stride; above it a warning calls the duty unknown.
+DUTY_THRESHOLD, MAX_DUTY_STDERR = 3.3, 0.03
 #: One attempt at a fit: free parameters, order of the readout, starts, and a text that describes
 #: it.
 Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
@@ -142,9 +141,9 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
                                       for minimum in minima[:2])])
     sizes = np.array(list(other.sizes.values()))[:, None]
     rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
-    if rise > 0.5 * ASKED**2 * other.sharing:
+    if rise > 0.5 * DUTY_THRESHOLD**2 * other.sharing:
         return fitted((*names, GAIT_DUTY), order, minima), ()
-    known = other.parameters[GAIT_DUTY].stderr < KNOWN or np.isinf(other.model_error)
+    known = other.parameters[GAIT_DUTY].stderr < MAX_DUTY_STDERR or np.isinf(other.model_error)
     return own, () if known else (
         'the recording does not tell how long legs stand: they are taken to stand as the cells of '
         'the network do, and the intervals hold for that alone',)
@@ -155,7 +154,7 @@ def _as_it_is(cycle: Stride, cells: Mapping[str, int], network: Network, gait: s
     """Fit the readouts alone; all parameters of the network keep their values."""
     name = next(iter(network.parameters()))
     value, kind = float(network.as_dict()[name]), network.ranges[name]
-    room = STAYS * max(abs(value), 1.0)
+    room = FIXED_BOUND_WIDTH * max(abs(value), 1.0)
     bounds = {name: (max(kind.low, value - room), min(kind.high, value + room))}
     fit = invert(cycle, cells, network, gait, (name,), order, ({},), readout=readout,
                  bounds=bounds, straight=True, done=done)
@@ -163,10 +162,10 @@ def _as_it_is(cycle: Stride, cells: Mapping[str, int], network: Network, gait: s
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())
 
 
-#: POOR: order of the readout -> mean RMS error, as a fraction of the range, above which a fit is
-#: poor; fits of real trots and walks have 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04.
-#: POOR_FACTOR: factor of the confidence of a poor fit.
-POOR, POOR_FACTOR = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
+#: POOR_THRESHOLDS: order of the readout -> mean RMS error, as a fraction of the range, above which
+#: a fit is poor; fits of real trots and walks have 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04.
+#: POOR_FACTOR: of the confidence of a poor fit.
+POOR_THRESHOLDS, POOR_FACTOR = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -203,8 +202,8 @@ class RecordingFit(ShortRepr):
 
     @property
     def poor(self) -> bool:
-        """Whether the mean RMS error is above POOR for the order of the readouts."""
-        return self.fit.mean_rms_share > POOR[self.fit.order]
+        """Whether the mean RMS error is above the threshold for the order of the readouts."""
+        return self.fit.mean_rms_share > POOR_THRESHOLDS[self.fit.order]
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""
@@ -312,7 +311,7 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
         stride, cycles=1, frequency=1.0 / recording.cycle,
         # A cut is right to half a sample on either side.
         frequency_error=float(np.median(np.diff(recording.times))) / (6**0.5 * recording.cycle**2),
-        confidence=FEW_CYCLES * stride.confidence,
+        confidence=FEW_CYCLES_FACTOR * stride.confidence,
         scatter={leg: unknown if k else one
                  for k, (leg, one) in enumerate(stride.scatter.items())})
 

@@ -31,10 +31,10 @@ from cpg_ros.fitting.recordings.formats import FORMATS
 
 # Recordings in folders: bags, split ones as one, and other files of known formats.
 
-#: RESULTS: file that marks a folder of results, in which no recordings are searched for.
-RESULTS = 'cpg_ros_results.json'
-#: BLOCK: bytes that are read at once.
-BLOCK = 1 << 20
+#: MARKER_FILE: marks a folder of results, in which no recordings are searched for.
+MARKER_FILE = 'cpg_ros_results.json'
+#: BLOCK_SIZE: bytes that are read at once.
+BLOCK_SIZE = 1 << 20
 
 
 def found(folders: Sequence[Path]) -> Iterator[Path]:
@@ -63,7 +63,7 @@ def _below(folder: Path) -> Iterator[Path]:
                 ending for entry in FORMATS.values() for ending in entry.endings)):
             yield folder
         return
-    if (folder / RESULTS).exists():
+    if (folder / MARKER_FILE).exists():
         return
     try:
         inside = sorted(folder.iterdir())
@@ -98,7 +98,7 @@ def digest(recording: Path) -> str:
         size = path.stat().st_size
         total.update(os.fsencode(f'{path.name if recording.is_dir() else path.suffix}\n{size}\n'))
         with path.open('rb') as file:
-            while block := file.read(BLOCK):
+            while block := file.read(BLOCK_SIZE):
                 total.update(block)
     return total.hexdigest()
 
@@ -117,8 +117,7 @@ def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
 
 # A folder of results: a file for every recording that is done, from which the table is made.
 
-#: ROWS: folder of the rows; FITTED: folder of the fitted files.
-ROWS, FITTED = 'rows', 'fitted'
+ROW_FOLDER, FIT_FOLDER = 'rows', 'fitted'
 
 
 def key(recording: Path) -> str:
@@ -144,15 +143,15 @@ class Results:
 
         """
         self.folder, self.settings = folder, settings
-        mark = folder / RESULTS
+        mark = folder / MARKER_FILE
         if folder.exists() and not mark.exists() and any(folder.iterdir()):
             raise InputError(f'{folder} is not a results folder: it contains other files')
-        for name in (ROWS, FITTED):
+        for name in (ROW_FOLDER, FIT_FOLDER):
             (folder / name).mkdir(parents=True, exist_ok=True)
         write_atomically(mark, json.dumps({'made by': 'inversion --bags'}) + '\n')
 
     def _place(self, recording: Path) -> Path:
-        return self.folder / ROWS / f'{key(recording)}.json'
+        return self.folder / ROW_FOLDER / f'{key(recording)}.json'
 
     def get(self, recording: Path) -> dict[str, Any] | None:
         """Return a recording's row, if it was made with the same settings."""
@@ -168,14 +167,15 @@ class Results:
         """
         files = row.pop('files', {})
         for name, text in files.items():
-            write_atomically(self.folder / FITTED / name, text)
+            write_atomically(self.folder / FIT_FOLDER / name, text)
         if not files:
             # Remove files that the new result no longer has.
             for ending in ('.yaml', '_robot.yaml'):
-                (self.folder / FITTED / f'{self.name(recording)}{ending}').unlink(missing_ok=True)
+                name = f'{self.name(recording)}{ending}'
+                (self.folder / FIT_FOLDER / name).unlink(missing_ok=True)
         stored = {'file': printable(str(recording)), 'settings': self.settings, **row,
                 'reason': printable(row['reason']),
-                'fitted': str(Path(FITTED, next(iter(files)))) if files else ''}
+                'fitted': str(Path(FIT_FOLDER, next(iter(files)))) if files else ''}
         write_atomically(self._place(recording), json.dumps(stored))
 
     def name(self, recording: Path) -> str:
@@ -191,7 +191,7 @@ class Results:
 
 # The page of many inverted recordings: one file, a table that can be sorted, small pictures.
 
-MORE = """
+TABLE_STYLE = """
 th { cursor: pointer; white-space: nowrap; } th[aria-sort]::after { content: " \\2191"; }
 th[aria-sort=descending]::after { content: " \\2193"; }
 svg polyline { fill: none; stroke-width: 1.2; } svg .r { stroke: #a0aec0; stroke-width: 2.5; }
@@ -217,8 +217,8 @@ heads.forEach((head, k) => head.addEventListener('click', () => {
   body.append(...[...body.rows].sort(order));
 }));
 document.querySelector('input').addEventListener('input', event => {
-  const wanted = event.target.value.toLowerCase();
-  for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
+  const query = event.target.value.toLowerCase();
+  for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(query);
 });
 """
 HEADS = ('file', 'gait', 'frequency [Hz]', 'confidence', 'residual / range [%]', 'parameters',
@@ -261,7 +261,7 @@ def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: in
     title = f'{done} recordings, {done - failed} fitted, {failed} not'
     with replacing(path) as beside, beside.open('w', encoding='utf-8') as out:
         out.write(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-                  f'<title>{title}</title><style>{STYLE}{MORE}</style></head><body>\n'
+                  f'<title>{title}</title><style>{STYLE}{TABLE_STYLE}</style></head><body>\n'
                   f'<h1>{title}</h1>\n<p><input placeholder="show rows that contain this" '
                   'aria-label="filter"> Click a column head to sort. Grey: recorded; blue: '
                   'fitted.</p>\n<table><thead><tr>'
@@ -271,15 +271,15 @@ def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: in
         out.write(f'</tbody></table><script>{SCRIPT}</script></body></html>\n')
 
 
-#: BATCH: rows that are in memory at once.
-BATCH = 256
-#: FIRST: column -> unit, in the order of the table, before the columns of the parameters.
-FIRST = {'file': '', 'digest': '', 'reason': '', 'gait': '', 'recognised': '',
-         'frequency': 'Hz', 'frequency_error': 'Hz', 'confidence': '', 'cycles': '',
-         'begin': 's', 'end': 's', 'network': '', 'rms_share': ''}
-TEXT = ('file', 'digest', 'reason', 'gait', 'recognised', 'network', 'fitted')
-#: PARTS: columns of each parameter: value, standard error, and ends of the 95 % interval.
-PARTS = ('value', 'stderr', 'low', 'high')
+#: BATCH_SIZE: rows that are in memory at once.
+BATCH_SIZE = 256
+#: COLUMN_UNITS: of the table, in its order, before the columns of the parameters.
+COLUMN_UNITS = {'file': '', 'digest': '', 'reason': '', 'gait': '', 'recognised': '',
+                'frequency': 'Hz', 'frequency_error': 'Hz', 'confidence': '', 'cycles': '',
+                'begin': 's', 'end': 's', 'network': '', 'rms_share': ''}
+TEXT_COLUMNS = ('file', 'digest', 'reason', 'gait', 'recognised', 'network', 'fitted')
+#: ESTIMATE_FIELDS: columns of each parameter.
+ESTIMATE_FIELDS = ('value', 'stderr', 'low', 'high')
 
 Rows = Callable[[], Iterable[dict[str, Any]]]
 
@@ -302,15 +302,16 @@ def parameter_columns(rows: Iterable[dict[str, Any]]) -> list[str]:
     """Return the names of the columns of the parameters, those of all rows, sorted."""
     names = {f'{row["network"]}.{name}' for row in rows for name in row.get('parameters', {})}
     return [f'{name}{"" if part == "value" else f".{part}"}' for name in sorted(names)
-            for part in PARTS]
+            for part in ESTIMATE_FIELDS]
 
 
 def flat(row: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """Return a row with a field for every column."""
-    cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
+    cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT_COLUMNS else None)
+                             for name in COLUMN_UNITS}
     cells |= dict.fromkeys(columns)
     for name, estimate in row.get('parameters', {}).items():
-        for part in PARTS:
+        for part in ESTIMATE_FIELDS:
             column = f'{row["network"]}.{name}{"" if part == "value" else f".{part}"}'
             cells[column] = estimate[part]
     return cells | {'phases': row.get('phases', {}), 'joints': row.get('joints', {}),
@@ -323,7 +324,7 @@ def _batches(rows: Iterable[dict[str, Any]], columns: list[str]
     batch: list[dict[str, Any]] = []
     for row in rows:
         batch.append(flat(row, columns))
-        if len(batch) == BATCH:
+        if len(batch) == BATCH_SIZE:
             yield batch
             batch = []
     if batch:
@@ -343,14 +344,15 @@ def write_tables(folder: Path, rows: Rows) -> list[Path]:
     """
     arrow = library()
     columns = parameter_columns(rows())
-    kinds = {**{name: arrow.string() if name in TEXT else arrow.float64() for name in FIRST},
+    kinds = {**{name: arrow.string() if name in TEXT_COLUMNS else arrow.float64()
+                for name in COLUMN_UNITS},
              'cycles': arrow.int64(), **dict.fromkeys(columns, arrow.float64()),
              'phases': arrow.map_(arrow.string(), arrow.float64()),
              'joints': arrow.map_(arrow.string(), arrow.float64()),
              'warnings': arrow.list_(arrow.string()), 'fitted': arrow.string(),
              'seconds': arrow.float64()}
-    schema = arrow.schema([arrow.field(name, kind, metadata={'unit': FIRST[name]}
-                                       if FIRST.get(name) else None)
+    schema = arrow.schema([arrow.field(name, kind, metadata={'unit': COLUMN_UNITS[name]}
+                                       if COLUMN_UNITS.get(name) else None)
                            for name, kind in kinds.items()])
     parquet, table = folder / 'table.parquet', folder / 'table.csv'
     with (replacing(parquet) as one, replacing(table) as other,

@@ -33,7 +33,7 @@ from cpg_ros.common.errors import ShortRepr
 from cpg_ros.fitting.gaits.foot_contacts import FootContacts
 from cpg_ros.fitting.gaits.leg_names import role_of
 from cpg_ros.fitting.gaits.mean_cycle import evaluate_coefficients
-from cpg_ros.fitting.gaits.quality_checks import TRAVELS
+from cpg_ros.fitting.gaits.quality_checks import MIN_TRAVEL
 from cpg_ros.fitting.gaits.stride import Stride
 from cpg_ros.fitting.inversion.recording_fit import RecordingFit
 from cpg_ros.fitting.recordings.recording import Recording
@@ -42,15 +42,14 @@ import numpy as np
 #: PROXIMAL: words of joints that swing a leg; then the words of joints below, which bend it.
 PROXIMAL = frozenset(('hip', 'thigh', 'hfe', 'hy', 'coxa', 'shoulder', 'upper', 'hippitch'))
 DISTAL = frozenset(('knee', 'calf', 'kfe', 'lower', 'tibia', 'elbow', 'shank', 'kn', 'kneepitch'))
-#: HARMONICS: harmonics of the mean cycle in its extremes; POINTS: phases at which these are
-#: searched for.
+#: HARMONICS: of the mean cycle in its extremes, which are searched for at POINTS phases.
 HARMONICS, POINTS = 12, 4096
-#: AROUND: half width of the fit to an extreme, cycles; SEARCHED: largest distance from that of the
-#: mean cycle, cycles; TRIED: number of phases that are tried; SAMPLES: fewest samples on a side.
-AROUND, SEARCHED, TRIED, SAMPLES = 0.08, 0.08, 33, 3
-#: SKEWED: least skewness that tells in which sense a joint bends; BENT: least mean, over the RMS
-#: motion, that tells it otherwise; CLEARER: least difference in bend of the two strokes, likewise.
-SKEWED, BENT, CLEARER = 0.4, 1.0, 0.3
+#: FIT_HALF_WIDTH: of the fit to an extreme, cycles; SEARCH_RANGE: around that of the mean cycle,
+#: cycles; NUM_CANDIDATES: phases in it; MIN_SIDE_SAMPLES: on either side.
+FIT_HALF_WIDTH, SEARCH_RANGE, NUM_CANDIDATES, MIN_SIDE_SAMPLES = 0.08, 0.08, 33, 3
+#: MIN_SKEWNESS: that tells in which sense a joint bends; MIN_MEAN_RATIO: of its mean to its RMS
+#: motion, that tells it otherwise; MIN_BEND_DIFFERENCE: of the two strokes, likewise.
+MIN_SKEWNESS, MIN_MEAN_RATIO, MIN_BEND_DIFFERENCE = 0.4, 1.0, 0.3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -154,14 +153,14 @@ def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, fl
     size, mean = float(np.std(y)), float(np.mean(y))
     # It is bent far for a short time; where it is bent evenly, its zero is where it is straight.
     skewness = float(np.mean((y - mean)**3)) / size**3 if size else 0.0
-    if abs(skewness) < SKEWED and (abs(mean) < BENT * size or not size):
+    if abs(skewness) < MIN_SKEWNESS and (abs(mean) < MIN_MEAN_RATIO * size or not size):
         return joint, 1.0, f'the direction in which {bending} bends is unknown'
-    bent = np.sign(skewness if abs(skewness) >= SKEWED else mean) * y
+    bent = np.sign(skewness if abs(skewness) >= MIN_SKEWNESS else mean) * y
     # From its smallest to its largest angle the joint rises.
     least, largest = theta[np.argmin(x)], theta[np.argmax(x)]
     rising = (theta - least) % 1.0 < (largest - least) % 1.0
     more = float(bent[rising].mean() - bent[~rising].mean())
-    if abs(more) < CLEARER * size:
+    if abs(more) < MIN_BEND_DIFFERENCE * size:
         return joint, 1.0, f'{bending} is bent as much in one stroke of {joint} as in the other'
     return joint, float(np.sign(more)), ''
 
@@ -173,7 +172,7 @@ def _extremes(times: np.ndarray, phases: np.ndarray, x: np.ndarray, c: np.ndarra
     peak = float(theta[np.argmax(side * evaluate_coefficients(c[:, None], theta)[0])])
     extremes = []
     for k in range(int(np.floor(phases[0] - peak)), int(np.ceil(phases[-1] - peak)) + 1):
-        near = (np.abs(phases - peak - k) <= SEARCHED + AROUND) & np.isfinite(x)
+        near = (np.abs(phases - peak - k) <= SEARCH_RANGE + FIT_HALF_WIDTH) & np.isfinite(x)
         at = _summit(phases[near], side * x[near], peak + k)
         if at is not None:
             extremes.append((float(np.interp(at, phases, times)), at))
@@ -187,12 +186,12 @@ def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
     slopes: a vertex of a symmetric fit, and a mean of unequal strides, are biased towards the
     slower stroke.
     """
-    tried = expected + np.linspace(-SEARCHED, SEARCHED, TRIED)
-    misfits = np.full(TRIED, np.inf)
+    tried = expected + np.linspace(-SEARCH_RANGE, SEARCH_RANGE, NUM_CANDIDATES)
+    misfits = np.full(NUM_CANDIDATES, np.inf)
     for k, at in enumerate(tried):
-        near = np.abs(phases - at) <= AROUND
+        near = np.abs(phases - at) <= FIT_HALF_WIDTH
         before, after = (near & (phases < at)).sum(), (near & (phases > at)).sum()
-        if min(before, after) < SAMPLES:
+        if min(before, after) < MIN_SIDE_SAMPLES:
             continue
         off = phases[near] - at
         rows = np.column_stack([np.ones(off.size), np.minimum(off, 0.0)**2,
@@ -201,7 +200,7 @@ def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
         if max(fitted[1:]) < 0.0:
             misfits[k] = np.mean((rows @ fitted - x[near])**2)
     k = int(np.argmin(misfits))
-    if not 0 < k < TRIED - 1 or not np.isfinite(misfits[k - 1:k + 2]).all():
+    if not 0 < k < NUM_CANDIDATES - 1 or not np.isfinite(misfits[k - 1:k + 2]).all():
         return None
     low, middle, high = misfits[k - 1:k + 2]
     bend = low - 2.0 * middle + high
@@ -227,8 +226,8 @@ def _strides(fore: np.ndarray, hind: np.ndarray | None) -> np.ndarray:
 
 # The strides of a recording as tables: each stride, each leg, and left against right.
 
-#: FEWEST: fewest strides of a leg for which a scatter is reported.
-FEWEST = 3
+#: MIN_STRIDES: of a leg, for a scatter.
+MIN_STRIDES = 3
 #: QUANTITIES: name from joints, name from contacts, attribute of LegStrides, and format of each.
 QUANTITIES = (('stride [s]', 'stride [s]', 'periods', '.4f'),
               ('retraction [s]', 'stance [s]', 'retractions', '.4f'),
@@ -267,9 +266,9 @@ def by_leg(legs: list[LegStrides]) -> Rows:
             values = getattr(leg, attribute)
             finite = len(values) > 0 and np.isfinite(values).all()
             cells.append('cannot tell' if not finite else f'{values.mean():{form}}' + (
-                f' +- {values.std(ddof=1):{form}}' if len(values) >= FEWEST else ''))
+                f' +- {values.std(ddof=1):{form}}' if len(values) >= MIN_STRIDES else ''))
         scatter = (f'{leg.periods.std(ddof=1) / leg.periods.mean():.1%}'
-                   if len(leg.periods) >= FEWEST else f'fewer than {FEWEST}')
+                   if len(leg.periods) >= MIN_STRIDES else f'fewer than {MIN_STRIDES}')
         rows.append((leg.leg, str(len(leg.begins)), *cells, scatter, f'{leg.range:.3f}',
                      'contacts' if leg.by_contacts else leg.joint))
     return rows
@@ -279,7 +278,7 @@ def gait_summary(result: RecordingFit, legs: list[LegStrides]) -> Rows:
     """Return the rows of a gait laboratory's report: quantity and value, with a head."""
     periods = np.concatenate([leg.periods for leg in legs])
     stride, contacts = result.stride, result.stride.contacts
-    scatter = f' +- {periods.std(ddof=1):.3f}' if len(periods) >= FEWEST else ''
+    scatter = f' +- {periods.std(ddof=1):.3f}' if len(periods) >= MIN_STRIDES else ''
     rows: Rows = [
         ('quantity', 'value'),
         ('cadence [steps/min]', f'{120.0 * stride.frequency:.1f}') if len(legs) == 2 else
@@ -312,7 +311,7 @@ def _travel(result: RecordingFit) -> Rows:
     inside = (recording.times >= stride.begin) & (recording.times <= stride.end)
     first, *_, last = recording.body[inside, :2]
     length = float(np.linalg.norm(last - first)) / stride.warp.cycles
-    if length < TRAVELS:
+    if length < MIN_TRAVEL:
         return [('stride length', 'not known: the body stays where it is, as on a treadmill')]
     return [('stride length [m]', f'{length:.3f}'),
             ('speed [m/s]', f'{length * stride.frequency:.3f}')]

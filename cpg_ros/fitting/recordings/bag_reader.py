@@ -26,7 +26,7 @@ import struct
 
 from cpg_ros.common.command_line import printable, progress_bar
 from cpg_ros.fitting.recordings.bag_storage import Bag, ENDINGS, files_of_bag, opened
-from cpg_ros.fitting.recordings.joint_streams import BATCH, recorded, Servo, Stream
+from cpg_ros.fitting.recordings.joint_streams import BATCH_SIZE, recorded, Servo, Stream
 from cpg_ros.fitting.recordings.recording import (
     FootLoads,
     JOINTS,
@@ -39,12 +39,12 @@ import numpy as np
 
 # Foot loads, whose messages have no stamps.
 
-#: NAME: last part of the name of a topic with foot loads, in any namespace; TYPE: its type.
-NAME, TYPE = 'foot_contacts', 'std_msgs/msg/Float64MultiArray'
-#: HEAD: bytes of the CDR header of a message; bit 0 of its second byte is 1 for little-endian.
-HEAD = 4
-#: APART: if start and first stamp differ by more, s, the recording uses times of reception.
-APART = 60.0
+#: LOAD_TOPIC: last part of the name of a topic with foot loads, in any namespace.
+LOAD_TOPIC, LOAD_TYPE = 'foot_contacts', 'std_msgs/msg/Float64MultiArray'
+#: HEADER_SIZE: of CDR, bytes; bit 0 of its second byte is 1 for little-endian.
+HEADER_SIZE = 4
+#: CLOCK_TOLERANCE: s; if start and first stamp differ by more, times of reception are used.
+CLOCK_TOLERANCE = 60.0
 
 
 class LoadStream:
@@ -64,8 +64,8 @@ class LoadStream:
 
     def pass_joint_state(self, received: int, message: bytes) -> None:
         """Take the clock from a serialised JointState."""
-        if len(message) >= HEAD + 8:
-            seconds, rest = struct.unpack_from(f'{_order(message)}iI', message, HEAD)
+        if len(message) >= HEADER_SIZE + 8:
+            seconds, rest = struct.unpack_from(f'{_order(message)}iI', message, HEADER_SIZE)
             self._clock.append((received, 1_000_000_000 * seconds + rest))
 
     def loads(self, start: float) -> FootLoads | None:
@@ -97,7 +97,7 @@ class LoadStream:
 
     def _on_clock(self, start: float) -> np.ndarray:
         received, stamps = np.array(self._clock, dtype=np.int64).T
-        if abs(start - 1e-9 * stamps[0]) > APART:
+        if abs(start - 1e-9 * stamps[0]) > CLOCK_TOLERANCE:
             # Joint states without stamps are recorded by when they were received.
             stamps = received
         begin, own = received[0], np.array(self._received, dtype=np.int64)
@@ -120,17 +120,17 @@ def _layout(message: bytes) -> tuple[tuple[str, ...], int]:
 
     """
     order = _order(message)
-    dimensions, length = struct.unpack_from(f'{order}II', message, HEAD)
-    end = HEAD + 8 + length
+    dimensions, length = struct.unpack_from(f'{order}II', message, HEADER_SIZE)
+    end = HEADER_SIZE + 8 + length
     if dimensions != 1 or not 1 < length <= len(message):
         raise ValueError('not one dimension with a label')
-    legs = tuple(message[HEAD + 8:end - 1].decode().split(','))
+    legs = tuple(message[HEADER_SIZE + 8:end - 1].decode().split(','))
     # Size, stride and offset, four bytes each, then how many numbers there are.
-    (count,) = struct.unpack_from(f'{order}I', message, end + -(end - HEAD) % 4 + 12)
-    offset = end + -(end - HEAD) % 4 + 16
+    (count,) = struct.unpack_from(f'{order}I', message, end + -(end - HEADER_SIZE) % 4 + 12)
+    offset = end + -(end - HEADER_SIZE) % 4 + 16
     if count != len(legs):
         raise ValueError('not a number for each name')
-    return legs, offset + -(offset - HEAD) % 8
+    return legs, offset + -(offset - HEADER_SIZE) % 8
 
 
 # The recording: joint states, and the foot loads if there are any.
@@ -178,7 +178,7 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
                 streams[topic].add(received, message)
                 if loads:
                     loads.pass_joint_state(received, message)
-                if not done % BATCH:
+                if not done % BATCH_SIZE:
                     bar(done)
         for stream in streams.values():
             stream.decode()
@@ -193,7 +193,7 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
 def _load_stream(bag: Bag) -> LoadStream | None:
     """Return a stream for the topic with foot loads, None unless exactly one has them."""
     topics = {connection.topic for connection in bag.connections
-             if connection.topic.rsplit('/')[-1] == NAME and connection.msgtype == TYPE}
+             if connection.topic.rsplit('/')[-1] == LOAD_TOPIC and connection.msgtype == LOAD_TYPE}
     return LoadStream(topics.pop()) if len(topics) == 1 else None
 
 

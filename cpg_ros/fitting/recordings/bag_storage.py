@@ -30,7 +30,7 @@ from typing import Any, IO
 from cpg_ros.common import files as regular_file
 from cpg_ros.fitting.recordings.bag_library import Reader, ReaderError, unpack_file
 from cpg_ros.fitting.recordings.cdr import JOINT_STATE
-from cpg_ros.fitting.recordings.low_state import MOTORS
+from cpg_ros.fitting.recordings.low_state import MOTOR_NAMES
 from cpg_ros.fitting.recordings.recording import abbreviate, RecordingError, refuse_stand_in
 from cpg_ros.fitting.recordings.tables import UnpackedSize
 
@@ -106,13 +106,12 @@ class _Ended(io.RawIOBase):
         super().close()
 
 
-#: STORAGES: endings of a bag's storage files; METADATA: name of the file that describes them.
-STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
-#: PACKED: additional ending of packed storage files; ENDINGS: endings of all bags that are files.
-PACKED = '.zstd'
-ENDINGS = (*STORAGES, *(ending + PACKED for ending in STORAGES), '.bag')
-#: LARGEST_METADATA: largest metadata file, bytes; a thousand topics take 2 MB.
-LARGEST_METADATA = 16_000_000
+STORAGE_SUFFIXES, METADATA_FILE = ('.mcap', '.db3'), 'metadata.yaml'
+#: ZSTD_SUFFIX: of packed storage files, after their own; ENDINGS: of all bags that are files.
+ZSTD_SUFFIX = '.zstd'
+ENDINGS = (*STORAGE_SUFFIXES, *(ending + ZSTD_SUFFIX for ending in STORAGE_SUFFIXES), '.bag')
+#: MAX_METADATA_SIZE: bytes; a thousand topics take 2 MB.
+MAX_METADATA_SIZE = 16_000_000
 
 
 class Bag:
@@ -143,7 +142,7 @@ class Bag:
         if not types:
             raise RecordingError(f'{self.path}: an empty bag, without topics')
         fitting = [topic for topic in types if types[topic] == {JOINT_STATE}]
-        motors = [topic for topic in types if types[topic] <= set(MOTORS)]
+        motors = [topic for topic in types if types[topic] <= set(MOTOR_NAMES)]
         if not topics and not fitting and motors:
             # Robots publish their state twice, at the full rate and slower.
             counts = self.expected()
@@ -236,7 +235,7 @@ def _opened(path: Path) -> Iterator[Bag]:
                 size += file.stat().st_size
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
-        whole = path.is_file() or (path / METADATA).exists()
+        whole = path.is_file() or (path / METADATA_FILE).exists()
         renamed = _renamed(path, files) if path.is_dir() and whole else ''
     except OSError as error:
         raise RecordingError(f'{error.filename or path}: {error.strerror}') from error
@@ -245,8 +244,8 @@ def _opened(path: Path) -> Iterator[Bag]:
         notes.append(f'{path}: metadata.yaml is missing; its storage files are read as they are')
     if renamed:
         whole = False
-        notes.append(f'{path / METADATA} names {renamed}, which is not there; its storage files '
-                     'are read as they are')
+        notes.append(f'{path / METADATA_FILE} names {renamed}, which is not there; its storage '
+                     'files are read as they are')
     with ExitStack() as stack:
         readers = []
         for storage in [path] if whole else files:
@@ -264,18 +263,18 @@ def _opened(path: Path) -> Iterator[Bag]:
 
 def _renamed(path: Path, files: list[Path]) -> str:
     """Return the names in metadata.yaml of storage files that all have been renamed, or ''."""
-    text = (path / METADATA).read_text(errors='replace')[:LARGEST_METADATA]
+    text = (path / METADATA_FILE).read_text(errors='replace')[:MAX_METADATA_SIZE]
     part = re.search(r'^  relative_file_paths:\n((?: +- .*\n)+)', text, re.M)
     names = [] if part is None else [line.strip(' -"\'') for line in part[1].splitlines()]
     there = {file.name for file in files}
     matched = len(names) == len(files) > 0 and not any(
-        name.endswith(PACKED) or Path(name).name in there for name in names)
+        name.endswith(ZSTD_SUFFIX) or Path(name).name in there for name in names)
     return abbreviate(names, 3) if matched else ''
 
 
 def _check(file: Path) -> None:
     """Reject pipes and devices, which would block the library."""
-    largest = LARGEST_METADATA if file.name == METADATA else math.inf
+    largest = MAX_METADATA_SIZE if file.name == METADATA_FILE else math.inf
     with regular_file.opened(file, RecordingError, largest=largest) as data:
         refuse_stand_in(file, data.read(64))
 
@@ -285,15 +284,15 @@ def _files(path: Path) -> list[Path]:
     if not path.exists():
         raise RecordingError(f'{path}: no such bag')
     if not path.is_dir():
-        if path.suffix not in STORAGES:
+        if path.suffix not in STORAGE_SUFFIXES:
             _check(path)
             raise RecordingError(f'{path}: neither a folder nor a file with the ending '
-                                 f'{" or ".join(STORAGES)}')
+                                 f'{" or ".join(STORAGE_SUFFIXES)}')
         return [path]
-    files = [file for file in path.iterdir() if file.suffix in STORAGES and file.is_file()]
-    if not files and not (path / METADATA).exists():
+    files = [file for file in path.iterdir() if file.suffix in STORAGE_SUFFIXES and file.is_file()]
+    if not files and not (path / METADATA_FILE).exists():
         raise RecordingError(f'{path}: not a bag: it has neither metadata.yaml nor a storage file '
-                             f'({", ".join(STORAGES)})')
+                             f'({", ".join(STORAGE_SUFFIXES)})')
     return sorted(files, key=lambda file: (len(file.name), file.name))
 
 
@@ -308,8 +307,8 @@ def files_of_bag(folder: Path) -> list[Path]:
 
     """
     files = sorted(file for file in folder.iterdir() if file.is_file() and (
-        file.suffix in STORAGES or file.name == METADATA))
-    storages = [file for file in files if file.suffix in STORAGES]
+        file.suffix in STORAGE_SUFFIXES or file.name == METADATA_FILE))
+    storages = [file for file in files if file.suffix in STORAGE_SUFFIXES]
     parts = [re.fullmatch(r'(.*)_\d+', file.stem) for file in storages]
     split = len(parts) > 1 and all(parts) and len({
         (part[1], file.suffix) for part, file in zip(parts, storages, strict=True) if part}) == 1
@@ -327,9 +326,9 @@ def _culprit(path: Path, files: list[Path], error: Exception) -> str:
         except Exception:
             return str(file)
     if files or isinstance(error, ReaderError):
-        return (f'{path / METADATA} cannot be used'
+        return (f'{path / METADATA_FILE} cannot be used'
                 + (f' to read {abbreviate([file.name for file in files])}' if files else ''))
-    return ' or '.join(str(file) for file in path.iterdir() if file.name != METADATA)
+    return ' or '.join(str(file) for file in path.iterdir() if file.name != METADATA_FILE)
 
 
 def line(error: Exception) -> str:

@@ -35,13 +35,13 @@ from cpg_ros.fitting.recordings.recording import (
     unwrapped,
 )
 from cpg_ros.fitting.recordings.tables import number_in, number_rows, opened, remaining_lines
-from cpg_ros.fitting.recordings.thinned import FARTHEST, pluralize
+from cpg_ros.fitting.recordings.thinned import MAX_POSITION, pluralize
 import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
 STATEMENT = re.compile(r'\b(ROOT|JOINT|CHANNELS)\b[ \t]*([^\n\r]*)')
-#: LONGEST: most lines of a tree; MOST: most channels of all joints; a body with hands has 300.
-LONGEST, MOST = 200_000, 10_000
+#: MAX_CHANNELS: of all joints; a body with hands has 300.
+MAX_TREE_LINES, MAX_CHANNELS = 200_000, 10_000
 
 
 def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True) -> Recording:
@@ -63,7 +63,7 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     """
     path = Path(path)
     with opened(path) as file:
-        head = list(takewhile(lambda line: line.strip() != 'MOTION', islice(file, LONGEST)))
+        head = list(takewhile(lambda line: line.strip() != 'MOTION', islice(file, MAX_TREE_LINES)))
         if ''.join(head[:1]).split()[:1] != ['HIERARCHY']:
             raise RecordingError(f"{path}: not a BVH file: it does not begin with 'HIERARCHY'")
         count, interval, line = _motion(file, path, len(head) + 1)
@@ -79,7 +79,7 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
     require(names, names, str(path))
     with np.errstate(invalid='ignore'):
         angles = np.radians(rows[:, turning])
-        angles[~(np.abs(angles) <= FARTHEST)] = np.nan
+        angles[~(np.abs(angles) <= MAX_POSITION)] = np.nan
         moving = [name for name, column in zip(names, angles.T, strict=True)
                   if not (column == column[0]).all()]
     selected = matching(joints, names, str(path)) if joints else moving
@@ -109,9 +109,10 @@ def _tree(text: str, path: Path) -> list[tuple[str, str]]:
         channels += [(joint, channel) for channel in named]
     if text.count('{') != text.count('}'):
         raise RecordingError(f'{path}: not as many braces close as open in its tree of joints')
-    if not any(channel.endswith('rotation') for _, channel in channels) or len(channels) > MOST:
+    if len(channels) > MAX_CHANNELS or not any(channel.endswith('rotation')
+                                               for _, channel in channels):
         raise RecordingError(f'{path}: {pluralize(len(channels), "channel")}, where joints that '
-                             f'turn have up to {MOST}')
+                             f'turn have up to {MAX_CHANNELS}')
     return channels
 
 

@@ -30,17 +30,17 @@ from cpg_ros.fitting.recordings.markers import (
     contacts,
     Footfall,
     joint_recording,
+    LENGTH_UNITS,
     load_segments,
     marker_names,
     Markers,
     SEGMENTS,
     travelling,
-    UNITS,
 )
 from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    ANGLES,
+    ANGLE_UNITS,
     JOINTS,
     matching,
     Recording,
@@ -52,8 +52,8 @@ from cpg_ros.fitting.recordings.tables import stamps_of_frames
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
-#: LARGEST: largest file, bytes; BLOCK: size of its first block, bytes.
-LARGEST, BLOCK = 1_000_000_000, 512
+#: MAX_SIZE: of a file, bytes; BLOCK_SIZE: of its first block, bytes.
+MAX_SIZE, BLOCK_SIZE = 1_000_000_000, 512
 #: PLUG_IN_GAIT: segments whose feet are looked for without others.
 PLUG_IN_GAIT = 'human_plug_in_gait'
 
@@ -141,8 +141,8 @@ def _plates(parameters: Any, analogs: np.ndarray, frames: int) -> tuple[np.ndarr
     return (np.reshape(loads[:count], (count, frames)), np.reshape(corners, (count, 4, 3)))
 
 
-#: STRIKE, OFF: events of a foot that lands, and of one that leaves the ground.
-STRIKE, OFF = ('foot strike', 'heel strike', 'hs'), ('foot off', 'toe off', 'to')
+#: Names of a foot's touchdown and lift-off.
+STRIKE_EVENTS, OFF_EVENTS = ('foot strike', 'heel strike', 'hs'), ('foot off', 'toe off', 'to')
 
 
 def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
@@ -160,15 +160,15 @@ def footfalls(events: Mapping[str, Any]) -> list[Footfall]:
         leg, name = side.lower(), ' '.join(label.lower().split())
         if leg not in ('left', 'right'):
             leg, name = {'l': 'left', 'r': 'right'}.get(name[:1], ''), name[1:]
-        if leg and name in STRIKE + OFF:
-            falls.append((leg, time, name in STRIKE))
+        if leg and name in STRIKE_EVENTS + OFF_EVENTS:
+            falls.append((leg, time, name in STRIKE_EVENTS))
     return falls
 
 
-#: LOADED: force on a plate, N, from which on a foot stands on it; BESIDE: largest distance of a
-#: foot from a plate that it stands on, over the plate's edge; BRIEF: shortest stance and swing, s;
-#: EVEN: largest ratio of the times between landings; LANDINGS: fewest of them.
-LOADED, BESIDE, BRIEF, EVEN, LANDINGS = 20.0, 0.1, 0.05, 1.6, 5
+#: CONTACT_FORCE: on the plate under a foot, N; PLATE_MARGIN: distance of a foot from its plate,
+#: over the plate's edge; MIN_DURATION: of stance and swing, s; MAX_PERIOD_RATIO: of the times
+#: between landings.
+CONTACT_FORCE, PLATE_MARGIN, MIN_DURATION, MAX_PERIOD_RATIO, MIN_LANDINGS = 20.0, 0.1, 0.05, 1.6, 5
 
 
 def plate_footfalls(times: np.ndarray, loads: np.ndarray, corners: np.ndarray,
@@ -197,12 +197,12 @@ def plate_footfalls(times: np.ndarray, loads: np.ndarray, corners: np.ndarray,
     for foot in feet.values():
         along = foot - corners[:, :1]
         inside = np.abs(np.einsum('pnx,pex->pen', along, edges)
-                        / np.sum(edges**2, axis=2)[..., None] - 0.5) <= 0.5 + BESIDE
+                        / np.sum(edges**2, axis=2)[..., None] - 0.5) <= 0.5 + PLATE_MARGIN
         above.append(np.where(inside.all(axis=1),
                               np.abs(np.einsum('pnx,px->pn', along, upward)), np.inf))
-    width, stances = np.ones(max(1, round(BRIEF / float(np.median(np.diff(times)))))), []
+    width, stances = np.ones(max(1, round(MIN_DURATION / float(np.median(np.diff(times)))))), []
     for leg, own, other in zip(feet, above, above[::-1], strict=True):
-        down = ((np.abs(loads) > LOADED) & (own < other)).any(axis=0)
+        down = ((np.abs(loads) > CONTACT_FORCE) & (own < other)).any(axis=0)
         down = binary_opening(binary_closing(down, width), width)
         changes = (np.flatnonzero(np.diff(down)) + 1)[int(down[0]):]
         stances += [(float(times[first]), leg, float(times[end]))
@@ -212,13 +212,13 @@ def plate_footfalls(times: np.ndarray, loads: np.ndarray, corners: np.ndarray,
     for stance in sorted(stances):
         if run and run[-1][1] == stance[1]:
             run = []
-        elif len(run) > 1 and not 1.0 / EVEN < (stance[0] - run[-1][0]) / (
-                run[-1][0] - run[-2][0]) < EVEN:
+        elif len(run) > 1 and not 1.0 / MAX_PERIOD_RATIO < (stance[0] - run[-1][0]) / (
+                run[-1][0] - run[-2][0]) < MAX_PERIOD_RATIO:
             run = run[-1:]
         run = [*run, stance]
         best = max(best, run, key=len)
     return [event for begin, leg, end in best for event in ((leg, begin, True), (leg, end, False))
-            ] if len(best) >= LANDINGS else []
+            ] if len(best) >= MIN_LANDINGS else []
 
 
 def c3d_markers(path: str | Path) -> Markers:
@@ -262,7 +262,7 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any],
     names, doubles = marker_names(labels, coordinates)
     markers = Markers(names, stamps_of_frames(np.arange(frames), rate, path), coordinates, path,
                     notes=(*notes, *doubles),
-                    unit=UNITS.get(''.join(map(str, point.get('UNITS', ['']))), math.nan))
+                    unit=LENGTH_UNITS.get(''.join(map(str, point.get('UNITS', ['']))), math.nan))
     subjects = {name.rpartition(':')[2] for name in angles}
     return markers, [name for name, label in zip(names, labels, strict=True)
                    if label in angles or label.rpartition(':')[2] in subjects
@@ -281,7 +281,7 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
               ) -> Recording:
     """Return the angles that a model wrote."""
     source = points.source
-    scale = ANGLES.get(unit.lower() or 'deg')
+    scale = ANGLE_UNITS.get(unit.lower() or 'deg')
     if scale is None:
         raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
     names = matching(joints, angles, str(source))
@@ -309,9 +309,9 @@ def _stated(path: Path) -> int:
         RecordingError: it is not a C3D file.
 
     """
-    with files.opened(path, RecordingError, largest=LARGEST) as file:
-        data = file.read(BLOCK)
-    if len(data) < BLOCK or data[1] != 0x50 or not data[0]:
+    with files.opened(path, RecordingError, largest=MAX_SIZE) as file:
+        data = file.read(BLOCK_SIZE)
+    if len(data) < BLOCK_SIZE or data[1] != 0x50 or not data[0]:
         raise RecordingError(f'{path}: not a C3D file: its first bytes are not those of one')
     first, last = np.frombuffer(data, '<u2')[3:5].astype(int)
     return (last - first + 1) % 65536

@@ -30,13 +30,13 @@ from cpg_ros.fitting.recordings.bag_library import deserialize, SerdeError
 import numpy as np
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-#: LAYOUTS: most layouts of a batch that are decoded in bulk; other messages are decoded singly.
-LAYOUTS = 8
+#: MAX_LAYOUTS: of a batch that are decoded in bulk; other messages are decoded singly.
+MAX_LAYOUTS = 8
 #: FIELDS: arrays of a message, in its order.
 FIELDS = ('position', 'velocity', 'effort')
-#: HEADER: bytes before the body: representation, of which the library reads two bytes, and
+#: HEADER_SIZE: bytes before the body: representation, of which the library reads two bytes, and
 #: options.
-HEADER = 4
+HEADER_SIZE = 4
 
 
 class UndecodableError(CpgError):
@@ -82,7 +82,7 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
     fields = FIELDS if efforts else FIELDS[:1]
     left = np.arange(len(messages))
     lengths = np.fromiter(map(len, messages), np.intp, len(messages))
-    for _ in range(LAYOUTS):
+    for _ in range(MAX_LAYOUTS):
         if not left.size:
             return
         layout = _Layout(messages, int(left[0]))
@@ -144,7 +144,7 @@ class _Layout:
         self.order = '<' if first[1] else '>'
         fixed = np.zeros(self.length, bool)
         fixed[:2] = True
-        end = HEADER + 8
+        end = HEADER_SIZE + 8
 
         def text(value: str) -> None:
             nonlocal end
@@ -168,7 +168,7 @@ class _Layout:
             number()
             count = len(getattr(message, which))
             if count:
-                end += (HEADER - end) % 8
+                end += (HEADER_SIZE - end) % 8
             self.spans[which] = end, count
             end += 8 * count
         # Bytes are compared as words of four, which all of these but the first fill or pad.
@@ -191,8 +191,8 @@ class _Layout:
 
     def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return stamps and the numbers of all fields, copied; of width 0 if not requested."""
-        seconds = self._array(joined, self.order + 'i4', HEADER, 1)[:, 0].astype(np.int64)
-        nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
+        seconds = self._array(joined, self.order + 'i4', HEADER_SIZE, 1)[:, 0].astype(np.int64)
+        nanoseconds = self._array(joined, self.order + 'u4', HEADER_SIZE + 4, 1)[:, 0]
         return seconds * 10**9 + nanoseconds, [
             self._array(joined, self.order + 'f8', place, count if which in fields else 0)
             .astype(np.float64) for which, (place, count) in self.spans.items()]

@@ -25,11 +25,12 @@ import re
 from cpg_ros.common.command_line import printable, progress_bar
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    ANGLES,
+    ANGLE_UNITS,
     Chunk,
     FootLoads,
+    INDEXED_NAME,
     JOINTS,
-    LATEST,
+    MAX_TIME,
     merged,
     Option,
     Recording,
@@ -37,31 +38,30 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingFormat,
     require,
     UNIT,
-    UNNAMED,
 )
 from cpg_ros.fitting.recordings.tables import (
+    BOOLEANS,
     cells_of,
-    EMPTY,
+    MAX_LINES,
+    MAX_PREAMBLE_LINES,
     Meaning,
-    MOST_LINES,
     number_in,
     number_rows,
     opened,
-    PREAMBLE,
     preamble,
     seconds_of,
-    TRUTH,
+    SEPARATORS,
 )
 from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Columns of a table: time, angles of joints, loads on feet.
 
-#: TIMES: name of a unit of time in a header -> that unit in s.
-TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
-         'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
+#: TIME_UNITS: name of a unit of time in a header -> that unit in s.
+TIME_UNITS = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
+              'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
 #: Headers with a unit: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
-BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
+UNIT_HEADER = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
 TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|temps|tiempo|tempo'
                   r'|elapsed[_ ]time)(?:[_ ]([a-z]+))?$', re.I)
 #: RECEIPT: times of reception, used if there is no other time; SECONDS, NANOSECONDS: parts of a
@@ -69,27 +69,26 @@ TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp|zeit|tem
 RECEIPT = re.compile(r'^(receive|recv|log|publish)[_ ]?time$', re.I)
 SECONDS = re.compile(r'^(.*[./_])?(secs?)$', re.I)
 NANOSECONDS = re.compile(r'^(.*[./_])?(nanosecs?|nsecs?)$', re.I)
-#: NAMED, VALUE: columns of names and of values in a table with a line for each value.
-NAMED = re.compile(r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
-VALUE = re.compile(r'^(position|pos|angle|value|q)$', re.I)
+#: NAME_COLUMN, VALUE_COLUMN: columns of names and of values in a table with a line for each value.
+NAME_COLUMN = re.compile(
+    r'^(joint|joint_?name|name|topic|variable|series|label|signal|channel)$', re.I)
+VALUE_COLUMN = re.compile(r'^(position|pos|angle|value|q)$', re.I)
 #: CYCLE: column of a stride's phase from 0 to 100 %: '%', 'percent', 'Gait cycle [%]'.
 CYCLE = re.compile(r'^(%|percent|%? ?(percent_?)?(gait|stride)?[_ ]?cycle)([_ ]?percent)?$', re.I)
 #: POSITION: columns of joints among others: 'JointPosFR_hip', or in PlotJuggler's way
 #: '/joint_states/lf_knee/position'.
 POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
                       r'|^/.*/([^/]+)/position$', re.I)
-#: LOAD: words of a load on a foot; AXIS: words of one of its axes.
-LOAD = {'force', 'forces', 'contact', 'contacts', 'load', 'loads', 'grf', 'fz'}
-AXIS = {'x', 'y', 'z', 'fx', 'fy', 'vx', 'vy', 'vz', 'px', 'py', 'pz'}
-#: UNITS: cell of a row of units.
-UNITS = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
-#: COMMA: a number with a decimal comma.
-COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
+#: Words of a load on a foot, and of its components.
+LOAD_WORDS = {'force', 'forces', 'contact', 'contacts', 'load', 'loads', 'grf', 'fz'}
+AXIS_WORDS = {'x', 'y', 'z', 'fx', 'fy', 'vx', 'vy', 'vz', 'px', 'py', 'pz'}
+UNIT_CELL = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
+DECIMAL_COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
 DELIMITERS = ',;\t'
-#: ASTRAY: distance of a time ahead of both neighbours, s, from which on it is wrong.
-ASTRAY = 3600.0
-#: LINES: lines that are parsed together.
-LINES = 8192
+#: MAX_TIME_JUMP: of a time ahead of both neighbours, s; beyond, it is wrong.
+MAX_TIME_JUMP = 3600.0
+#: BATCH_SIZE: lines that are parsed together.
+BATCH_SIZE = 8192
 
 
 @dataclass(frozen=True)
@@ -104,7 +103,7 @@ class Column:
 
 def split(header: str) -> tuple[str, str | None]:
     """Return name and unit of a header."""
-    match = BRACKETED.match(header)
+    match = UNIT_HEADER.match(header)
     return (match[1], match[2]) if match else (header, None)
 
 
@@ -114,8 +113,8 @@ def load_columns(headers: list[str]) -> list[Column]:
     for k, header in enumerate(headers):
         name, unit = split(header)
         words = {word.lower() for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+', name)}
-        if (len(words) > 1 and words & LOAD and not words & AXIS
-                and (unit is None or unit.lower() not in ANGLES)):
+        if (len(words) > 1 and words & LOAD_WORDS and not words & AXIS_WORDS
+                and (unit is None or unit.lower() not in ANGLE_UNITS)):
             found.append(Column(k, header, name, 1.0))
     return found if len(found) > 1 else []
 
@@ -148,7 +147,7 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
 
     """
     path = Path(path)
-    for value, units in ((unit, ANGLES), (time, TIMES)):
+    for value, units in ((unit, ANGLE_UNITS), (time, TIME_UNITS)):
         if value is not None and value not in units:
             raise RecordingError(f'{path}: unit {value!r} is none of '
                                  f'{abbreviate(list(units), 20)}')
@@ -177,12 +176,12 @@ class _Table:
         self.notes: list[str] = []
         #: Cells that are the same in all rows.
         self.fixed: dict[int, str] = {}
-        head = list(islice(file, PREAMBLE + 1))
+        head = list(islice(file, MAX_PREAMBLE_LINES + 1))
         blank = len(list(takewhile(lambda line: not line.strip(), head)))
         if blank == len(head):
             raise RecordingError(f'{path}: the file is empty')
         line, rest, self.line = head[blank], iter(head[blank + 1:]), blank + 1
-        if not any(map(line.strip(EMPTY).count, DELIMITERS)) and '\0' not in line and (
+        if not any(map(line.strip(SEPARATORS).count, DELIMITERS)) and '\0' not in line and (
                 after := preamble(line, rest)) is not None:
             line, self.line, declared = after[0], self.line + after[1], after[2]
             if unit and declared and unit != declared:
@@ -227,7 +226,7 @@ class _Table:
         """Examine the first line below the header; return the header to use."""
         first = next(self.lines, '')
         cells = self._cells(first, self.line + 1) if first.strip() else []
-        units = [UNITS.fullmatch(cell.strip()) for cell in cells]
+        units = [UNIT_CELL.fullmatch(cell.strip()) for cell in cells]
         texts = [match[1].strip('-') for match in units if match]
         if (len(cells) >= len(headers) == len(texts[:len(headers)]) and len(texts) == len(cells)
                 and any(texts) and not any(texts[len(headers):])
@@ -240,7 +239,7 @@ class _Table:
             first = next(self.lines, '')
             cells = self._cells(first, self.line + 1) if first.strip() else []
         self.commas = (self.delimiter != ',' and '.' not in first
-                       and any(map(COMMA.fullmatch, first.strip().split(self.delimiter))))
+                       and any(map(DECIMAL_COMMA.fullmatch, first.strip().split(self.delimiter))))
         if self.commas:
             self.notes.append('commas are taken for decimal points')
         self.lines = chain([first] if first else [], self.lines)
@@ -280,8 +279,8 @@ class _Table:
         rows: dict[float, dict[str, str]] = {}
         for number, line in enumerate(self.lines, self.line + 1):
             self.read += len(line)
-            if number > MOST_LINES:
-                raise RecordingError(f'{self.path}: more than {MOST_LINES} lines: divide it into '
+            if number > MAX_LINES:
+                raise RecordingError(f'{self.path}: more than {MAX_LINES} lines: divide it into '
                                      'parts')
             if not line.strip():
                 continue
@@ -318,7 +317,7 @@ class _Table:
 
         candidates = [(k, units[k] or match[2]) for k, name in enumerate(names)
                  if (match := TIME.match(name))]
-        candidates = [(k, unit) for k, unit in candidates if unit is None or unit in TIMES]
+        candidates = [(k, unit) for k, unit in candidates if unit is None or unit in TIME_UNITS]
         seconds, nanoseconds = called(SECONDS), called(NANOSECONDS)
         if len(candidates) != 1 and len(seconds) == len(nanoseconds) == 1:
             self.rest = nanoseconds[0]
@@ -337,7 +336,7 @@ class _Table:
                    else "no time column, such as 'time' or 'time [ms]'; the columns are "
                    + abbreviate(headers, 20)))
         k, unit = candidates[0]
-        return Column(k, headers[k], '', self._scale(headers[k], unit, option, TIMES))
+        return Column(k, headers[k], '', self._scale(headers[k], unit, option, TIME_UNITS))
 
     def _scale(self, header: str, unit: str | None, option: str | None,
                units: dict[str, float]) -> float:
@@ -356,14 +355,14 @@ class _Table:
             if k in taken or not name or any(
                     kind.match(name) for kind in (RECEIPT, SECONDS, NANOSECONDS)):
                 continue
-            if UNNAMED.match(header):
+            if INDEXED_NAME.match(header):
                 name, unit = header.rpartition('.')[2], None
-            if unit is None or unit.lower() in ANGLES:
+            if unit is None or unit.lower() in ANGLE_UNITS:
                 columns.append(Column(k, header, name,
-                                       self._scale(header, unit, option, ANGLES)))
+                                       self._scale(header, unit, option, ANGLE_UNITS)))
             else:
                 others.append(header)
-        positions = [column for column in columns if UNNAMED.match(column.header)] or [
+        positions = [column for column in columns if INDEXED_NAME.match(column.header)] or [
             replace(column, joint=match[match.lastindex or 0])
             for column in columns if (match := POSITION.match(column.joint))]
         named = {column.index: column for column in (*columns, *positions)}
@@ -398,10 +397,10 @@ class _Table:
         scales = np.array([column.scale for column in self.columns])
         loads = [column.index for column in self.loads]
         words: dict[int, Meaning] = dict.fromkeys(
-            loads, lambda word: TRUTH.get(word.lower(), np.nan))
+            loads, lambda word: BOOLEANS.get(word.lower(), np.nan))
         if self.time.scale == 1.0:
             words[self.time.index] = seconds_of
-        while lines := list(islice(self.lines, LINES)):
+        while lines := list(islice(self.lines, BATCH_SIZE)):
             self.read += sum(map(len, lines))
             if self.commas:
                 lines = [line.replace(',', '.') for line in lines]
@@ -432,10 +431,10 @@ class _Table:
     def _check(self, seconds: np.ndarray, lines: list[str]) -> None:
         """Raise RecordingError for times that are not numbers, or that go back."""
         before = np.append(self.last, seconds[:-1])[:len(seconds)]
-        wrong = ~(np.abs(seconds) < LATEST) | (seconds < before)
+        wrong = ~(np.abs(seconds) < MAX_TIME) | (seconds < before)
         # A single stamp far ahead of the next one is the one that is wrong: merged leaves it out.
         first, ahead, after = seconds[:-2], seconds[1:-1], seconds[2:]
-        wrong[2:] &= ~((first <= after) & (ahead > after + ASTRAY))
+        wrong[2:] &= ~((first <= after) & (ahead > after + MAX_TIME_JUMP))
         if wrong.any():
             row = int(np.argmax(wrong))
             number = [k for k, line in enumerate(lines, self.line + 1) if line.strip()][row]
@@ -443,7 +442,7 @@ class _Table:
             value = float(seconds[row])
             if not np.isfinite(value):
                 raise RecordingError(where + 'no time')
-            if abs(value) >= LATEST:
+            if abs(value) >= MAX_TIME:
                 raise RecordingError(where + f'{value:.6g} s is not a plausible time; if it is in '
                                      'ms, us or ns, declare the unit')
             raise RecordingError(where + f'time goes back from {before[row]:.9g} to '
@@ -465,8 +464,8 @@ def _lines_before_header(head: Sequence[str]) -> int:
 
 def _tidy(headers: Sequence[str], cells: Sequence[str]) -> tuple[int, int] | None:
     """Return the columns of names and of values of a table with a line for each value, or None."""
-    names = [k for k, header in enumerate(headers) if NAMED.match(header)]
-    values = [k for k, header in enumerate(headers) if VALUE.match(split(header)[0])]
+    names = [k for k, header in enumerate(headers) if NAME_COLUMN.match(header)]
+    values = [k for k, header in enumerate(headers) if VALUE_COLUMN.match(split(header)[0])]
     if len(names) != 1 or len(values) != 1 or len(cells) < len(headers):
         return None
     return None if number_in(cells[names[0]]) is not None else (names[0], values[0])

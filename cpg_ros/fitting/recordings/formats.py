@@ -33,6 +33,7 @@ from cpg_ros.fitting.recordings.opensim_reader import MOT, TRC
 from cpg_ros.fitting.recordings.pose_reader import POSE
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
+    INDEXED_NAME,
     name_positions,
     Option,
     Recording,
@@ -40,7 +41,6 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingFormat,
     refuse_stand_in,
     repeat_stride,
-    UNNAMED,
 )
 
 #: FORMATS: name -> format. To add one, write a file like those of the others and name it here.
@@ -113,7 +113,7 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     if robot_joints and 'joints' not in given and 'some' in args.features:
         given |= {'joints': robot_joints, 'some': True}
     recording = args.read(path, progress=progress, **given)
-    if robot_joints and all(map(UNNAMED.match, recording.joints)):
+    if robot_joints and all(map(INDEXED_NAME.match, recording.joints)):
         recording = name_positions(recording, robot_joints)
     return recording if cycle is None else repeat_stride(recording, cycle)
 

@@ -28,7 +28,7 @@ from cpg_ros.fitting.recordings.cdr import (
     SerializedBlock,
     UndecodableError,
 )
-from cpg_ros.fitting.recordings.low_state import decode_low_states, MOTORS
+from cpg_ros.fitting.recordings.low_state import decode_low_states, MOTOR_NAMES
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     Chunk,
@@ -38,13 +38,13 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingError,
     require,
 )
-from cpg_ros.fitting.recordings.thinned import LONG, Thinned
+from cpg_ros.fitting.recordings.thinned import MAX_RAW_SAMPLES, Thinned
 import numpy as np
 
 # The commands of joints, from their positions, velocities and efforts.
 
-#: SMALLEST, LARGEST: limits of gains, N m/rad and N m s/rad; others are mistakes and overflow.
-SMALLEST, LARGEST = 1e-3, 1e5
+#: N m/rad and N m s/rad; other gains are mistakes and overflow.
+MIN_GAIN, MAX_GAIN = 1e-3, 1e5
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Servo:
     """The controller of a robot's joints: effort = kp (command - position) - kd velocity.
 
     Attributes:
-        kp: N m / rad, from SMALLEST to LARGEST.
-        kd: N m s / rad, from 0 to LARGEST.
+        kp: N m / rad, from MIN_GAIN to MAX_GAIN.
+        kd: N m s / rad, from 0 to MAX_GAIN.
 
     Raises:
         InputError: a gain is out of its range.
@@ -64,10 +64,10 @@ class Servo:
     kd: float = 0.0
 
     def __post_init__(self) -> None:
-        if not SMALLEST <= self.kp <= LARGEST:
-            raise InputError(f'kp {self.kp:g} is not from {SMALLEST:g} to {LARGEST:g} N m/rad')
-        if not 0.0 <= self.kd <= LARGEST:
-            raise InputError(f'kd {self.kd:g} is not from 0 to {LARGEST:g} N m s/rad')
+        if not MIN_GAIN <= self.kp <= MAX_GAIN:
+            raise InputError(f'kp {self.kp:g} is not from {MIN_GAIN:g} to {MAX_GAIN:g} N m/rad')
+        if not 0.0 <= self.kd <= MAX_GAIN:
+            raise InputError(f'kd {self.kd:g} is not from 0 to {MAX_GAIN:g} N m s/rad')
 
     @property
     def needs(self) -> str:
@@ -89,10 +89,10 @@ class Servo:
         return position + effort / self.kp
 
 
-#: BATCH: most messages of a topic that are decoded together; BATCH_BYTES: most bytes of these.
-BATCH, BATCH_BYTES = 4096, 16_000_000
-#: DATED: stamp, ns, above which a clock counts from 1970, so that a stamp of 0 means none.
-DATED = 10**17
+#: BATCH_SIZE: messages of a topic that are decoded together; BATCH_BYTES: most bytes of these.
+BATCH_SIZE, BATCH_BYTES = 4096, 16_000_000
+#: EPOCH_THRESHOLD: ns; above, a clock counts from 1970, so that a stamp of 0 means none.
+EPOCH_THRESHOLD = 10**17
 
 
 class Stream:
@@ -152,7 +152,7 @@ class Stream:
         self.received.append(received)
         self.messages.append(message)
         self._bytes += len(message)
-        if len(self.messages) == BATCH or self._bytes > BATCH_BYTES:
+        if len(self.messages) == BATCH_SIZE or self._bytes > BATCH_BYTES:
             self.decode()
 
     def decode(self) -> None:
@@ -166,7 +166,7 @@ class Stream:
         try:
             efforts = self.servo is not None
             blocks = (decode_low_states(self.messages, self.order, efforts, self.kind)
-                      if self.kind in MOTORS else in_order(decode(self.messages, efforts)))
+                      if self.kind in MOTOR_NAMES else in_order(decode(self.messages, efforts)))
             for block in blocks:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
@@ -197,12 +197,12 @@ class Stream:
                 positions = self.servo.command(positions, block.velocities, block.efforts)
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
-            self.dated = self.dated or bool((stamps > DATED).any())
+            self.dated = self.dated or bool((stamps > EPOCH_THRESHOLD).any())
             if self.wanted:
                 names, positions = _of_joints(self.wanted, names, positions)
             self.parts.append((stamps, received, names, positions))
             self._size += len(stamps)
-            if self._size >= LONG:
+            if self._size >= MAX_RAW_SAMPLES:
                 self._thin()
 
     def _named(self, names: tuple[str, ...], count: int) -> tuple[str, ...]:
@@ -236,7 +236,7 @@ class Stream:
             self._ahead = self._ahead or int(other[0] - own[0])
             self._thinned.setdefault(names, Thinned()).add(
                 own, np.column_stack([positions, 1e-9 * (other - own - self._ahead)]))
-        self.parts, self._size = [], LONG
+        self.parts, self._size = [], MAX_RAW_SAMPLES
 
     def notes(self, headers: bool) -> list[str]:
         """Return a line for each kind of data that is dropped."""

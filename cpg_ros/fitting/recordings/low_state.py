@@ -29,16 +29,16 @@ LOW_STATE, HUMANOID_STATE = 'unitree_go/msg/LowState', 'unitree_hg/msg/LowState'
 _ARM = ('shoulder_pitch', 'shoulder_roll', 'shoulder_yaw', 'elbow', 'wrist_roll', 'wrist_pitch',
         'wrist_yaw')
 _LEG = ('hip_pitch', 'hip_roll', 'hip_yaw', 'knee', 'ankle_pitch', 'ankle_roll')
-#: MOTORS: kind of message -> default names of its motors, those of Unitree's URDF.
-MOTORS = {
+#: MOTOR_NAMES: kind of message -> default names, those of Unitree's URDF.
+MOTOR_NAMES = {
     LOW_STATE: tuple(f'{leg}_{part}_joint' for leg in ('FR', 'FL', 'RR', 'RL')
                      for part in ('hip', 'thigh', 'calf')),
     HUMANOID_STATE: tuple(f'{part}_joint' for part in chain(
         (f'{side}_{part}' for side in ('left', 'right') for part in _LEG),
         (f'waist_{axis}' for axis in ('yaw', 'roll', 'pitch')),
         (f'{side}_{part}' for side in ('left', 'right') for part in _ARM)))}
-#: _HEADER: bytes of CDR's header; _LITTLE_ENDIAN: its second byte for little-endian numbers.
-_HEADER, _LITTLE_ENDIAN = 4, 1
+#: _HEADER_SIZE: bytes of CDR's header; _LITTLE_ENDIAN: its second byte for little-endian numbers.
+_HEADER_SIZE, _LITTLE_ENDIAN = 4, 1
 
 
 def _fields(size: int, motor: int, motors: int, offsets: Sequence[int]) -> np.dtype:
@@ -48,13 +48,13 @@ def _fields(size: int, motor: int, motors: int, offsets: Sequence[int]) -> np.dt
     # Of the last motor only these numbers: what follows it ends the message.
     return np.dtype({'names': ['quaternion', 'gyroscope', 'accelerometer', 'motors', 'feet'],
                      'formats': ['4<f4', '3<f4', '3<f4', (one, motors), '4<i2'],
-                     'offsets': [_HEADER + offset for offset in offsets],
-                     'itemsize': _HEADER + size})
+                     'offsets': [_HEADER_SIZE + offset for offset in offsets],
+                     'itemsize': _HEADER_SIZE + size})
 
 
-#: FIELDS: kind of message -> what is read of it; of dogs the offsets are as in the bridge, which
+#: DTYPES: kind of message -> what is read of it; of dogs the offsets are as in the bridge, which
 #: drives the robot by them. Humanoids have no foot sensors: what stands there is not used.
-FIELDS = {LOW_STATE: _fields(1176, 48, 12, (24, 40, 52, 80, 1080)),
+DTYPES = {LOW_STATE: _fields(1176, 48, 12, (24, 40, 52, 80, 1080)),
           HUMANOID_STATE: _fields(2088, 56, 35, (16, 32, 44, 72, 2068))}
 
 
@@ -68,11 +68,11 @@ def low_states(messages: Sequence[bytes], kind: str = LOW_STATE) -> np.ndarray:
         UndecodableError: a message has another length or byte order.
 
     """
-    size = FIELDS[kind].itemsize
+    size = DTYPES[kind].itemsize
     for index, message in enumerate(messages):
         if len(message) < size or message[1] != _LITTLE_ENDIAN:
             raise UndecodableError(index, f'{len(message)} bytes, where {size} are needed')
-    return np.frombuffer(b''.join(message[:size] for message in messages), FIELDS[kind])
+    return np.frombuffer(b''.join(message[:size] for message in messages), DTYPES[kind])
 
 
 def decode_low_states(messages: Sequence[bytes], joints: Sequence[str], efforts: bool,
@@ -89,7 +89,7 @@ def decode_low_states(messages: Sequence[bytes], joints: Sequence[str], efforts:
     """
     if not messages:
         return
-    motors, names = low_states(messages, kind)['motors'], MOTORS[kind]
+    motors, names = low_states(messages, kind)['motors'], MOTOR_NAMES[kind]
     fits = len(joints) == 12 if kind == LOW_STATE else 0 < len(joints) <= motors.shape[1]
     names = tuple(joints) if fits and not set(joints) & set(names) else names
     motors, count, none = motors[:, :len(names)], len(messages), np.empty((len(messages), 0))

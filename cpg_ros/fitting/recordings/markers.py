@@ -46,8 +46,8 @@ import numpy as np
 #: SEGMENTS: option of every reader of markers.
 SEGMENTS = Option('segments', 'for markers: a file that says which of them span which segment '
                   'and which joints are between, or the name of a shipped one', 'FILE')
-#: LIKELY: default likelihood below which a marker counts as not seen, that of DeepLabCut.
-LIKELY = 0.6
+#: MIN_LIKELIHOOD: default for a marker that counts as seen, that of DeepLabCut.
+MIN_LIKELIHOOD = 0.6
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Segments:
 
     segments: Mapping[str, Segment]
     joints: Mapping[str, JointAngle]
-    least_likelihood: Annotated[float, within(0.0, 1.0)] = LIKELY
+    least_likelihood: Annotated[float, within(0.0, 1.0)] = MIN_LIKELIHOOD
     alternatives: dict[str, tuple[str, ...]] = field(default_factory=dict)
     body: tuple[str, ...] = ()
     feet: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -206,12 +206,12 @@ def load_segments(name: str | Path) -> Segments:
     return listed
 
 
-#: SHORTEST: fraction of a segment's length across the axis below which it has no direction.
-SHORTEST = 1e-3
-#: UNITS: what files call the unit of places -> that in m.
-UNITS = {'mm': 1e-3, 'cm': 1e-2, 'm': 1.0}
-#: FARTHEST: largest coordinate of a marker, in any unit.
-FARTHEST = 1e9
+#: MIN_LENGTH_RATIO: of a segment across the axis to its length, for it to have a direction.
+MIN_LENGTH_RATIO = 1e-3
+#: LENGTH_UNITS: name in a file -> m.
+LENGTH_UNITS = {'mm': 1e-3, 'cm': 1e-2, 'm': 1.0}
+#: MAX_COORDINATE: of a marker, in any unit.
+MAX_COORDINATE = 1e9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -302,7 +302,8 @@ def turned(first: np.ndarray, second: np.ndarray, axis: np.ndarray | None = None
                              for vector in (first, second))
             cross = np.sum(axis * np.cross(first, second), axis=1)
         angle = np.arctan2(cross, np.sum(first * second, axis=1))
-        short = [~(np.linalg.norm(vector, axis=1) >= SHORTEST) for vector in (first, second)]
+        short = [~(np.linalg.norm(vector, axis=1) >= MIN_LENGTH_RATIO)
+                 for vector in (first, second)]
     return np.where(short[0] | short[1], np.nan, angle)
 
 
@@ -401,8 +402,8 @@ def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: S
                                                    loads=replace(loads, by_motion=True))
 
 
-#: STEP: least range of a foot's way forward and back that counts, over the usual one.
-STEP = 0.5
+#: MIN_STEP_RATIO: range of a foot's way forward and back that counts, over the usual one.
+MIN_STEP_RATIO = 0.5
 #: Leg, time, s, and whether its foot lands or leaves the ground then.
 Footfall = tuple[str, float, bool]
 
@@ -436,7 +437,7 @@ def footfalls(times: np.ndarray, body: np.ndarray, feet: Mapping[str, np.ndarray
             seen = np.isfinite(along)
             if not seen.any():
                 return []
-            least = STEP * np.ptp(np.percentile(along[seen], (5.0, 95.0)))
+            least = MIN_STEP_RATIO * np.ptp(np.percentile(along[seen], (5.0, 95.0)))
             own += [(time, down) for time in
                     times[seen][find_peaks(along[seen], prominence=least)[0]].tolist()]
         states = [down for _, down in sorted(own)]
@@ -483,7 +484,7 @@ def contacts(events: Sequence[Footfall], start: float, times: np.ndarray) -> Foo
 def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:
     """Return the points, nan where they are missing or unlikely."""
     points = markers.points.astype(float)
-    points[~(np.abs(points) <= FARTHEST).all(axis=2)] = np.nan
+    points[~(np.abs(points) <= MAX_COORDINATE).all(axis=2)] = np.nan
     if markers.likelihoods is None:
         return points
     unlikely = ~(markers.likelihoods >= likely)

@@ -23,9 +23,9 @@ import zipfile
 from cpg_ros.common import files
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    ANGLES,
+    ANGLE_UNITS,
     JOINTS,
-    LATEST,
+    MAX_TIME,
     Recording,
     recording_of,
     RecordingError,
@@ -42,8 +42,8 @@ RATES = ('fps', 'rate', 'frequency', 'sampling_rate')
 NAMES = ('joints', 'joint_names', 'names')
 POSITIONS = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
 UNITS = ('unit', 'units')
-#: LARGEST: largest archive, bytes.
-LARGEST = 1_000_000_000
+#: MAX_SIZE: of an archive, bytes.
+MAX_SIZE = 1_000_000_000
 
 
 def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None = None,
@@ -76,7 +76,7 @@ def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None 
 
 def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
     """Read all arrays of numbers and texts."""
-    with files.opened(path, RecordingError, largest=LARGEST) as file:
+    with files.opened(path, RecordingError, largest=MAX_SIZE) as file:
         try:
             with zipfile.ZipFile(file) as packed:
                 members = [member.filename for member in packed.infolist()]
@@ -162,14 +162,14 @@ def _scale(arrays: Mapping[str, np.ndarray], option: str | None, path: Path, not
     name = _named(arrays, UNITS)
     stated = str(arrays[name]) if name and arrays[name].ndim == 0 else None
     for value in (stated, option):
-        if value is not None and value not in ANGLES:
+        if value is not None and value not in ANGLE_UNITS:
             raise RecordingError(f'{path}: unit {value[:40]!r} is none of '
-                                 f'{abbreviate(list(ANGLES))}')
-    if stated and option and ANGLES[stated] != ANGLES[option]:
+                                 f'{abbreviate(list(ANGLE_UNITS))}')
+    if stated and option and ANGLE_UNITS[stated] != ANGLE_UNITS[option]:
         raise RecordingError(f'{path}: its angles are in {stated}, not {option}')
     if not stated and not option:
         notes.append("no array 'unit': the angles are taken to be in rad")
-    return ANGLES[stated or option or 'rad']
+    return ANGLE_UNITS[stated or option or 'rad']
 
 
 def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: int, path: Path
@@ -181,9 +181,9 @@ def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: in
             raise RecordingError(f'{path}: {name!r} of shape {times.shape} and type '
                                  f'{times.dtype}, where there are {count} samples')
         seconds = times.astype(float)
-        if not (np.abs(seconds) < LATEST).all():
+        if not (np.abs(seconds) < MAX_TIME).all():
             raise RecordingError(f'{path}: {name!r} has values that are no times in s, such as '
-                                 f'{seconds[~(np.abs(seconds) < LATEST)][0]:g}')
+                                 f'{seconds[~(np.abs(seconds) < MAX_TIME)][0]:g}')
         return np.rint(seconds * 1e9).astype(np.int64)
     if name := _named(arrays, RATES):
         if arrays[name].size != 1 or arrays[name].dtype.kind not in 'fiu':

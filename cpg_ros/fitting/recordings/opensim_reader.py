@@ -27,17 +27,17 @@ import re
 from cpg_ros.fitting.recordings.csv_reader import read_csv
 from cpg_ros.fitting.recordings.markers import (
     joint_recording,
+    LENGTH_UNITS,
     marker_names,
     Markers,
     SEGMENTS,
-    UNITS,
 )
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
-    ANGLES,
+    ANGLE_UNITS,
     JOINTS,
-    LATEST,
     matching,
+    MAX_TIME,
     Recording,
     RecordingError,
     RecordingFormat,
@@ -101,7 +101,7 @@ def trc_markers(path: str | Path) -> Markers:
         notes.append(f'{pluralize(len(rows), "row")}, where NumFrames is '
                      f'{facts.get("NumFrames", "missing")}')
     seconds = rows[:, 1]
-    wrong = ~(np.abs(seconds) < LATEST)
+    wrong = ~(np.abs(seconds) < MAX_TIME)
     if wrong.any():
         raise RecordingError(f"{path}: {pluralize(int(wrong.sum()), 'row')} without a time in s, "
                              f'such as frame {rows[np.argmax(wrong), 0]:g}')
@@ -110,7 +110,8 @@ def trc_markers(path: str | Path) -> Markers:
     points[unseen] = np.nan
     names, doubles = marker_names(labels, points)
     return Markers(names, np.rint(seconds * 1e9).astype(np.int64), points, path,
-                   notes=(*notes, *doubles), unit=UNITS.get(facts.get('Units', ''), math.nan))
+                   notes=(*notes, *doubles),
+                   unit=LENGTH_UNITS.get(facts.get('Units', ''), math.nan))
 
 
 TRC = RecordingFormat(
@@ -123,9 +124,9 @@ TRC = RecordingFormat(
 STATE = re.compile(r'^(?:.*/)?([^/]+)/(value|speed|activation|fiber_length)$')
 #: PELVIS: name of a translation of the pelvis, m; its group is the axis.
 PELVIS = re.compile(r'^(?:.*/)?pelvis_t([xyz])(?:/value)?$')
-#: NO_ANGLE: names of translations and forces, whose columns look like those of angles.
-NO_ANGLE = re.compile(r'_t[xyz]$|^ground_(force|torque|moment)|_(force|moment|torque)$'
-                      r'|_[fmp][xyz]$|force_v?[xyz]|force_p[xyz]', re.I)
+#: NON_ANGLE: names of translations and forces, whose columns look like those of angles.
+NON_ANGLE = re.compile(r'_t[xyz]$|^ground_(force|torque|moment)|_(force|moment|torque)$'
+                       r'|_[fmp][xyz]$|force_v?[xyz]|force_p[xyz]', re.I)
 
 
 def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = (),
@@ -151,7 +152,7 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     # Speeds of states are called like their coordinate, with '_u' behind.
     speeds = {f'{column}_u' for column in columns}
     angles = {column: _joint(column) for column in columns
-              if column not in speeds and not NO_ANGLE.search(_joint(column)) and (
+              if column not in speeds and not NON_ANGLE.search(_joint(column)) and (
                   not (state := STATE.match(column)) or state[2] == 'value')}
     if not angles:
         raise RecordingError(f'{path}: no column of joint angles; there are '
@@ -164,9 +165,8 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     recording = read_csv(path, unit, progress=progress, joints=[*(
         next(column for column, joint in angles.items() if joint == name) for name in names),
         *body.values()])
-    place = dict(zip(body,
-                     recording.positions[:, len(names):].T / ANGLES[declared or unit or 'rad'],
-                     strict=True))
+    scale = ANGLE_UNITS[declared or unit or 'rad']
+    place = dict(zip(body, recording.positions[:, len(names):].T / scale, strict=True))
     recording = replace(recording, joints=tuple(names),
                         positions=recording.positions[:, :len(names)],
                     body=np.column_stack([place.get(axis, 0.0 * place['y']) for axis in 'xzy'])

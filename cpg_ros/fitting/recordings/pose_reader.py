@@ -55,10 +55,10 @@ import numpy as np
 INDIVIDUAL = Option('individual', 'of a table of several animals, the one to read', 'NAME')
 #: COLUMN: header of a table with one row of headers: marker, coordinate.
 COLUMN = re.compile(r'(.+)[._](x|y|z|score|likelihood)')
-#: FRAMES: columns of frame numbers in these tables; TRACK: column of animals.
-FRAMES, TRACK = ('frame_idx', 'fnum'), 'track'
-#: ROWS: first cells of DeepLabCut's rows of headers.
-ROWS = ('scorer', 'individuals', 'bodyparts', 'coords')
+#: Columns of frame numbers and of animals in these tables.
+FRAME_COLUMNS, TRACK_COLUMN = ('frame_idx', 'fnum'), 'track'
+#: HEADER_ROWS: first cells of DeepLabCut's rows of headers.
+HEADER_ROWS = ('scorer', 'individuals', 'bodyparts', 'coords')
 
 
 @dataclass
@@ -217,7 +217,7 @@ def recognises(path: Path) -> bool:
             cells = _cells(file.readline(), path, 1)
     except RecordingError:
         return False
-    return cells[:1] == ['scorer'] or any(cell in FRAMES for cell in cells)
+    return cells[:1] == ['scorer'] or any(cell in FRAME_COLUMNS for cell in cells)
 
 
 def _cells(line: str, path: Path, number: int) -> list[str]:
@@ -231,9 +231,10 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
         heads: dict[str, list[str]] = {}
         for number, line in enumerate(islice(file, 3) if first[:1] == ['scorer'] else (), 2):
             cells = _cells(line, path, number)
-            if not cells or cells[0] not in ROWS or len(cells) != len(first):
+            if not cells or cells[0] not in HEADER_ROWS or len(cells) != len(first):
                 raise RecordingError(f'{path}, line {number}: a row of headers has to begin with '
-                                     f'one of {abbreviate(ROWS)} and have {len(first)} cells')
+                                     f'one of {abbreviate(HEADER_ROWS)} and have {len(first)} '
+                                     'cells')
             heads[cells[0]] = cells
             if cells[0] == 'coords':
                 break
@@ -247,12 +248,12 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
                               strict=True)]
         frame = 0
     else:
-        frames = [k for k, cell in enumerate(first) if cell in FRAMES]
+        frames = [k for k, cell in enumerate(first) if cell in FRAME_COLUMNS]
         if len(frames) != 1:
             raise RecordingError(
                 f"{path}: not a table of poses: its first line neither begins with 'scorer' nor "
-                f'has a column {" or ".join(map(repr, FRAMES))}; files of other kinds have to be '
-                'exported as CSV')
+                f'has a column {" or ".join(map(repr, FRAME_COLUMNS))}; files of other kinds have '
+                'to be exported as CSV')
         frame = frames[0]
         columns = [('', match[1], match[2]) if (match := COLUMN.fullmatch(cell))
                    and match[1] != 'instance' else None for cell in first]
@@ -261,8 +262,8 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
     rows, notes = number_rows(lines, [
         'frame' if k == frame else ' '.join(one[1:]) if one else ''
         for k, one in enumerate(columns)], ',', path, 2 + len(heads))
-    if TRACK in first:
-        at = first.index(TRACK)
+    if TRACK_COLUMN in first:
+        at = first.index(TRACK_COLUMN)
         tracks = [_cells(line, path, k)[at] for k, line in enumerate(filter(str.strip, lines), 2)
                   ][:len(rows)]
         animal = _chosen(individual, list(dict.fromkeys(tracks)), path)

@@ -31,12 +31,11 @@ from typing import Any
 from cpg_ros.common.errors import CpgError
 import numpy as np
 
-#: Limits of the process. MEMORY: address space, bytes; TIME: processor time, s; MEMORY_PER_BYTE,
-#: TIME_PER_BYTE: additional ones for each byte of the file.
-MEMORY, MEMORY_PER_BYTE = 2_000_000_000, 60
-TIME, TIME_PER_BYTE = 5.0, 1e-6
-#: REFUSED: exit code for a file that the library rejects.
-REFUSED = 3
+#: Limits of the process. MAX_MEMORY: address space, bytes; MAX_CPU_TIME: processor time, s;
+#: MEMORY_PER_BYTE, TIME_PER_BYTE: additional ones for each byte of the file.
+MAX_MEMORY, MEMORY_PER_BYTE = 2_000_000_000, 60
+MAX_CPU_TIME, TIME_PER_BYTE = 5.0, 1e-6
+EXIT_REJECTED = 3
 
 
 class UnreadableFile(CpgError):
@@ -58,12 +57,12 @@ def read_apart(reader: Callable[[str], dict[str, Any]], path: Path) -> dict[str,
     size = path.stat().st_size
     package = str(Path(__file__).resolve().parents[3])
     others = os.environ.get('PYTHONPATH', '')
-    seconds = TIME + TIME_PER_BYTE * size
+    seconds = MAX_CPU_TIME + TIME_PER_BYTE * size
     with TemporaryDirectory(prefix='cpg_ros-') as folder:
         out = Path(folder, 'arrays.npz')
         command = [sys.executable, '-P', '-m', __name__, reader.__module__, reader.__name__,
                    os.path.abspath(path), str(out),
-                   str(round(MEMORY + MEMORY_PER_BYTE * size)), str(round(seconds))]
+                   str(round(MAX_MEMORY + MEMORY_PER_BYTE * size)), str(round(seconds))]
         environment = os.environ | {'OPENBLAS_NUM_THREADS': '1', 'PYTHONPATH': os.pathsep.join(
             filter(None, (package, others)))}
         try:
@@ -98,11 +97,11 @@ def main(module: str, name: str, path: str, out: str, memory: str, seconds: str)
         np.savez(out, **getattr(import_module(module), name)(path))
     except MemoryError:
         print('it takes more memory than a file of its size', file=sys.stderr)
-        return REFUSED
+        return EXIT_REJECTED
     # No library lists what damaged files make it raise.
     except Exception as error:
         print(' '.join(str(error).split()) or type(error).__name__, file=sys.stderr)
-        return REFUSED
+        return EXIT_REJECTED
     return 0
 
 

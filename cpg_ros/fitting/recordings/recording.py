@@ -58,19 +58,18 @@ class FootLoads(ShortRepr):
         return f'{len(self.times)} loads on {", ".join(self.legs)}'
 
 
-#: ANGLES: name of a unit of angles in a file -> that unit in rad.
-ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
-          'deg': math.pi / 180.0, 'degree': math.pi / 180.0, 'degrees': math.pi / 180.0,
-          '°': math.pi / 180.0}
+#: ANGLE_UNITS: name in a file -> rad.
+ANGLE_UNITS = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
+               'deg': math.pi / 180.0, 'degree': math.pi / 180.0, 'degrees': math.pi / 180.0,
+               '°': math.pi / 180.0}
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
 
-#: DROPOUT: interval between samples, as a multiple of the usual one, above which samples are
-#: missing;
-#: JITTER: relative difference from the usual interval above which it is jitter.
-DROPOUT, JITTER = 1.5, 0.1
-#: LATEST: largest size of a stamp, s: the range of ROS, which keeps differences within int64.
-LATEST = 2**32
+#: DROPOUT_RATIO: interval, over the usual one, above which samples are missing; JITTER_RATIO:
+#: relative difference from it above which it is jitter.
+DROPOUT_RATIO, JITTER_RATIO = 1.5, 0.1
+#: MAX_TIME: of a stamp, s: the range of ROS, which keeps differences within int64.
+MAX_TIME = 2**32
 
 
 class RecordingError(CpgError):
@@ -329,7 +328,7 @@ def _groups(chunks: Iterable[Chunk], source: str
             continue
         if not np.issubdtype(stamps.dtype, np.integer):
             raise RecordingError(f'{source}: stamps must be whole nanoseconds, not {stamps.dtype}')
-        far = np.abs(stamps.astype(float)) > LATEST * 1e9
+        far = np.abs(stamps.astype(float)) > MAX_TIME * 1e9
         if far.any():
             raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')
         if len(set(names)) < len(names):
@@ -425,7 +424,7 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
             continue
         steps = np.diff(own)
         usual = float(np.median(steps))
-        long = steps > DROPOUT * usual
+        long = steps > DROPOUT_RATIO * usual
         who = '' if len(together) == 1 else f'{joint_list([joints[k] for k in columns])}: '
         if long.any():
             lost = int((np.rint(steps[long] / usual) - 1).sum())
@@ -433,16 +432,16 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
             notes.append(f'{who}{pluralize(int(long.sum()), "dropout")}, about '
                          f'{pluralize(lost, "sample")} of {len(own) + lost}, the longest '
                          f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
-        off = int((np.abs(steps - usual)[~long] > JITTER * usual).sum())
+        off = int((np.abs(steps - usual)[~long] > JITTER_RATIO * usual).sum())
         if off:
             notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
-                         f'{JITTER:.0%} of the usual {usual:.4g} s')
+                         f'{JITTER_RATIO:.0%} of the usual {usual:.4g} s')
     return notes
 
 
-#: UNNAMED: name of a position by its index: 'position[3]', 'dof_pos_3', 'q_3'.
-UNNAMED = re.compile(r'^(?:.*[./])?(?:positions?\[\d+\]|(?:(?:dof|joint)_?pos(?:itions?)?|q)'
-                     r'_?(?:\d+|\[\d+\]))$', re.I)
+#: INDEXED_NAME: name of a position by its index: 'position[3]', 'dof_pos_3', 'q_3'.
+INDEXED_NAME = re.compile(r'^(?:.*[./])?(?:positions?\[\d+\]|(?:(?:dof|joint)_?pos(?:itions?)?|q)'
+                          r'_?(?:\d+|\[\d+\]))$', re.I)
 
 
 def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recording:
@@ -462,15 +461,15 @@ def name_positions(recording: Recording, robot_joints: Sequence[str]) -> Recordi
 
 # Recordings of exactly one stride, as gait laboratories cut them.
 
-#: COPIES: number of copies of a single stride that are analysed.
-COPIES = 6
-#: Largest gap between end and begin of a stride, over the joint's range. GAP_DECLARED: of a
-#: declared stride; GAP_RECOGNISED: of a recognised one.
-GAP_DECLARED, GAP_RECOGNISED = 0.3, 0.1
-#: Recognised strides. DURATIONS: shortest and longest, s; SEAM_SPEED: least speed at the seam,
-#: over the mean one, as a motion from rest to rest closes, too; ODD_FRACTION: least fraction of
-#: odd harmonics in the power, as two strides have none.
-DURATIONS, SEAM_SPEED, ODD_FRACTION = (0.1, 3.0), 0.3, 0.2
+#: NUM_COPIES: of a single stride that are analysed.
+NUM_COPIES = 6
+#: Largest gaps between end and begin of a declared and of a recognised stride, over the joint's
+#: range.
+MAX_DECLARED_GAP, MAX_RECOGNISED_GAP = 0.3, 0.1
+#: Recognised strides. STRIDE_DURATIONS: shortest and longest, s; MIN_SEAM_SPEED: over the mean
+#: one, as a motion from rest to rest closes, too; MIN_ODD_POWER: fraction of odd harmonics in the
+#: power, as two strides have none.
+STRIDE_DURATIONS, MIN_SEAM_SPEED, MIN_ODD_POWER = (0.1, 3.0), 0.3, 0.2
 
 
 def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
@@ -493,23 +492,23 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
         raise RecordingError(f'{recording.source}: a stride cannot last {duration:g} s')
     gaps, closed = _seam(recording)
     worst = int(np.argmax(gaps))
-    if gaps[worst] > GAP_DECLARED:
+    if gaps[worst] > MAX_DECLARED_GAP:
         raise RecordingError(f'{recording.source}: not one stride: '
                              f'{joint_list(recording.joints[worst:worst + 1])} ends '
                              f'{gaps[worst]:.0%} of its range from where it begins')
     count = len(recording.times) - closed
     own = length if closed else length + step
     scale = duration / own if duration else 1.0
-    starts = own * np.arange(COPIES)[:, None]
+    starts = own * np.arange(NUM_COPIES)[:, None]
     loads = recording.loads
     if loads is not None:
         held = loads.times < own
         loads = replace(loads, times=scale * (starts + loads.times[held]).ravel(),
-                        loads=np.tile(loads.loads[held], (COPIES, 1)))
+                        loads=np.tile(loads.loads[held], (NUM_COPIES, 1)))
     return replace(
         recording, times=scale * (starts + recording.times[:count]).ravel(), loads=loads,
-        positions=np.tile(recording.positions[:count], (COPIES, 1)), cycle=scale * own,
-        body=None if recording.body is None else np.tile(recording.body[:count], (COPIES, 1)),
+        positions=np.tile(recording.positions[:count], (NUM_COPIES, 1)), cycle=scale * own,
+        body=None if recording.body is None else np.tile(recording.body[:count], (NUM_COPIES, 1)),
         notes=(*recording.notes, f'one stride, of {scale * own:.4g} s, which is repeated: it '
                'does not tell how strides differ'))
 
@@ -523,9 +522,10 @@ def recognise_stride(recording: Recording) -> Recording | None:
     normalised = x[:len(x) - closed] / np.maximum(np.ptp(x, axis=0), 1e-9)
     speeds = np.abs(normalised - np.roll(normalised, 1, axis=0)).mean(axis=1)
     power = np.sum(np.abs(np.fft.rfft(normalised - normalised.mean(axis=0), axis=0))**2, axis=1)
-    if (gaps.max() > GAP_RECOGNISED or speeds[[0, 1, -1]].mean() < SEAM_SPEED * speeds.mean()
-            or power[1::2].sum() < ODD_FRACTION * power.sum()
-            or not DURATIONS[0] <= recording.times[-1] <= DURATIONS[1]):
+    if (gaps.max() > MAX_RECOGNISED_GAP
+            or speeds[[0, 1, -1]].mean() < MIN_SEAM_SPEED * speeds.mean()
+            or power[1::2].sum() < MIN_ODD_POWER * power.sum()
+            or not STRIDE_DURATIONS[0] <= recording.times[-1] <= STRIDE_DURATIONS[1]):
         return None
     return repeat_stride(recording)
 

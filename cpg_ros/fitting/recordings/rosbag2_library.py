@@ -27,7 +27,7 @@ from rclpy.serialization import deserialize_message
 import rosbag2_py
 from sensor_msgs.msg import JointState
 
-STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+STORAGE_IDS = {'.mcap': 'mcap', '.db3': 'sqlite3'}
 
 
 class ReaderError(Exception):
@@ -78,7 +78,7 @@ class Reader:
         self.path = Path(path)
         self.connections: list[Connection] = []
         self._storage = rosbag2_py.StorageOptions(
-            uri=str(path), storage_id=STORAGES.get(self.path.suffix, ''))
+            uri=str(path), storage_id=STORAGE_IDS.get(self.path.suffix, ''))
         self._kind = rosbag2_py.SequentialReader
 
     def __enter__(self) -> 'Reader':

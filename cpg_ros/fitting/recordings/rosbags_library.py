@@ -25,10 +25,10 @@ from rosbags.rosbag2 import Reader, reader, ReaderError, storage_mcap
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
 
-__all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize', 'unpack_file']
+__all__ = ['TYPESTORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize', 'unpack_file']
 
-#: STORE: message types; the layout of a JointState is the same in all ROS 2 distributions.
-STORE = get_typestore(Stores.ROS2_JAZZY)
+#: TYPESTORE: message types; the layout of a JointState is the same in all ROS 2 distributions.
+TYPESTORE = get_typestore(Stores.ROS2_JAZZY)
 #: ZSTD: the module with which the library unpacks, which sets no limit.
 ZSTD: Any = vars(reader)['zstd']
 
@@ -40,7 +40,7 @@ def deserialize(message: bytes) -> Any:
         SerdeError: the bytes are not such a message.
 
     """
-    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+    return TYPESTORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
 
 
 class _UnpackedFile(ZSTD.ZstdFile):  # type: ignore[misc]

@@ -29,13 +29,12 @@ from typing import cast, IO
 import zlib
 
 from cpg_ros.common import files
-from cpg_ros.fitting.recordings.recording import LATEST, Option, RecordingError
+from cpg_ros.fitting.recordings.recording import MAX_TIME, Option, RecordingError
 import numpy as np
 
 # Rows of numbers out of lines of text, with every mistake named by its line.
 
-#: TRUTH: word for a contact -> its number.
-TRUTH = {'true': 1.0, 'false': 0.0}
+BOOLEANS = {'true': 1.0, 'false': 0.0}
 #: What the words of a column count as; None for no number.
 Meaning = Callable[[str], float | None]
 
@@ -137,15 +136,15 @@ def number_rows(lines: Sequence[str], headers: Sequence[str], delimiter: str | N
 
 # Limits of unpacked data: a small file may hold endless zeros.
 
-#: A file may unpack to ALWAYS bytes, or to RATIO times its packed size if that is more.
-ALWAYS, RATIO = 20_000_000, 100
+#: A file may unpack to UNPACKED_ALLOWANCE bytes, or MAX_UNPACKED_RATIO times its size if more.
+UNPACKED_ALLOWANCE, MAX_UNPACKED_RATIO = 20_000_000, 100
 
 
 class UnpackedSize:
     """Counter of the bytes unpacked from one file, chunk or message."""
 
     def __init__(self, packed: int) -> None:
-        self.most, self._size = max(ALWAYS, RATIO * packed), 0
+        self.most, self._size = max(UNPACKED_ALLOWANCE, MAX_UNPACKED_RATIO * packed), 0
 
     def add(self, count: int) -> None:
         """Count bytes.
@@ -164,8 +163,7 @@ class UnpackedSize:
 # Stamps of frames that have numbers but no times.
 
 FPS = Option('fps', 'frames a second, for files that do not say', 'HZ')
-#: SLOWEST, FASTEST: plausible range of a frame rate, Hz.
-SLOWEST, FASTEST = 1e-2, 1e6
+MIN_FPS, MAX_FPS = 1e-2, 1e6
 
 
 def stamps_of_frames(frames: np.ndarray, fps: str | float | None, path: Path) -> np.ndarray:
@@ -189,27 +187,26 @@ def stamps_of_frames(frames: np.ndarray, fps: str | float | None, path: Path) ->
         rate = float(fps)
     except ValueError:
         rate = math.nan
-    if not SLOWEST <= rate <= FASTEST:
-        raise RecordingError(f'{path}: {fps!s:.40} frames a second are not from {SLOWEST:g} to '
-                             f'{FASTEST:g}')
+    if not MIN_FPS <= rate <= MAX_FPS:
+        raise RecordingError(f'{path}: {fps!s:.40} frames a second are not from {MIN_FPS:g} to '
+                             f'{MAX_FPS:g}')
     seconds = np.asarray(frames, float) / rate
-    if not (np.abs(seconds) < LATEST).all():
+    if not (np.abs(seconds) < MAX_TIME).all():
         raise RecordingError(f'{path}: frames without a plausible number')
     return np.rint(seconds * 1e9).astype(np.int64)
 
 
-#: LARGEST: largest file, bytes, packed or not; LONGEST: longest line, letters.
-LARGEST, LONGEST = 4_000_000_000, 1 << 17
-#: MOST_LINES: most lines of a file that is in memory as text: six hours at 100 Hz.
-MOST_LINES = 2_000_000
-#: GZIP: first bytes of a file packed by gzip.
-GZIP = b'\x1f\x8b'
-#: UTF_16: first bytes of a file in UTF-16, as some spreadsheets write it.
-UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
-#: EMPTY: characters that are stripped at the end of a line, such as delimiters of empty cells.
-EMPTY = ',;\t \r\n'
-#: END: last line of the preamble of OpenSim's .mot and .sto files; PREAMBLE: most lines of it.
-END, PREAMBLE = 'endheader', 100
+#: MAX_SIZE: of a file, bytes, packed or not; MAX_LINE_LENGTH: letters.
+MAX_SIZE, MAX_LINE_LENGTH = 4_000_000_000, 1 << 17
+#: MAX_LINES: of a file that is in memory as text: six hours at 100 Hz.
+MAX_LINES = 2_000_000
+GZIP_MAGIC = b'\x1f\x8b'
+#: UTF-16 is how some spreadsheets write tables.
+UTF_16_BOMS = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
+#: SEPARATORS: stripped at the end of a line, such as delimiters of empty cells.
+SEPARATORS = ',;\t \r\n'
+#: Of OpenSim's .mot and .sto files.
+PREAMBLE_END, MAX_PREAMBLE_LINES = 'endheader', 100
 class _Lines(io.TextIOWrapper):
     """Text with a limit on the length of lines, which would otherwise fill the memory.
 
@@ -227,9 +224,10 @@ class _Lines(io.TextIOWrapper):
             RecordingError: it is too long.
 
         """
-        line = super().readline(LONGEST)
-        if len(line) == LONGEST:
-            raise RecordingError(f'{self.path}: not a table: a line has {LONGEST} letters or more')
+        line = super().readline(MAX_LINE_LENGTH)
+        if len(line) == MAX_LINE_LENGTH:
+            raise RecordingError(f'{self.path}: not a table: a line has {MAX_LINE_LENGTH} letters '
+                                 'or more')
         return line
 
     def __next__(self) -> str:  # type: ignore[override]
@@ -265,12 +263,12 @@ def opened(path: Path) -> Iterator[io.TextIOBase]:
 
     """
     try:
-        with files.opened(path, RecordingError, largest=LARGEST) as file:
+        with files.opened(path, RecordingError, largest=MAX_SIZE) as file:
             start = file.read(2)
             file.seek(0)
-            unpacked = _Unpacked(file, path) if start == GZIP else file
+            unpacked = _Unpacked(file, path) if start == GZIP_MAGIC else file
             with _Lines(cast(IO[bytes], unpacked), newline='',
-                        encoding='utf-16' if start in UTF_16 else 'utf-8-sig') as text:
+                        encoding='utf-16' if start in UTF_16_BOMS else 'utf-8-sig') as text:
                 text.path = path
                 yield text
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
@@ -285,12 +283,12 @@ def remaining_lines(text: io.TextIOBase, path: Path) -> list[str]:
     """Return the lines that are left of a text.
 
     Raises:
-        RecordingError: they are more than MOST_LINES.
+        RecordingError: they are more than MAX_LINES.
 
     """
-    lines = list(itertools.islice(text, MOST_LINES + 1))
-    if len(lines) > MOST_LINES:
-        raise RecordingError(f'{path}: more than {MOST_LINES} lines: divide it into parts')
+    lines = list(itertools.islice(text, MAX_LINES + 1))
+    if len(lines) > MAX_LINES:
+        raise RecordingError(f'{path}: more than {MAX_LINES} lines: divide it into parts')
     return lines
 
 
@@ -308,11 +306,11 @@ def preamble(first: str, text: Iterator[str]
 
     """
     lines = [first]
-    while lines[-1].strip(EMPTY).lower() != END:
+    while lines[-1].strip(SEPARATORS).lower() != PREAMBLE_END:
         lines.append(next(text, ''))
-        if not lines[-1] or len(lines) > PREAMBLE:
+        if not lines[-1] or len(lines) > MAX_PREAMBLE_LINES:
             return None
-    values = {name.strip().lower(): value.strip(EMPTY).lower()
+    values = {name.strip().lower(): value.strip(SEPARATORS).lower()
               for name, mark, value in (line.partition('=') for line in lines) if mark}
     units = {'yes': 'deg', 'no': 'rad'}
     rows = values.get('nrows', values.get('datarows', ''))

@@ -26,15 +26,15 @@ import numpy as np
 
 # Implausible samples: stamps far from all others, angles that no joint can have.
 
-#: FARTHEST: largest position of a joint, rad.
-FARTHEST = 1e6
+#: MAX_POSITION: of a joint, rad.
+MAX_POSITION = 1e6
 #: SPIKE_RATIO: distance from the median, over the spread of the positions, at least 1 rad, above
-#: which a position is implausible; RARE: such positions are dropped if their fraction is up to
-#: this.
-SPIKE_RATIO, RARE = 100.0, 0.01
-#: A gap of more than ASTRAY times the duration of all samples, and of more than GAP, ns, separates
-#: recordings that do not belong together, or stamps that are wrong.
-ASTRAY, GAP = 10.0, 60_000_000_000
+#: which a position is implausible; such positions are dropped up to the fraction
+#: MAX_SPIKE_FRACTION.
+SPIKE_RATIO, MAX_SPIKE_FRACTION = 100.0, 0.01
+#: A gap of more than GAP_RATIO times the duration of all samples, and of more than MIN_GAP, ns,
+#: separates recordings that do not belong together, or stamps that are wrong.
+GAP_RATIO, MIN_GAP = 10.0, 60_000_000_000
 #: Stamps, the columns that they are of, and positions, shape (n, columns).
 Part = tuple[np.ndarray, list[int], np.ndarray]
 
@@ -49,7 +49,7 @@ def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
     stamps = np.sort(np.concatenate([stamps for stamps, _, _ in parts]))
     steps = np.diff(stamps)
     usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
-    gaps = np.flatnonzero(steps > max(ASTRAY * usual * stamps.size, GAP)) + 1
+    gaps = np.flatnonzero(steps > max(GAP_RATIO * usual * stamps.size, MIN_GAP)) + 1
     ends = np.concatenate([[0], gaps, [stamps.size]])
     most = int(np.argmax(np.diff(ends)))
     lost = stamps.size - int(ends[most + 1] - ends[most])
@@ -82,32 +82,30 @@ def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
 def _far(column: np.ndarray) -> np.ndarray:
     """Return which positions of a joint are beyond all others, shape (samples,)."""
     there = np.isfinite(column)
-    far = there & (np.abs(column) > FARTHEST)
+    far = there & (np.abs(column) > MAX_POSITION)
     near = there & ~far
     if near.any():
         low, middle, high = np.percentile(column[near], (5.0, 50.0, 95.0))
         spikes = near & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
-        if np.count_nonzero(spikes) <= max(1.0, RARE * np.count_nonzero(near)):
+        if np.count_nonzero(spikes) <= max(1.0, MAX_SPIKE_FRACTION * np.count_nonzero(near)):
             far |= spikes
     return far
 
 
-#: LONG: number of samples (messages or rows) from which on a recording is long.
-LONG = 1 << 17
-#: STEPS: steps of the grid that are tried, ns, the coarsest first; FRACTION: longest usual
-#: interval of the samples, in steps.
-STEPS, FRACTION = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
-#: A_PERIOD: fewest grid points of a period of the strongest motion; SLOWEST: least frequency that
-#: counts as motion, Hz.
-A_PERIOD, SLOWEST = 40.0, 0.2
-#: PART: samples of a part whose spectrum is computed.
-PART = 1 << 14
-#: ABOUT: distance of the samples' mean time from their grid point, steps, up to which it is
+#: MAX_RAW_SAMPLES: messages or rows; with more, a recording is long.
+MAX_RAW_SAMPLES = 1 << 17
+#: GRID_STEPS: ns, the coarsest first; MAX_INTERVAL_RATIO: of the samples' usual interval to it.
+GRID_STEPS, MAX_INTERVAL_RATIO = (10_000_000, 5_000_000, 2_500_000, 1_250_000), 0.5
+#: MIN_PERIOD_POINTS: of the strongest motion on the grid; MIN_FREQUENCY: of motion, Hz.
+MIN_PERIOD_POINTS, MIN_FREQUENCY = 40.0, 0.2
+#: SPECTRUM_SIZE: samples of a part whose spectrum is computed.
+SPECTRUM_SIZE = 1 << 14
+#: CENTRE_TOLERANCE: distance of the samples' mean time from their grid point, steps, that is
 #: ignored; beyond it the mean counts at that time.
-ABOUT = 0.3
-#: SPIKE: a sample is a spike if it is off both neighbours by this many standard deviations, and by
-#: this multiple of their difference.
-SPIKE = 3.0
+CENTRE_TOLERANCE = 0.3
+#: SPIKE_STD_RATIO: distance of a spike from both neighbours, over the standard deviation and over
+#: the difference of these.
+SPIKE_STD_RATIO = 3.0
 
 
 class Thinned:
@@ -123,7 +121,7 @@ class Thinned:
     def __init__(self) -> None:
         self.step, self.count, self.rate = 0, 0, 0.0
         self._coming: list[tuple[np.ndarray, np.ndarray]] = []
-        self._size, self._next = 0, LONG
+        self._size, self._next = 0, MAX_RAW_SAMPLES
         # The grid so far, in arrays that grow in place: joining pieces would take twice the
         # memory.
         self._stamps, self._values = array('q'), array('d')
@@ -145,7 +143,7 @@ class Thinned:
         if not self.step:
             self.step, self.rate = _step_for(stamps, values)
             # Without a step now, there may be one later: joints may stand at first.
-            self._next = LONG if self.step else 2 * self._next
+            self._next = MAX_RAW_SAMPLES if self.step else 2 * self._next
         last = 0
         if self.step:
             # All but what belongs to the last point of the grid.
@@ -196,23 +194,23 @@ def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
         return 0, 0.0
     usual = float(np.median(intervals[intervals > 0]))
     power: np.ndarray | float = 0.0
-    for low, high in pairwise(range(0, len(values) + 1, min(PART, len(values)))):
+    for low, high in pairwise(range(0, len(values) + 1, min(SPECTRUM_SIZE, len(values)))):
         part = _without_odd(values[low:high])
         part = np.nan_to_num(part - np.nanmean(np.where(np.isfinite(part), part, 0.0), axis=0))
         power = power + np.sum(np.abs(np.fft.rfft(part, axis=0))**2, axis=1)
-    frequencies = np.fft.rfftfreq(min(PART, len(values)), usual * 1e-9)
-    strongest = frequencies[np.argmax(np.where(frequencies >= SLOWEST, power, 0.0))]
-    steps = [step for step in STEPS if step * A_PERIOD * strongest <= 1e9
-             and usual <= FRACTION * step]
+    frequencies = np.fft.rfftfreq(min(SPECTRUM_SIZE, len(values)), usual * 1e-9)
+    strongest = frequencies[np.argmax(np.where(frequencies >= MIN_FREQUENCY, power, 0.0))]
+    steps = [step for step in GRID_STEPS if step * MIN_PERIOD_POINTS * strongest <= 1e9
+             and usual <= MAX_INTERVAL_RATIO * step]
     return (steps[0] if steps else 0), 1e9 / usual
 
 
 def _without_odd(values: np.ndarray) -> np.ndarray:
     """Return values without single spikes and without values that are not angles."""
-    values = np.where(np.abs(values) <= FARTHEST, values, np.nan)
+    values = np.where(np.abs(values) <= MAX_POSITION, values, np.nan)
     before, here, after = values[:-2], values[1:-1], values[2:]
     off = np.abs(here - 0.5 * (before + after))
-    wild = off > SPIKE * np.maximum(np.nanstd(values, axis=0), np.abs(after - before))
+    wild = off > SPIKE_STD_RATIO * np.maximum(np.nanstd(values, axis=0), np.abs(after - before))
     here[wild] = np.nan
     return values
 
@@ -255,6 +253,6 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
     # Samples all over a step have a mean that is off by 1 / 24 of the second difference.
     mean -= np.where(sides == 2, (after - before) / 24.0, 0.0)
     centre = off[np.arange(len(points)), np.argmax(count, axis=1)]
-    centre[np.abs(centre) <= ABOUT] = 0.0
+    centre[np.abs(centre) <= CENTRE_TOLERANCE] = 0.0
     return (points * step + np.rint(centre * step).astype(np.int64),
             mean - slope * (off - centre[:, None]))

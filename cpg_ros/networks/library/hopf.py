@@ -35,7 +35,7 @@ from cpg_ros.networks.library.families import LegPairs
 from cpg_ros.networks.network import Preset
 import numpy as np
 
-TURN = 2.0 * math.pi
+TWO_PI = 2.0 * math.pi
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class HopfOscillators(LegPairs):
             return None
         phase = np.array([float(shift) for shift in self.phases(gait)])
         # Stance is half a turn, and so is swing.
-        angle = np.interp(phase, [0.0, self.duty, 1.0], [0.0, 0.5 * TURN, TURN])
+        angle = np.interp(phase, [0.0, self.duty, 1.0], [0.0, 0.5 * TWO_PI, TWO_PI])
         size = math.sqrt(self.mu)
         return np.concatenate([size * np.cos(angle), size * np.sin(angle)]), 1.0 / self.nu
 

@@ -40,9 +40,9 @@ from cpg_ros.networks.network import known, Network, Preset, stated_gait
 from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
 
-TURN = 2.0 * math.pi
+TWO_PI = 2.0 * math.pi
 #: Keeps the angle of an oscillator at rest from being undefined: r is at least 1e-9.
-LEAST = 1e-18
+MIN_SQUARED_RADIUS = 1e-18
 
 
 @cache
@@ -108,11 +108,11 @@ class PhaseOscillators(Network):
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
         """Return the rates of x, y and s, as in the module."""
         x, y, s = cell.now()
-        r = sqrt(x**2 + y**2 + LEAST)
-        speed: Number = TURN * p.nu
+        r = sqrt(x**2 + y**2 + MIN_SQUARED_RADIUS)
+        speed: Number = TWO_PI * p.nu
         for n in range(1, cls.cells):
             x_j, y_j, _ = cell.now(lambda i, n=n: i + n)
-            phi = TURN * (getattr(p, f'offset{n}') - p.offset0)
+            phi = TWO_PI * (getattr(p, f'offset{n}') - p.offset0)
             # r_j sin(theta_j - phi) and r_j cos(theta_j - phi).
             sine, cosine = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
             speed = speed + p.w * (sine * x - cosine * y) / r
@@ -136,7 +136,7 @@ class PhaseOscillators(Network):
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float]:
         """Return the gait's state where the first leg's oscillator peaks, and the period."""
-        angle = TURN * np.array(self.leads)
+        angle = TWO_PI * np.array(self.leads)
         return np.concatenate([self.r * np.cos(angle), self.r * np.sin(angle),
                                np.zeros(self.cells)]), 1.0 / self.nu
 

@@ -159,7 +159,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     # Loaded here: what tunes gaits needs no bags.
     from cpg_ros.fitting.recordings.bag_storage import opened
     from cpg_ros.fitting.recordings.low_state import LOW_STATE
-    from cpg_ros.fitting.recordings.rosbags_library import SerdeError, STORE
+    from cpg_ros.fitting.recordings.rosbags_library import SerdeError, TYPESTORE
 
     path = Path(path)
     names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
@@ -183,7 +183,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
         for topic, received, data in bag.messages(list(names.values())):
             key = key_of[topic]
             try:
-                by_key[key].append((received, STORE.deserialize_cdr(data, TYPES[key])))
+                by_key[key].append((received, TYPESTORE.deserialize_cdr(data, TYPES[key])))
             except SerdeError as error:
                 raise RecordingError(f'{path}, {topic}: a message cannot be read: {error}'
                                      ) from error

@@ -24,7 +24,7 @@ import subprocess
 import sys
 
 import cpg_ros
-from cpg_ros.common.cache_folder import KEPT
+from cpg_ros.common.cache_folder import MAX_FOLDERS
 from cpg_ros.common.files import resource_folder
 from graph import EXECUTABLE, Process
 import pytest
@@ -147,7 +147,7 @@ def test_what_compiled_code_takes_from_other_files_is_watched():
 
 def test_unused_folders_of_the_cache_are_removed_and_no_others(tmp_path):
     cache, given = tmp_path / 'cpg_ros', environment(NUMBA_CACHE_DIR=str(tmp_path))
-    old = [cache / f'package-{number:014x}' for number in range(KEPT + 5)]
+    old = [cache / f'package-{number:014x}' for number in range(MAX_FOLDERS + 5)]
     for age, folder in enumerate(old):
         folder.mkdir(parents=True)
         lock = folder / 'in_use'
@@ -161,7 +161,7 @@ def test_unused_folders_of_the_cache_are_removed_and_no_others(tmp_path):
         subprocess.run([sys.executable, tmp_path / 'one.py'], env=given, check=True)
         left = {folder for folder in cache.iterdir() if folder.name.startswith('package-')}
     # The new one, those last used, and the oldest, which is in use.
-    assert set(old) & left == {*old[:KEPT - 1], old[-1]} and len(left) == KEPT + 1
+    assert set(old) & left == {*old[:MAX_FOLDERS - 1], old[-1]} and len(left) == MAX_FOLDERS + 1
     assert other.exists()
 
 

@@ -196,7 +196,7 @@ def test_folders_that_will_not_do(folder, tmp_path):
 
 
 def test_what_appears_is_taken_once_it_is_whole(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr('cpg_ros.fitting.inversion.many_recordings.LOOK', 0.01)
+    monkeypatch.setattr('cpg_ros.fitting.inversion.many_recordings.SCAN_PERIOD', 0.01)
     looks, said = iter(range(8)), []
 
     def goes_on():

@@ -287,7 +287,7 @@ def test_a_bag_of_anything_is_read_as_the_library_reads_it_or_refused(batch, tmp
 
 def test_progress_is_shown_on_long_reads_and_can_be_silenced(tmp_path, monkeypatch, capsys):
     path = write_bag(tmp_path / 'walk', walk(9000, JOINTS[:2])[0])
-    monkeypatch.setattr('cpg_ros.common.command_line.PATIENCE', -1.0)
+    monkeypatch.setattr('cpg_ros.common.command_line.PROGRESS_DELAY', -1.0)
     read_bag(path)
     assert capsys.readouterr().err.startswith('reading walk [')
     read_bag(path, progress=False)

@@ -158,7 +158,7 @@ def test_what_the_library_does_ends_nothing_but_its_process(path, tmp_path, monk
                                                             words):
     (tmp_path / 'ezc3d.py').write_text(library)
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.setattr(reader_process, 'TIME', 1.0)
+    monkeypatch.setattr(reader_process, 'MAX_CPU_TIME', 1.0)
     with pytest.raises(RecordingError, match=words) as error:
         read_c3d(path)
     assert str(error.value).startswith(f'{path}: ') and '\n' not in str(error.value)

@@ -234,7 +234,7 @@ def test_what_h5py_does_ends_nothing_but_its_process(tmp_path, monkeypatch, libr
     path = tmp_path / 'pose.h5'
     path.write_bytes(b'no poses')
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))
-    monkeypatch.setattr(reader_process, 'TIME', 1.0)
+    monkeypatch.setattr(reader_process, 'MAX_CPU_TIME', 1.0)
     with pytest.raises(RecordingError, match=words) as error:
         pose_markers(path, 25)
     assert str(error.value).startswith(f'{path}: ') and '\n' not in str(error.value)

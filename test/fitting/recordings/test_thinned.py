@@ -32,8 +32,8 @@ STEP = 10_000_000
 @pytest.fixture
 def soon(monkeypatch):
     """Make what counts as long short."""
-    monkeypatch.setattr(thinned, 'LONG', 2000)
-    monkeypatch.setattr(joint_streams, 'LONG', 2000)
+    monkeypatch.setattr(thinned, 'MAX_RAW_SAMPLES', 2000)
+    monkeypatch.setattr(joint_streams, 'MAX_RAW_SAMPLES', 2000)
 
 
 def motion(t, frequency=1.7):
@@ -72,7 +72,7 @@ def test_gaps_spikes_and_missing_values():
 
 
 def test_a_fast_stride_is_not_thinned_away(monkeypatch):
-    monkeypatch.setattr(thinned, 'LONG', 2000)
+    monkeypatch.setattr(thinned, 'MAX_RAW_SAMPLES', 2000)
     t = np.arange(6000) / 500.0
     for frequency, step in ((2.0, 10_000_000), (4.5, 5_000_000), (12.0, 0)):
         samples = Thinned()

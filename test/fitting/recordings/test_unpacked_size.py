@@ -47,7 +47,7 @@ def refusal(read, path: Path) -> str:
 @pytest.mark.parametrize(('read', 'head'), [
     (read_csv, b'time,hip\n'), (read_mot, b'walk\ninDegrees=no\nendheader\ntime\thip\n')])
 def test_text_that_unpacks_to_too_much(tmp_path, read, head, monkeypatch):
-    monkeypatch.setattr(tables, 'ALWAYS', 100_000)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', 100_000)
     path = tmp_path / 'walk.csv.gz'
     path.write_bytes(gzip.compress(head + b'\n' * 1_000_000))
     assert 'more than 0 MB' in refusal(read, path)
@@ -68,7 +68,7 @@ Frame Time: .01
     ('a.trc.gz', b'PathFileType\n\n\n\n\n'), ('a.bvh', BVH_HEAD),
     ('a.csv.gz', b'scorer,a\nbodyparts,b\ncoords,x\n')])
 def test_lines_without_end_are_not_kept(tmp_path, name, head, monkeypatch):
-    monkeypatch.setattr(tables, 'MOST_LINES', 1000)
+    monkeypatch.setattr(tables, 'MAX_LINES', 1000)
     path = tmp_path / name
     path.write_bytes(gzip.compress(head + b'0\n' * 1001))
     with pytest.raises(RecordingError, match='more than 1000 lines') as error:
@@ -78,7 +78,7 @@ def test_lines_without_end_are_not_kept(tmp_path, name, head, monkeypatch):
 
 @pytest.mark.parametrize('kind', [np.int8, float])
 def test_arrays_that_unpack_to_too_much(tmp_path, kind, monkeypatch):
-    monkeypatch.setattr(tables, 'ALWAYS', 100_000)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', 100_000)
     path = tmp_path / 'walk.npz'
     np.savez_compressed(path, hip=np.zeros(1_000_000, kind), fps=100.0)
     refusal(read_npz, path)
@@ -96,7 +96,7 @@ def test_members_that_are_no_arrays_are_named(tmp_path):
 
 def test_all_messages_of_a_bag_together_are_bounded(tmp_path, monkeypatch):
     # None of them is too large by itself.
-    monkeypatch.setattr(tables, 'ALWAYS', 1_000_000)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', 1_000_000)
     large = joint_state(START, JOINTS, [0.0] * len(JOINTS), (), [0.0] * 50_000)
     bag = write_bag(tmp_path / 'walk', [('/joint_states', START + k, large) for k in range(100)],
                     'sqlite3', 'message')
@@ -145,7 +145,7 @@ def test_metadata_of_other_types(tmp_path, value):
 
 
 def test_a_long_table_is_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables, 'ALWAYS', 100_000)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', 100_000)
     path = tmp_path / 'walk.csv.gz'
     rows = ''.join(f'{k / 100},{k % 7}\n' for k in range(20_000))
     path.write_bytes(gzip.compress(f'time,hip\n{rows}'.encode()))
@@ -154,9 +154,9 @@ def test_a_long_table_is_read(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(('storage', 'compression'), KINDS)
-@pytest.mark.parametrize('limit', [20_000_000, *in_depth(tables.ALWAYS)])
+@pytest.mark.parametrize('limit', [20_000_000, *in_depth(tables.UNPACKED_ALLOWANCE)])
 def test_bags_that_unpack_to_too_much(tmp_path, storage, compression, limit, monkeypatch):
-    monkeypatch.setattr(tables, 'ALWAYS', limit)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', limit)
     temporary = tmp_path / 'temporary'
     temporary.mkdir()
     monkeypatch.setattr(tempfile, 'tempdir', str(temporary))
@@ -171,7 +171,7 @@ def test_bags_that_unpack_to_too_much(tmp_path, storage, compression, limit, mon
 def test_how_much_counts_beside_the_size_of_what_was_packed(tmp_path, storage, compression,
                                                             monkeypatch):
     # Less than what it always may be is nothing, then: the ratio alone decides.
-    monkeypatch.setattr(tables, 'ALWAYS', 0)
+    monkeypatch.setattr(tables, 'UNPACKED_ALLOWANCE', 0)
     messages = walk(200)[0]
     bag = write_bag(tmp_path / 'walk', messages, storage, compression)
     assert len(read_bag(bag, progress=False).times) == 200
