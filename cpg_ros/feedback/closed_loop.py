@@ -24,7 +24,7 @@ from cpg_ros.feedback.estimate import (
     lose_odometry,
     Odometry,
     SensorData,
-    TOUCH,
+    TOUCHDOWN_LOAD,
 )
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, Memory
@@ -244,7 +244,7 @@ def _compare_contacts(loop, slot):
         state[AGREEMENT] = 1.0
         return wrong
     row = int(numbers[PHASE] * NUM_PHASES) % NUM_PHASES
-    state[AGREEMENT] = agreement(loop.sensors.foot_forces[0], TOUCH * loop.legs.weight,
+    state[AGREEMENT] = agreement(loop.sensors.foot_forces[0], TOUCHDOWN_LOAD * loop.legs.weight,
                                  tables.swinging[slot, row], min(dt * numbers[FREQUENCY], 1.0),
                                  state[AGREEMENT])
     state[CONTACTS_DISAGREE] = state[AGREEMENT] < MIN_AGREEMENT

@@ -32,8 +32,9 @@ import numpy as np
 
 # Foot forces from joint torques, for feet without sensors.
 
-#: SINGULAR: determinant of a leg's Jacobian, m^3, below which torques do not determine the force.
-SINGULAR = 1e-6
+#: MIN_DETERMINANT: determinant of a leg's Jacobian, m^3, below which torques do not determine the
+#: force.
+MIN_DETERMINANT = 1e-6
 
 
 @jit
@@ -59,7 +60,7 @@ def load_of(leg, columns, angles, efforts, up, slopes):
     forward, left, upward = (cross(slopes[1], slopes[2]), cross(slopes[2], slopes[0]),
                              cross(slopes[0], slopes[1]))
     volume = slopes[0, 0] * forward[0] + slopes[0, 1] * forward[1] + slopes[0, 2] * forward[2]
-    if abs(volume) < SINGULAR:
+    if abs(volume) < MIN_DETERMINANT:
         return 0.0
     load = 0.0
     for k in range(3):
@@ -79,16 +80,18 @@ def loads_of(rows, columns, angles, efforts, roll, pitch, out):
         out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
 
 
-#: TOUCH: fraction of the weight above which a foot is on the ground; LEAVE: fraction below which
-#: it is in the air again.
-TOUCH, LEAVE = 0.10, 0.04
-#: PULL: time constant, s, with which a leg that bears the whole weight corrects the velocity.
-PULL = 0.02
-#: SLIP: difference of a leg's velocity from the estimate, m/s, at which it counts half: it slips.
-SLIP = 0.25
-#: DISAGREE: time, s, after which legs that contradict the estimate are believed, not the estimate.
-#: WIDENS: time, s, in which the tolerance SLIP then grows by its own size.
-DISAGREE, WIDENS = 0.2, 0.05
+#: TOUCHDOWN_LOAD: fraction of the weight above which a foot is on the ground; LIFTOFF_LOAD:
+#: fraction below which it is in the air again.
+TOUCHDOWN_LOAD, LIFTOFF_LOAD = 0.10, 0.04
+#: CORRECTION_TIME: time constant, s, with which a leg that bears the whole weight corrects the
+#: velocity.
+CORRECTION_TIME = 0.02
+#: SLIP_SPEED: difference of a leg's velocity from the estimate, m/s, at which it counts half: it
+#: slips.
+SLIP_SPEED = 0.25
+#: DISAGREEMENT_TIME: time, s, after which legs that contradict the estimate are believed, not the
+#: estimate. WIDENING_TIME: time, s, in which the tolerance SLIP_SPEED then grows by its own size.
+DISAGREEMENT_TIME, WIDENING_TIME = 0.2, 0.05
 
 
 class SensorData(NamedTuple):
@@ -166,10 +169,10 @@ def update(legs, sensors, run, dt, velocity, contact, doubt, leg_velocities, scr
     velocity[1] += dt * (acceleration[1] - GRAVITY * up[1] - (turning[2] * vx - turning[0] * vz))
     velocity[2] += dt * (acceleration[2] - GRAVITY * up[2] - (turning[0] * vy - turning[1] * vx))
     total, loaded, apart = 0.0, 0.0, 0.0
-    slip = SLIP * (1.0 + max(doubt[run] - DISAGREE, 0.0) / WIDENS)
+    slip = SLIP_SPEED * (1.0 + max(doubt[run] - DISAGREEMENT_TIME, 0.0) / WIDENING_TIME)
     for leg in range(rows.shape[0]):
         fraction, seen = max(forces[leg], 0.0) / legs.weight, leg_velocities[leg]
-        contact[leg] = fraction > (LEAVE if contact[leg] else TOUCH)
+        contact[leg] = fraction > (LIFTOFF_LOAD if contact[leg] else TOUCHDOWN_LOAD)
         seen[3] = 0.0
         if not contact[leg] or rows[leg, 1] == 0.0:
             continue
@@ -181,9 +184,10 @@ def update(legs, sensors, run, dt, velocity, contact, doubt, leg_velocities, scr
         for k in range(3):
             off += (seen[k] - velocity[k])**2
         # Even where all legs slip, they count a little: integrated accelerations drift.
-        seen[3] = min(dt / PULL * fraction / (1.0 + off / slip**2), 0.5)
+        seen[3] = min(dt / CORRECTION_TIME * fraction / (1.0 + off / slip**2), 0.5)
         total += seen[3]
-        loaded, apart = loaded + fraction, apart + (fraction if off > (2.0 * SLIP)**2 else 0.0)
+        loaded += fraction
+        apart += fraction if off > (2.0 * SLIP_SPEED)**2 else 0.0
     if loaded > 0.0:
         # In flight nothing is known.
         doubt[run] = min(max(doubt[run] + (dt if apart > 0.5 * loaded else -2.0 * dt), 0.0), 1.0)
@@ -229,27 +233,29 @@ class BodyState:
 
 # Leg odometry: the base's pose, from the estimated velocity, and its covariance.
 
-# All but STATES are standard deviations or intensities of noise.
+# All but NUM_STATES are standard deviations or intensities of noise.
 #: Slow velocity error, measured on a simulated Go2 that trots, walks, turns and is pushed.
-#: STILL: its size at rest, m/s; OF_SPEED: as a fraction of the speed; SLOWLY: correlation time, s.
-STILL, OF_SPEED, SLOWLY = 0.001, 0.015, 15.0
-#: SCALE: constant relative error of the velocity of a robot whose odometry was not calibrated.
-SCALE = 0.05
-#: White noise. PLACE: of the position, m/sqrt(s); HEADING: of the heading, rad/sqrt(s), at which
-#: an IMU drifts by half a degree in a minute.
-PLACE, HEADING = 0.001, 0.001
-#: LEVEL: slope of the ground, as a fraction of the distance covered.
-LEVEL = 0.05
-#: HEIGHT: height above level ground, m.
-HEIGHT = 0.01
-#: INSTANT: velocity at an instant forward, to the left and up, m/s.
-INSTANT = 0.02, 0.02, 0.03
-#: TILT: roll and pitch as an IMU measures them, rad; RATE: their rates, rad/s.
-TILT, RATE = 0.01, 0.02
-#: UNSEEN: velocity that is not measured, m/s, in addition to the last measured speed.
-UNSEEN = 0.5
-#: STATES: number of states: x, y, heading, slow error forward and to the left, relative error.
-STATES = 6
+#: DRIFT_AT_REST: its size at rest, m/s; DRIFT_PER_SPEED: as a fraction of the speed; DRIFT_TIME:
+#: correlation time, s.
+DRIFT_AT_REST, DRIFT_PER_SPEED, DRIFT_TIME = 0.001, 0.015, 15.0
+#: SCALE_ERROR: constant relative error of the velocity of a robot whose odometry was not
+#: calibrated.
+SCALE_ERROR = 0.05
+#: White noise. POSITION_NOISE: of the position, m/sqrt(s); HEADING_NOISE: of the heading,
+#: rad/sqrt(s), at which an IMU drifts by half a degree in a minute.
+POSITION_NOISE, HEADING_NOISE = 0.001, 0.001
+#: SLOPE_ERROR: slope of the ground, as a fraction of the distance covered.
+SLOPE_ERROR = 0.05
+#: HEIGHT_ERROR: height above level ground, m.
+HEIGHT_ERROR = 0.01
+#: VELOCITY_ERROR: velocity at an instant forward, to the left and up, m/s.
+VELOCITY_ERROR = 0.02, 0.02, 0.03
+#: TILT_ERROR: roll and pitch as an IMU measures them, rad; RATE_ERROR: their rates, rad/s.
+TILT_ERROR, RATE_ERROR = 0.01, 0.02
+#: UNMEASURED_VELOCITY: velocity that is not measured, m/s, in addition to the last measured speed.
+UNMEASURED_VELOCITY = 0.5
+#: NUM_STATES: number of states: x, y, heading, slow error forward and to the left, relative error.
+NUM_STATES = 6
 
 
 class Odometry(NamedTuple):
@@ -284,9 +290,9 @@ class Odometry(NamedTuple):
     scratch: np.ndarray
 
     @classmethod
-    def begin(cls, scale: float = 1.0, scale_error: float = SCALE) -> 'Odometry':
+    def begin(cls, scale: float = 1.0, scale_error: float = SCALE_ERROR) -> 'Odometry':
         """Return one that begins where the base is; arguments as in ``scale``."""
-        square = STATES, STATES
+        square = NUM_STATES, NUM_STATES
         return cls(np.zeros(6), np.zeros(square), np.zeros(6), np.zeros(4), np.zeros((6, 6)),
                    np.zeros(2), np.array([scale, scale_error]), np.full(1, -1.0),
                    np.zeros((2, *square)))
@@ -310,17 +316,17 @@ def _report(odometry):
         for column in range(3):
             # The heading is the last of the six.
             out[row + 3 * (row == 2), column + 3 * (column == 2)] = covariance[row, column]
-    out[2, 2] = HEIGHT**2 + (LEVEL * pose[5])**2
-    out[3, 3] = out[4, 4] = TILT**2
+    out[2, 2] = HEIGHT_ERROR**2 + (SLOPE_ERROR * pose[5])**2
+    out[3, 3] = out[4, 4] = TILT_ERROR**2
 
 
 @jit
 def _multiply(left, right, out):
-    """Fill a product of matrices, shape (STATES, STATES); BLAS takes the interpreter's lock."""
-    for row in range(STATES):
-        for column in range(STATES):
+    """Fill a product of square matrices of NUM_STATES; BLAS takes the interpreter's lock."""
+    for row in range(NUM_STATES):
+        for column in range(NUM_STATES):
             total = 0.0
-            for k in range(STATES):
+            for k in range(NUM_STATES):
                 total += left[row, k] * right[k, column]
             out[row, column] = total
 
@@ -342,7 +348,7 @@ def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
     joints, scale, factor = sensors.joint_positions[0], odometry.scale[0], odometry.scratch[0]
     if odometry.unseen[0] < 0.0:
         pose[4] = rpy[2]
-        covariance[3, 3] = covariance[4, 4] = STILL**2
+        covariance[3, 3] = covariance[4, 4] = DRIFT_AT_REST**2
         covariance[5, 5] = odometry.scale[1]**2
     odometry.unseen[0], odometry.tilt[0], odometry.tilt[1] = 0.0, rpy[0], rpy[1]
     for k in range(3):
@@ -371,9 +377,9 @@ def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
 
     # P <- F P F' + Q, as F (F P)', for P is symmetric; F differs from one in the rows of x and y,
     # and in the slow errors.
-    stays = math.exp(-dt / SLOWLY)
+    stays = math.exp(-dt / DRIFT_TIME)
     factor[:] = 0.0
-    for k in range(STATES):
+    for k in range(NUM_STATES):
         factor[k, k] = stays if k in (3, 4) else 1.0
     factor[0, 2], factor[1, 2] = -dt * north, dt * east
     factor[0, 3], factor[0, 4] = dt * cy, -dt * sy
@@ -381,8 +387,9 @@ def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
     factor[0, 5], factor[1, 5] = dt * east, dt * north
     _multiply(factor, covariance, odometry.scratch[1])
     _multiply(factor, odometry.scratch[1].T, covariance)
-    slow = STILL**2 + OF_SPEED**2 * (forward**2 + left**2)
-    for k, added in enumerate((dt * PLACE**2, dt * PLACE**2, dt * HEADING**2,
+    slow = DRIFT_AT_REST**2 + DRIFT_PER_SPEED**2 * (forward**2 + left**2)
+    moved = dt * POSITION_NOISE**2
+    for k, added in enumerate((moved, moved, dt * HEADING_NOISE**2,
                                (1.0 - stays**2) * slow, (1.0 - stays**2) * slow)):
         covariance[k, k] += added
     pose[5] += dt * math.hypot(forward, left)
@@ -393,15 +400,15 @@ def advance_odometry(odometry, legs, sensors, velocity, contact, dt):
 def lose_odometry(odometry, dt):
     """Take a step of dt in s without measurements.
 
-    The base may have kept any constant velocity since the last one, of which UNSEEN and the last
-    speed are standard deviations: the error grows with the time, its variance with the square of
-    that.
+    The base may have kept any constant velocity since the last one, of which
+    UNMEASURED_VELOCITY and the last speed are standard deviations: the error grows with the time,
+    its variance with the square of that.
     """
     before = odometry.unseen[0]
     if before < 0.0:
         return
     odometry.unseen[0] = before + dt
-    added = ((UNSEEN**2 + odometry.twist[0]**2 + odometry.twist[1]**2)
+    added = ((UNMEASURED_VELOCITY**2 + odometry.twist[0]**2 + odometry.twist[1]**2)
              * (odometry.unseen[0]**2 - before**2))
     for k in range(2):
         odometry.covariance[k, k] += added

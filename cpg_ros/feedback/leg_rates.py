@@ -20,7 +20,7 @@ detects an IMU whose mount is rotated about the vertical.
 """
 
 from cpg_ros.dynamics.integration.compilation import jit, jit_entry
-from cpg_ros.feedback.estimate import TOUCH, velocity_by_leg
+from cpg_ros.feedback.estimate import TOUCHDOWN_LOAD, velocity_by_leg
 from cpg_ros.feedback.kinematics import foot_of
 import numpy as np
 
@@ -86,7 +86,7 @@ def compare_rates(legs, sensors, dt, memory, seen, scratch):
     rows, columns, forces = legs.rows, legs.columns, sensors.foot_forces[0]
     angles, rates, turning = (sensors.joint_positions[0], sensors.joint_velocities[0],
                               sensors.angular_velocity[0])
-    load, slopes, now = 2.0 * TOUCH * legs.weight, scratch[:3], scratch[3]
+    load, slopes, now = 2.0 * TOUCHDOWN_LOAD * legs.weight, scratch[:3], scratch[3]
     count = len(MOUNTS)
     for leg in range(rows.shape[0]):
         if forces[leg] < load or rows[leg, 1] == 0.0:

@@ -38,10 +38,11 @@ from cpg_ros.feedback.laws import (
 from cpg_ros.feedback.laws.law import limited, low_passed
 import numpy as np
 
-#: LEAD: phase by which corrections lead the pattern, cycles, as joints lag behind their commands.
-LEAD = 0.04
-#: APPROACH: time constant with which the wanted velocity is approached, s.
-APPROACH = 0.2
+#: PHASE_LEAD: phase by which corrections lead the pattern, cycles, as joints lag behind their
+#: commands.
+PHASE_LEAD = 0.04
+#: APPROACH_TIME: time constant with which the wanted velocity is approached, s.
+APPROACH_TIME = 0.2
 
 
 class PlannedMotion(NamedTuple):
@@ -118,12 +119,12 @@ class Intent(NamedTuple):
 @jit
 def _approach(target, dt, now, rate):
     """Advance a velocity and its rate by dt in s towards a target, as cpg_steer does strides."""
-    decay = math.exp(-dt / APPROACH)
+    decay = math.exp(-dt / APPROACH_TIME)
     for k in range(len(now)):
         gap = now[k] - target[k]
-        pull = rate[k] + gap / APPROACH
+        pull = rate[k] + gap / APPROACH_TIME
         now[k] = target[k] + (gap + pull * dt) * decay
-        rate[k] = (rate[k] - pull * dt / APPROACH) * decay
+        rate[k] = (rate[k] - pull * dt / APPROACH_TIME) * decay
 
 
 @jit
@@ -174,7 +175,7 @@ def _change_strides(tables, gains, memory, run, slot, missing, turned, step):
         memory.heading_integral[run] = integral = heading.integrate(
             memory.heading_integral[run], turned, gains, fraction * dt)
         # The faster it runs, the sooner a heading error carries it off its line.
-        hurry = max(_possible_speed(tables, memory, run, slot) / sidestep.FAST, 1.0)
+        hurry = max(_possible_speed(tables, memory, run, slot) / sidestep.FAST_SPEED, 1.0)
         uneven = fraction * hurry * heading.yaw_rate(turned, integral, gains) / rate
         length = heading.response(tables.at[slot], tables.length[slot],
                                   memory.wanted_velocity[run, 0, 0])
@@ -248,7 +249,7 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
         tables: GaitTables.
         gains: Gains.
         memory: Memory, changed in place.
-        at: run, leg, slot of the gait, and the rows of its tables with LEAD and without.
+        at: run, leg, slot of the gait, and the rows of its tables with PHASE_LEAD and without.
         foot: planned position, base's frame, m, shape (3,).
         middle: of the standing feet, forward and to the left, m.
         off: Deviation.
@@ -299,7 +300,7 @@ def _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, ste
     rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
     quick, phase = 1.0 - math.exp(-dt / gains.smooth), planned.phase[run]
     foot, feet = memory.scratch[0], memory.leg_velocities
-    row = int((phase + LEAD) % 1.0 * NUM_PHASES) % NUM_PHASES
+    row = int((phase + PHASE_LEAD) % 1.0 * NUM_PHASES) % NUM_PHASES
     now = int(phase % 1.0 * NUM_PHASES) % NUM_PHASES
     standing, mean_x, mean_y, stumbling = 0, 0.0, 0.0, 0.0
     for leg in range(rows.shape[0]):

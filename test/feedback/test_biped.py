@@ -226,7 +226,7 @@ def test_the_force_of_a_stance_corrects_the_height_and_never_pulls():
     assert stepping.upward_force(0.5, stepping.RUNS, at + 9.0, speed, 33.0, gains) == 0.0
     assert stepping.upward_force(0.5, stepping.RUNS, at - 9.0, speed, 33.0,
                                  gains) == pytest.approx(
-        stepping.MOST * 33.0 * G)
+        stepping.MAX_FORCE * 33.0 * G)
 
 
 def test_a_foot_in_flight_lands_below_where_the_body_will_be():

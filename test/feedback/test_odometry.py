@@ -84,19 +84,19 @@ def test_its_covariance_is_that_of_draws():
     headings = turn * dt * np.arange(steps)
     made = follow([(speed, 0.1)] * steps, headings, dt)
     rng = np.random.default_rng(20261125)
-    stays = math.exp(-dt / module.SLOWLY)
-    slow = math.sqrt((1.0 - stays**2) * (module.STILL**2 + module.OF_SPEED**2
+    stays = math.exp(-dt / module.DRIFT_TIME)
+    slow = math.sqrt((1.0 - stays**2) * (module.DRIFT_AT_REST**2 + module.DRIFT_PER_SPEED**2
                                          * (speed**2 + 0.1**2)))
-    error = rng.normal(0.0, module.STILL, (2, count))
+    error = rng.normal(0.0, module.DRIFT_AT_REST, (2, count))
     drift, place = np.zeros(count), np.zeros((2, count))
-    fraction = 1.0 + rng.normal(0.0, module.SCALE, count)
+    fraction = 1.0 + rng.normal(0.0, module.SCALE_ERROR, count)
     for heading in headings:
         angle = heading + drift
         forward, left = speed * fraction + error[0], 0.1 * fraction + error[1]
         place += dt * np.array([np.cos(angle) * forward - np.sin(angle) * left,
                                 np.sin(angle) * forward + np.cos(angle) * left])
-        place += rng.normal(0.0, module.PLACE * math.sqrt(dt), (2, count))
-        drift += rng.normal(0.0, module.HEADING * math.sqrt(dt), count)
+        place += rng.normal(0.0, module.POSITION_NOISE * math.sqrt(dt), (2, count))
+        drift += rng.normal(0.0, module.HEADING_NOISE * math.sqrt(dt), count)
         error = stays * error + rng.normal(0.0, slow, (2, count))
     found = np.cov(np.vstack([place, drift]))
     scale = np.sqrt(np.diag(found))
@@ -142,13 +142,14 @@ def test_without_measurements_it_knows_less():
     before = made.covariance[0, 0]
     for _ in range(200):
         lose_odometry(made, 0.02)
-    speeds = np.random.default_rng(3).normal(0.0, math.hypot(module.UNSEEN, 0.4), 100000)
+    spread = math.hypot(module.UNMEASURED_VELOCITY, 0.4)
+    speeds = np.random.default_rng(3).normal(0.0, spread, 100000)
     assert made.covariance[0, 0] - before == pytest.approx((4.0 * speeds).var(), rel=0.02)
     # Once there are measurements, the time without them begins anew.
     advance_odometry(made, LEGS, sensors(), np.zeros(3), IN_THE_AIR, 0.02)
     before = made.covariance[1, 1]
     lose_odometry(made, 0.02)
-    assert made.covariance[1, 1] - before == pytest.approx((0.02 * module.UNSEEN)**2)
+    assert made.covariance[1, 1] - before == pytest.approx((0.02 * module.UNMEASURED_VELOCITY)**2)
     made.restart()
     assert not made.covariance.any() and not made.pose.any()
 

@@ -23,7 +23,7 @@ from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, LAWS
 from cpg_ros.feedback.gait_tables import NUM_PHASES
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.tick import LEAD, PlannedMotion
+from cpg_ros.feedback.tick import PHASE_LEAD, PlannedMotion
 from go2 import DT, GO2, program
 import numpy as np
 import pytest
@@ -107,7 +107,7 @@ def test_posture_goes_with_the_stiffness():
         planned.angles[0] = GO2.column('offset')
         sensed.rpy[0, 0] = 0.02
         feedback.advance(sensed, planned, DT)
-        stands = ~feedback.tables.swinging[planned.gaits[0, 0], round(LEAD * NUM_PHASES)]
+        stands = ~feedback.tables.swinging[planned.gaits[0, 0], round(PHASE_LEAD * NUM_PHASES)]
         assert feedback.memory.kp_scale[0] == factor and stands.any()
         found.append(feedback.memory.displacement[0, stands, 2])
     np.testing.assert_allclose(found[0], 2.0 * found[1])

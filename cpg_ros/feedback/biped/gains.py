@@ -104,7 +104,7 @@ _HOP = {
     'reaction': 0.2228, 'reaction_yaw': 0.681, 'flight_height': 0.9914, 'flight_kp': 5162.0,
     'flight_kd': 353.6, 'flight_width': 0.898, 'flight_ahead': 0.488, 'flight_x': 0.1152,
     'flight_y': 0.03}
-OF_GAIT: Mapping[str, Mapping[str, float]] = {
+GAIT_GAINS: Mapping[str, Mapping[str, float]] = {
     'run': {
         'frequency': 2.206, 'duty': 0.353, 'lift': 0.0792, 'swing_end': 0.9576,
         'height_kp': 3979.0, 'height_kd': 354.5, 'roll_kp': 271.4, 'roll_kd': 81.5,
@@ -113,8 +113,8 @@ OF_GAIT: Mapping[str, Mapping[str, float]] = {
         'sole_kd': 0.33, 'stance_damping': 0.3, 'speed_integral': 0.793, 'place_offset': 0.0082,
         'reaction': 0.0689, 'reaction_yaw': 0.639},
     'two_legged_hop': _HOP, 'two_legged_jump': _HOP}
-#: SHORTEST: limits of gains in gaits with flight that are lower than in a walk.
-SHORTEST: Mapping[str, float] = {'duty': 0.2}
+#: FLIGHT_LIMITS: limits of gains in gaits with flight that are lower than in a walk.
+FLIGHT_LIMITS: Mapping[str, float] = {'duty': 0.2}
 _Fields: Any = named_tuple('BipedGains', GAINS, (gain.default for gain in GAINS.values()))
 
 
@@ -132,7 +132,8 @@ class BipedGains(_Fields):  # type: ignore[misc]
 
         """
         for gait_name, changes in body.gait_gains.items():
-            _check(changes, f'biped.gains.{gait_name}', SHORTEST if gait_name in OF_GAIT else {})
+            _check(changes, f'biped.gains.{gait_name}',
+                   FLIGHT_LIMITS if gait_name in GAIT_GAINS else {})
         return cls.of(body.gains, gait, body.scale)._replace(**body.gait_gains.get(gait, {}))
 
     @classmethod
@@ -151,7 +152,7 @@ class BipedGains(_Fields):  # type: ignore[misc]
 
         """
         _check(changes, 'biped.gains', {})
-        of_gait = OF_GAIT.get(gait, {})
+        of_gait = GAIT_GAINS.get(gait, {})
         usual = {**{name: gain.default for name, gain in GAINS.items()}, **of_gait}
         own = {name: value for name, value in changes.items() if name not in of_gait}
         return cls(**{name: float(own[name] if name in own else _scaled(GAINS[name], value, scale))

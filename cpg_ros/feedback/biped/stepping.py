@@ -37,9 +37,9 @@ SWING_GAINS = {
     'sole_kp': Gain(30.2, 500.0, 'N m/rad', 'moment that keeps the sole level and ahead'),
     'sole_kd': Gain(0.716, 50.0, 'N m s/rad', 'derivative gain of the same'),
     'press': Gain(0.012, 0.1, 'm', 'how far below the ground a path ends')}
-#: LANDED: factor of the swing's forces on a foot that has landed early; SWUNG: factor of the
-#: stance's damping on the joints of a leg that bears nothing.
-LANDED, SWUNG = 0.2, 0.2
+#: LANDED_FACTOR: factor of the swing's forces on a foot that has landed early; SWING_FACTOR:
+#: factor of the stance's damping on the joints of a leg that bears nothing.
+LANDED_FACTOR, SWING_FACTOR = 0.2, 0.2
 
 
 @jit
@@ -112,8 +112,8 @@ CLOCK_GAINS = {
     'touchdown': Gain(0.09, 1.0, '', "fraction of the robot's weight on a foot above which, late "
                       'in the swing, it has landed: the clock leaps to the stance'),
     'early': Gain(0.3, 1.0, '', 'fraction of the load that a leg takes which has landed early')}
-#: LATE: fraction of the swing before which a load on the foot does not count as a touchdown.
-LATE = 0.6
+#: LATE_SWING: fraction of the swing before which a load on the foot does not count as a touchdown.
+LATE_SWING = 0.6
 
 
 @jit
@@ -164,9 +164,10 @@ FLIGHT_GAINS = {
                          'distance travelled in stance'),
     'flight_x': Gain(0.159, 1.0, 's', 'foot further ahead by what the speed is too high'),
     'flight_y': Gain(0.0512, 1.0, 's', 'the same sideways')}
-#: MOST: largest upward force, as a multiple of the weight; REACH: largest distance of a foothold
-#: from the centre of mass, forward and sideways, m; ASIDE: least distance to the leg's side, m.
-MOST, REACH, ASIDE = 3.5, 0.35, 0.045
+#: MAX_FORCE: largest upward force, as a multiple of the weight; MAX_REACH: largest distance of a
+#: foothold from the centre of mass, forward and sideways, m; MIN_SIDE_DISTANCE: least distance to
+#: the leg's side, m.
+MAX_FORCE, MAX_REACH, MIN_SIDE_DISTANCE = 3.5, 0.35, 0.045
 #: Kinds of gaits. WALKS: legs in turn without flight; RUNS: in turn with flight; HOPS: together.
 WALKS, RUNS, HOPS = 0, 1, 2
 
@@ -203,7 +204,7 @@ def upward_force(fraction, kind, height, rise, mass, gains):
     at, speed, force = course(fraction, kind, gains)
     push = math.sin(math.pi * fraction) * (gains.flight_kp * (at - height)
                                         + gains.flight_kd * (speed - rise))
-    return min(max(weight * force + push, 0.0), MOST * weight)
+    return min(max(weight * force + push, 0.0), MAX_FORCE * weight)
 
 
 @jit
@@ -223,7 +224,8 @@ def foothold(speed, target, side, remaining, gains):
              + gains.flight_x * (speed[0] - target[0]) + gains.place_offset)
     left = (0.5 * side * gains.flight_width * gains.step_width
             + speed[1] * (remaining + 0.5 * stance) + gains.flight_y * (speed[1] - target[1]))
-    return (min(max(ahead, -REACH), REACH), side * min(max(side * left, ASIDE), REACH))
+    return (min(max(ahead, -MAX_REACH), MAX_REACH),
+            side * min(max(side * left, MIN_SIDE_DISTANCE), MAX_REACH))
 
 
 @jit
@@ -245,18 +247,18 @@ PLACEMENT_GAINS = {
     'speed_up': Gain(4.90, 20.0, '1/m', 'speed-up of the clock by the DCM error'),
     'speed_up_from': Gain(0.047, 0.5, 'm', 'DCM error that does not speed the clock up'),
     'speed_up_most': Gain(0.6, 2.0, '', 'largest speed-up')}
-#: SOONEST: least time to the touchdown, s, for which footholds are computed; LOWEST: least height
-#: of the centre of mass over the feet, m, for the growth rate of the capture point.
-SOONEST, LOWEST = 0.02, 0.3
-#: INTEGRAL: limit of the integral of the missing speed, m; MISSING: limit of the missing speed
-#: that it integrates, m/s.
-INTEGRAL, MISSING = 0.4, 1.0
+#: MIN_TIME_LEFT: least time to the touchdown, s, for which footholds are computed; MIN_COM_HEIGHT:
+#: least height of the centre of mass over the feet, m, for the growth rate of the capture point.
+MIN_TIME_LEFT, MIN_COM_HEIGHT = 0.02, 0.3
+#: MAX_INTEGRAL: limit of the integral of the missing speed, m; MAX_SPEED_ERROR: limit of the
+#: missing speed that it integrates, m/s.
+MAX_INTEGRAL, MAX_SPEED_ERROR = 0.4, 1.0
 
 
 @jit
 def growth_rate(height):
     """Return w = sqrt(g / h), 1/s, of a centre of mass at a height in m over the feet."""
-    return math.sqrt(GRAVITY / max(height, LOWEST))
+    return math.sqrt(GRAVITY / max(height, MIN_COM_HEIGHT))
 
 
 @jit
@@ -310,7 +312,7 @@ def step(dcm_error, side, remaining, rate, target, gains):
         gains: BipedGains.
 
     """
-    time, grown = 0.5 / gains.frequency, math.exp(rate * max(remaining, SOONEST))
+    time, grown = 0.5 / gains.frequency, math.exp(rate * max(remaining, MIN_TIME_LEFT))
     forward = target[0] * time + gains.place_x * grown * dcm_error[0] + gains.place_offset
     outward = gains.step_width + side * (target[1] * time + gains.place_y * grown * dcm_error[1])
     return (min(max(forward, -gains.reach_x), gains.reach_x),
@@ -328,8 +330,8 @@ def speed_up(dcm_error, gains):
 @jit
 def integrate(integral, missing, dt):
     """Return the integral of the missing speed, m, dt in s later."""
-    integral += dt * min(max(missing, -MISSING), MISSING)
-    return min(max(integral, -INTEGRAL), INTEGRAL)
+    integral += dt * min(max(missing, -MAX_SPEED_ERROR), MAX_SPEED_ERROR)
+    return min(max(integral, -MAX_INTEGRAL), MAX_INTEGRAL)
 
 
 @jit

@@ -36,12 +36,12 @@ import numpy as np
 VELOCITY_GAINS = {'velocity_time': Gain(0.03, 1.0, 's',
                                         'in which the soles that stand correct the '
                                "accelerometer's velocity")}
-#: A sole begins to count at a load of FROM, and counts in full at FROM + OVER, fractions of the
-#: weight.
-FROM, OVER = 0.06, 0.18
-#: SLIP: speed of a sole at which it counts half, m/s; ROLL: angular speed with the same effect,
-#: rad/s.
-SLIP, ROLL = 0.2, 1.0
+#: A sole begins to count at a load of MIN_LOAD, and counts in full at MIN_LOAD + LOAD_RANGE,
+#: fractions of the weight.
+MIN_LOAD, LOAD_RANGE = 0.06, 0.18
+#: SLIP_SPEED: speed of a sole at which it counts half, m/s; ROLL_SPEED: angular speed with the
+#: same effect, rad/s.
+SLIP_SPEED, ROLL_SPEED = 0.2, 1.0
 
 
 @jit
@@ -73,17 +73,19 @@ def update(turn, acceleration, soles, loads, dt, gains, velocity):
 
 # Roll error of an inertial unit that is tilted, or whose filter is biased.
 
-#: LEVELLED, STOOD: time constants in a walk and in a stand, s; STEEPEST: largest error, rad.
-LEVELLED, STOOD, STEEPEST = 2.0, 0.7, 0.06
-#: WHOLE: by how much the loads of two feet may differ from the weight, as a fraction of it; LIGHT:
-#: least fraction on each.
-WHOLE, LIGHT = 0.1, 0.1
+#: ROLL_TIME_WALK, ROLL_TIME_STAND: time constants in a walk and in a stand, s; MAX_ROLL_ERROR:
+#: largest error, rad.
+ROLL_TIME_WALK, ROLL_TIME_STAND, MAX_ROLL_ERROR = 2.0, 0.7, 0.06
+#: MAX_LOAD_ERROR: by how much the loads of two feet may differ from the weight, as a fraction of
+#: it; MIN_FOOT_LOAD: least fraction on each.
+MAX_LOAD_ERROR, MIN_FOOT_LOAD = 0.1, 0.1
 
 
 @jit
 def show_balance(loads):
     """Return whether the measured loads, fractions of the weight, are those of two feet."""
-    return abs(loads[0] + loads[1] - 1.0) < WHOLE and min(loads[0], loads[1]) > LIGHT
+    whole = abs(loads[0] + loads[1] - 1.0) < MAX_LOAD_ERROR
+    return whole and min(loads[0], loads[1]) > MIN_FOOT_LOAD
 
 
 @jit
@@ -101,7 +103,7 @@ def roll_error(error, lean, faster, step):
 
     """
     dt, time = step
-    return min(max(error + (faster / GRAVITY - dt * lean) / time, -STEEPEST), STEEPEST)
+    return min(max(error + (faster / GRAVITY - dt * lean) / time, -MAX_ROLL_ERROR), MAX_ROLL_ERROR)
 
 
 @jit
@@ -115,16 +117,16 @@ def _trust(sole, load, velocity):
     for k in range(3):
         off += (sole[k] + velocity[k])**2
         turned += sole[3 + k]**2
-    return min(max((load - FROM) / OVER, 0.0), 1.0) / (
-        (1.0 + off / SLIP**2) * (1.0 + turned / ROLL**2))
+    return min(max((load - MIN_LOAD) / LOAD_RANGE, 0.0), 1.0) / (
+        (1.0 + off / SLIP_SPEED**2) * (1.0 + turned / ROLL_SPEED**2))
 
 
 # Arms of a biped: joints of no leg that swing with the waveforms of the network's cells.
 
-#: RISE: duration of the ramp from rest to the full swing of the arms, and back, s.
-RISE = 1.0
-#: FASTEST: largest speed of a joint, rad/s, also while gaits change.
-FASTEST = 10.0
+#: ARM_RAMP: duration of the ramp from rest to the full swing of the arms, and back, s.
+ARM_RAMP = 1.0
+#: MAX_JOINT_SPEED: largest speed of a joint, rad/s, also while gaits change.
+MAX_JOINT_SPEED = 10.0
 #: SAMPLES: number of points of an orbit from which the range of a cell is read.
 SAMPLES = 256
 
@@ -193,13 +195,14 @@ def swing_arms(arms, slot, state, moving, dt):
         dt: s.
 
     """
-    arms.level[0] = min(max(arms.level[0] + (dt if moving else -dt) / RISE, 0.0), 1.0)
+    arms.level[0] = min(max(arms.level[0] + (dt if moving else -dt) / ARM_RAMP, 0.0), 1.0)
     for k in range(len(arms.rest)):
         if state:
             value = number_at(state + 8 * arms.indices[slot, k])
             arms.waves[k] = (value - arms.middle[slot, k]) / arms.half[slot, k]
         target = arms.rest[k] + arms.level[0] * arms.swings[k] * arms.waves[k]
-        arms.positions[k] += min(max(target - arms.positions[k], -FASTEST * dt), FASTEST * dt)
+        step = MAX_JOINT_SPEED * dt
+        arms.positions[k] += min(max(target - arms.positions[k], -step), step)
 
 
 STANCE_GAINS = {
@@ -225,8 +228,8 @@ STANCE_GAINS = {
     'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
     'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
     'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
-#: LEAST, MOST: limits of the upward force, as multiples of the weight.
-LEAST, MOST = 0.3, 1.8
+#: MIN_FORCE, MAX_FORCE: limits of the upward force, as multiples of the weight.
+MIN_FORCE, MAX_FORCE = 0.3, 1.8
 
 
 @jit
@@ -259,7 +262,7 @@ def upward_force(target, height, rise, mass, gains):
     """
     weight = mass * GRAVITY
     up = weight + gains.height_kp * (target - height) - gains.height_kd * rise
-    return min(max(up, LEAST * weight), MOST * weight)
+    return min(max(up, MIN_FORCE * weight), MAX_FORCE * weight)
 
 
 @jit

@@ -29,8 +29,8 @@ from cpg_ros.feedback.biped.links import (
 )
 from cpg_ros.feedback.kinematics import cross, GRAVITY, wrapped
 
-#: KEPT: least fraction of the load on each foot while standing.
-KEPT = 0.02
+#: MIN_LOAD: least fraction of the load on each foot while standing.
+MIN_LOAD = 0.02
 
 
 @jit
@@ -81,7 +81,7 @@ def _follow_clock(gains, memory, kind):
         if phase >= swing_fraction and laws.swinging[leg]:
             laws.swinging[leg] = laws.landed[leg] = False
         if (laws.swinging[leg] and not laws.landed[leg]
-                and phase > stepping.LATE * swing_fraction
+                and phase > stepping.LATE_SWING * swing_fraction
                 and laws.loads[leg] > gains.touchdown):
             laws.landed[leg] = True
             laws.clock[1] = max(laws.clock[1], swing_fraction - phase)
@@ -125,7 +125,7 @@ def _stand(links, gains, memory, xi, axes, rate, shifted):
     middle, now = 0.5 * (first + second), -s * xi[0] + c * xi[1]
     goal = middle + shifted * (second - links.sides[1] * inward - middle)
     cop = now + (gains.stand - 1.0) * (now - goal)
-    laws.fractions[0] = min(max((cop - second) / (first - second), KEPT), 1.0 - KEPT)
+    laws.fractions[0] = min(max((cop - second) / (first - second), MIN_LOAD), 1.0 - MIN_LOAD)
     laws.fractions[1] = 1.0 - laws.fractions[0]
     ahead = 0.5 * (c * (soles[0, 0] + soles[1, 0]) + s * (soles[0, 1] + soles[1, 1]))
     laws.dcm_error[0], laws.dcm_error[1] = c * xi[0] + s * xi[1] - ahead, 0.0
@@ -230,7 +230,7 @@ def _bear(links, gains, memory, sensors, shift, mode, kind):
     laws.force[0], laws.force[1], laws.force[2] = force
     for leg in range(2):
         torque, bears = memory.torque[leg], fractions[leg] > 0.0
-        damping = gains.stance_damping * (1.0 if bears else stepping.SWUNG)
+        damping = gains.stance_damping * (1.0 if bears else stepping.SWING_FACTOR)
         for k in range(torque.size):
             row = links.chains[leg, k]
             torque[k] = (gravity_torque(pose, row)
@@ -256,7 +256,7 @@ def _swing(links, gains, memory, leg, kind):
             way[0, k] += still[k]
     base = laws.velocity
     now = (moving[0] + base[0], moving[1] + base[1], moving[2] + base[2])
-    strength = stepping.LANDED if laws.landed[leg] else 1.0
+    strength = stepping.LANDED_FACTOR if laws.landed[leg] else 1.0
     x, y, z = stepping.foot_force(way, foot, now, gains)
     force = (strength * x, strength * y, strength * z)
     x, y, z = stepping.level_moment(pose.rotations[links.chains[leg, -1]], laws.heading,
@@ -303,10 +303,10 @@ def tick(links, gains, memory, sensors, command, mode, step):
         shift = (support.cop_shift(laws.dcm_error, links.half, gains) if kind == stepping.WALKS
                  else (0.0, 0.0))
         _level(memory, axes, laws.fractions, shift[1],
-               (dt, support.LEVELLED if kind == stepping.WALKS else math.inf))
+               (dt, support.ROLL_TIME_WALK if kind == stepping.WALKS else math.inf))
     else:
         _level(memory, axes, laws.loads, 0.0,
-               (dt, support.STOOD if support.show_balance(laws.loads) else math.inf))
+               (dt, support.ROLL_TIME_STAND if support.show_balance(laws.loads) else math.inf))
         _stand(links, gains, memory, xi, axes, rate,
                shifted if mode == SHIFT and kind != stepping.HOPS else 0.0)
         reach = links.half[0]

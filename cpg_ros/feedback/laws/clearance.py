@@ -18,7 +18,7 @@ import math
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
-from cpg_ros.feedback.laws.reflexes import EARLY, STUMBLE
+from cpg_ros.feedback.laws.reflexes import LANDING_PHASE, STUMBLE_PHASE
 
 LAW = Law(
     'clearance', 'lift feet higher in swing while they stumble again and again', True,
@@ -34,7 +34,7 @@ LAW = Law(
 @jit
 def stumbles(contact, swinging, progress):
     """Return whether a swinging foot has hit something; the fraction is that of the swing."""
-    return contact and swinging and STUMBLE < progress < EARLY
+    return contact and swinging and STUMBLE_PHASE < progress < LANDING_PHASE
 
 
 @jit

@@ -28,16 +28,16 @@ LAW = Law(
         'turn_most': Gain(0.6, 6.0, 'rad/s', 'the largest yaw rate asked for')},
     memory={
         'heading_integral': StateVariable('yaw rate against a heading error that lasts [rad/s]')})
-#: LASTS: heading error beyond which none lasts, but comes of a push or a turn, rad; DRIFT: the
-#: largest integral, as a fraction of turn_most.
-LASTS, DRIFT = 0.2, 0.25
+#: MAX_LASTING_ERROR: heading error beyond which none lasts, but comes of a push or a turn, rad;
+#: MAX_INTEGRAL: the largest integral, as a fraction of turn_most.
+MAX_LASTING_ERROR, MAX_INTEGRAL = 0.2, 0.25
 
 
 @jit
 def integrate(integral, off, gains, dt):
     """Return the integral for a heading error in rad, rad/s."""
-    return limited(integral + dt * gains.turn_rate * off if abs(off) < LASTS else integral,
-                   DRIFT * gains.turn_most)
+    lasting = off if abs(off) < MAX_LASTING_ERROR else 0.0
+    return limited(integral + dt * gains.turn_rate * lasting, MAX_INTEGRAL * gains.turn_most)
 
 
 @jit

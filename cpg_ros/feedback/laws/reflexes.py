@@ -35,19 +35,21 @@ LAW = Law(
     memory={
         'reflex_state': StateVariable('of each leg, see LIFT to LANDED', ('legs', 5))})
 
-#: A contact between the fractions STUMBLE and EARLY of the swing is a stumble, from EARLY on an
-#: early landing; before STUMBLE the foot may not have left the ground yet.
-STUMBLE, EARLY = 0.2, 0.65
-#: MISSED: fraction of the stance from which on a foot without contact reaches for the ground.
-MISSED = 0.1
-#: LEANS: lift of a foot by an unexpected lean, m, above which it does not reach: the lean, not a
-#: hole, explains why it has no contact.
-LEANS = 0.005
-#: LIFTING: time, s, in which a foot is lifted in full over an obstacle that it hits.
-LIFTING = 0.01
-#: Indices of a foot's state. LIFT: lift over an obstacle, m; REACH: reach for the ground, m; HELD:
-#: lift held after an early landing, m; HEIGHT: height of that landing, m; LANDED: 1 after it.
-LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
+#: A contact between the fractions STUMBLE_PHASE and LANDING_PHASE of the swing is a stumble, from
+#: LANDING_PHASE on an early landing; before STUMBLE_PHASE the foot may not have left the ground
+#: yet.
+STUMBLE_PHASE, LANDING_PHASE = 0.2, 0.65
+#: REACH_PHASE: fraction of the stance from which on a foot without contact reaches for the ground.
+REACH_PHASE = 0.1
+#: MAX_LEAN_LIFT: lift of a foot by an unexpected lean, m, above which it does not reach: the lean,
+#: not a hole, explains why it has no contact.
+MAX_LEAN_LIFT = 0.005
+#: LIFT_TIME: time, s, in which a foot is lifted in full over an obstacle that it hits.
+LIFT_TIME = 0.01
+#: Indices of a foot's state. LIFT: lift over an obstacle, m; REACH: reach for the ground, m;
+#: HELD_LIFT: lift held after an early landing, m; LANDING_HEIGHT: height of that landing, m;
+#: LANDED: 1 after it.
+LIFT, REACH, HELD_LIFT, LANDING_HEIGHT, LANDED = range(5)
 
 
 @jit
@@ -66,24 +68,24 @@ def advance(state, contact, swinging, progress, height, lifted, gains, dt):
 
     """
     fade = math.exp(-gains.reflex_rate * dt)
-    late = swinging and progress >= EARLY
-    if swinging and contact and STUMBLE < progress < EARLY:
-        state[LIFT] = min(state[LIFT] + gains.lift * dt / LIFTING, gains.lift)
+    late = swinging and progress >= LANDING_PHASE
+    if swinging and contact and STUMBLE_PHASE < progress < LANDING_PHASE:
+        state[LIFT] = min(state[LIFT] + gains.lift * dt / LIFT_TIME, gains.lift)
     elif late:
         # Return to the gait's landing: a leg that is drawn in is too short to bear the body.
-        state[LIFT] = min(state[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
+        state[LIFT] = min(state[LIFT], gains.lift * (1.0 - progress) / (1.0 - LANDING_PHASE))
     elif not swinging:
         state[LIFT] *= fade
-    if not (swinging or contact) and progress > MISSED and lifted < LEANS:
+    if not (swinging or contact) and progress > REACH_PHASE and lifted < MAX_LEAN_LIFT:
         state[REACH] = min(state[REACH] + gains.reach_rate * dt, gains.reach_most)
     elif swinging:
         state[REACH] *= fade
     if late and contact and not state[LANDED]:
-        state[HEIGHT], state[LANDED] = height + max(state[LIFT], state[HELD]), 1.0
+        state[LANDING_HEIGHT], state[LANDED] = height + max(state[LIFT], state[HELD_LIFT]), 1.0
     elif not late:
         state[LANDED] = 0.0
     if state[LANDED]:
-        state[HELD] = min(max(state[HEIGHT] - height, 0.0), gains.lift)
+        state[HELD_LIFT] = min(max(state[LANDING_HEIGHT] - height, 0.0), gains.lift)
     else:
-        state[HELD] *= fade
-    return max(state[LIFT], state[HELD]) - state[REACH]
+        state[HELD_LIFT] *= fade
+    return max(state[LIFT], state[HELD_LIFT]) - state[REACH]

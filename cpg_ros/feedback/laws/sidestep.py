@@ -21,9 +21,9 @@ drifts sideways when it turns, and on a slope; the same integral acts then.
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, limited, low_passed, StateVariable
 
-#: LEVEL: largest angle of ground that counts as level, rad; FAST: forward speed above which a
-#: straight run drifts aside, m/s.
-LEVEL, FAST = 0.05, 1.0
+#: LEVEL_ANGLE: largest angle of ground that counts as level, rad; FAST_SPEED: forward speed above
+#: which a straight run drifts aside, m/s.
+LEVEL_ANGLE, FAST_SPEED = 0.05, 1.0
 
 LAW = Law(
     'sidestep', 'follow the sideways speed of cmd_vel', True,
@@ -41,10 +41,10 @@ LAW = Law(
                                  'and, while a turn is commanded, this times its rad/s'),
         'sidestep_slope': Gain(1.0, 10.0, 'm/s',
                                'and, on a slope, this times the angle of the ground above '
-                               f'{LEVEL:g} rad'),
+                               f'{LEVEL_ANGLE:g} rad'),
         'sidestep_fast': Gain(0.1, 1.0, '',
                               'and, forward, this times the speed above '
-                              f'{FAST:g} m/s'),
+                              f'{FAST_SPEED:g} m/s'),
         'sidestep_filter': Gain(0.5, 5.0, 's', 'time constant of the filter on that turn')},
     memory={
         'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
@@ -109,6 +109,6 @@ def correct_speed(correction, missing, target, turn, slope, forward, gains, dt):
 
     """
     most = (gains.sidestep_more * abs(target) + gains.sidestep_turning * abs(turn)
-            + gains.sidestep_slope * max(slope - LEVEL, 0.0)
-            + gains.sidestep_fast * max(forward - FAST, 0.0))
+            + gains.sidestep_slope * max(slope - LEVEL_ANGLE, 0.0)
+            + gains.sidestep_fast * max(forward - FAST_SPEED, 0.0))
     return limited(correction + dt * gains.sidestep_rate * missing, most)

@@ -16,7 +16,7 @@
 
 from importlib import import_module, util
 
-from cpg_ros.feedback.estimate import INSTANT, Odometry, RATE
+from cpg_ros.feedback.estimate import Odometry, RATE_ERROR, VELOCITY_ERROR
 from cpg_ros.ros.node.message_block import each, indices, MessageBlock, Template
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry as OdometryMessage
@@ -92,4 +92,5 @@ def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, 
             "('make messages' or ros-jazzy-tf2-msgs)")
     return MessageBlock(node, sizes, messages).feed(
         source.pose, source.orientation, source.twist, source.pose_covariance,
-        np.diag(np.square([*INSTANT, RATE, RATE, RATE])), period=PERIOD, while_not_0=fraction)
+        np.diag(np.square([*VELOCITY_ERROR, RATE_ERROR, RATE_ERROR, RATE_ERROR])),
+        period=PERIOD, while_not_0=fraction)

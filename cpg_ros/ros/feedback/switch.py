@@ -23,7 +23,7 @@ from cpg_ros.feedback.biped.balanced_pattern import BalancedPattern
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.gains import GAINS as BALANCE_GAINS
 from cpg_ros.feedback.closed_loop import CONTACTS
-from cpg_ros.feedback.estimate import Odometry, SCALE
+from cpg_ros.feedback.estimate import Odometry, SCALE_ERROR
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS, leg_length, robot_gains, shorter_times
 from cpg_ros.feedback.input_checks import MAX_AGE, MAX_AGE_BALANCE, MAX_STAMP_OFFSET
@@ -80,7 +80,7 @@ TOPICS = fixed({
                                     "robot's legs and IMU, such as odom; none by default"),
     f'{PREFIX}odometry_scale': Spec(1.0, 'true distance divided by odometry distance, for this '
                                     'robot and ground', 0.5, 2.0),
-    f'{PREFIX}odometry_scale_error': Spec(SCALE, 'standard deviation of that scale, for the '
+    f'{PREFIX}odometry_scale_error': Spec(SCALE_ERROR, 'standard deviation of that scale, for the '
                                           'covariance: about 0.015 where it was measured', 0.0,
                                           0.5),
     f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),

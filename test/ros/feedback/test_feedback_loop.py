@@ -19,7 +19,7 @@ import math
 
 from c_ticks import CTicks
 from cpg_ros.feedback.closed_loop import check_inputs
-from cpg_ros.feedback.estimate import TOUCH
+from cpg_ros.feedback.estimate import TOUCHDOWN_LOAD
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_checks import FADE, MAX_SILENCE, RECOVERY_TIME
 from cpg_ros.feedback.kinematics import geometry_of
@@ -221,7 +221,7 @@ def test_feet_are_felt_by_their_own_sensors_or_by_the_motors(monkeypatch, contac
     felt, true = np.array(felt[500:]), np.array(true[500:])
     # On the whole the legs bear the weight; efforts that move a leg pass for loads.
     assert felt.sum(axis=1).mean() == pytest.approx(true.sum(axis=1).mean(), rel=0.1)
-    least = TOUCH * geometry_of(GO2).weight
+    least = TOUCHDOWN_LOAD * geometry_of(GO2).weight
     agree = ((felt > least) == (true > least)).mean()
     assert agree > (0.97 if contacts == 'wrenches' else 0.55)
 
